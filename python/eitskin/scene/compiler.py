@@ -219,7 +219,7 @@ def _states(
 ) -> tuple[tuple[State, ...], IntArray]:
     """The distinct states, in the order that frames first have them, and which one each frame has
     (n,)."""
-    varies = any(isinstance(step, MaterialStep) and step.varies for step in steps)
+    varying = [step for step in steps if isinstance(step, MaterialStep) and step.varies]
     contacts = _contacts(scene, steps)
     samples = scene.samples()
     changes: dict[tuple[TrueTouch, ...], Change] = {(): NO_CHANGE}
@@ -230,7 +230,9 @@ def _states(
         recorded = frame - scene.quiet_frames
         touches = touches_at(samples, recorded) if recorded >= 0 else ()
         contact = contacts[frame if len(contacts) > 1 else 0]
-        key = (touches, contact_key(contact), frame if varies else 0)
+        time_s = recorded / scene.rate_hz
+        sheet = tuple(float(frame) if s.same is None else s.same(time_s, frame) for s in varying)
+        key = (touches, contact_key(contact), sheet)
         if key not in number:
             if touches not in changes:
                 changes[touches] = Change(*cover.factor(touches))

@@ -28,17 +28,22 @@ class Cover:
         self._corners = mesh.nodes_mm[mesh.triangles]
         self._middles = mesh.centroids_mm()
         self._reach = np.linalg.norm(self._corners - self._middles[:, None], axis=2).max(axis=1)
-        self._weights = sub_triangle_weights(subdivision)
+        self._weights = _sub_triangle_weights(subdivision)
 
     def of(self, touch: TrueTouch) -> tuple[IntArray, FloatArray]:
         """The elements that ``touch`` meets (e,), ascending, and what part of each it covers (e,),
-        in (0, 1]."""
+        in (0, 1]; of a shape, its mean change there over that in the middle."""
         centre = np.array([touch.x_mm, touch.y_mm])
+        reach_mm = touch.radius_mm * (1.0 if touch.shape is None else touch.shape.reach)
         near = np.flatnonzero(
-            np.linalg.norm(self._middles - centre, axis=1) <= touch.radius_mm + self._reach
+            np.linalg.norm(self._middles - centre, axis=1) <= reach_mm + self._reach
         )
-        points = self._weights @ self._corners[near]
-        part = (((points - centre) ** 2).sum(axis=2) <= touch.radius_mm**2).mean(axis=1)
+        offsets = self._weights @ self._corners[near] - centre
+        if touch.shape is None:
+            part = ((offsets**2).sum(axis=2) <= touch.radius_mm**2).mean(axis=1)
+        else:
+            x, y = offsets[..., 0], offsets[..., 1]
+            part = touch.shape.change_at(x, y, touch.radius_mm).mean(axis=1)
         met = part > 0
         return near[met], part[met]
 
@@ -56,7 +61,7 @@ class Cover:
         return elements, np.maximum(1.0 + change[elements], MIN_FACTOR)
 
 
-def sub_triangle_weights(subdivision: int) -> FloatArray:
+def _sub_triangle_weights(subdivision: int) -> FloatArray:
     """Barycentric weights (s^2, 3) of the centres of the s^2 triangles that halve, third, ... a
     triangle's sides."""
     s = subdivision

@@ -132,7 +132,7 @@ def _check_target(one: Range, scene: Scene, where: str) -> None:
                 f"{place}: the scene has {len(scene.touches)} touches, counted from 0"
             )
         if key[2] == "contrast" and not isinstance(scene.touches[number].law, ShortCircuit):
-            raise ConfigError(f"{place}: touch {number} has no contrast; its law is piezoresistive")
+            raise ConfigError(f"{place}: touch {number} has no contrast to vary under its law")
         return
     raise ConfigError(
         f"{place}: cannot be varied; use effects.NAME.KEY, or touch.NUMBER.KEY with"
@@ -179,8 +179,8 @@ def _seed(seed: int, number: int) -> int:
 def _varied(track: TouchTrack, key: str, value: float) -> TouchTrack:
     """``track`` with its law's contrast or its radius replaced, or moved so that its first keyframe
     has x or y."""
-    if key == "contrast":
-        return replace(track, law=ShortCircuit(value))
+    if key == "contrast" and isinstance(track.law, ShortCircuit):
+        return replace(track, law=replace(track.law, contrast=value))
     if key == "radius_mm":
         return replace(
             track, keyframes=tuple(replace(one, radius_mm=value) for one in track.keyframes)

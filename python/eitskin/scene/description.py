@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,8 +20,12 @@ from eitskin.errors import ConfigError
 from eitskin.scene.laws import DRIVING_KEY, LAW_KEYS, LAWS, law_from_table
 from eitskin.scene.random_touches import rim_distance_mm
 from eitskin.scene.touch_path import ALWAYS_S, Keyframe, TouchTrack, TrackSamples, sample
+from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, load_skin, paper_skin
+
+if TYPE_CHECKING:
+    from eitskin.scene.touch_shape import TouchShape
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -36,6 +40,11 @@ SCENE_KEYS = (
     "elements",
     "solver",
 )
+TOUCH_KEYS = {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_s"} | {
+    "shape",
+    "aspect",
+    "angle_deg",
+}
 SOLVERS = ("auto", "factorise", "update")
 MAX_FRAMES = 1_000_000
 MAX_TIME_S = 1e7
@@ -197,16 +206,15 @@ def _track(table: Mapping[str, Any], where: str) -> TouchTrack:
     name = choice(table, "law", "short_circuit", LAWS, where)
     driving = DRIVING_KEY[name]
     own = {key for keys in LAW_KEYS.values() for key in keys} | set(DRIVING_KEY.values())
-    check_keys(
-        table, {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_s"} | own, where
-    )
-    law = law_from_table(table, name, where)
+    check_keys(table, TOUCH_KEYS | own, where)
+    law, shape = law_from_table(table, name, where), _shape(table, where)
     hold = table.get("hold", False)
     if not isinstance(hold, bool):
         raise ConfigError(f"{where}: hold must be true or false, not {hold!r}")
     path = table.get("path")
     if path is None:
-        return TouchTrack(*_standing(table, driving, where))
+        keyframes, hold = _standing(table, driving, where)
+        return TouchTrack(keyframes, law, hold, shape)
     for key in ("x_mm", "y_mm", "from_s", "to_s"):
         if key in table:
             raise ConfigError(
@@ -226,7 +234,24 @@ def _track(table: Mapping[str, Any], where: str) -> TouchTrack:
                 f"{place}: t_s = {keys[-1].t_s:g} is not after {keys[-2].t_s:g}; keyframes must"
                 " ascend"
             )
-    return TouchTrack(tuple(keys), law, hold)
+    return TouchTrack(tuple(keys), law, hold, shape)
+
+
+def _shape(table: Mapping[str, Any], where: str) -> TouchShape | None:
+    """What ``shape`` names; its module is imported for shapes other than a disc."""
+    name = table.get("shape", "disc")
+    if name == "disc":
+        for key in ("aspect", "angle_deg"):
+            if key in table:
+                raise ConfigError(f"{where}: a disc has no {key}; name a shape, or remove it")
+        return None
+    from eitskin.scene import touch_shape
+
+    choice(table, "shape", None, ("disc", *touch_shape.SHAPES), where)
+    most = touch_shape.MAX_ASPECT
+    aspect = number(table, "aspect", touch_shape.SHAPES[name][1], where, low=1, high=most)
+    angle_deg = number(table, "angle_deg", 0.0, where, low=-360, high=360)
+    return touch_shape.named_shape(name, aspect, angle_deg)
 
 
 def _defaults(table: Mapping[str, Any], driving: str) -> dict[str, Any]:
@@ -235,9 +260,8 @@ def _defaults(table: Mapping[str, Any], driving: str) -> dict[str, Any]:
 
 def _standing(
     table: Mapping[str, Any], driving: str, where: str
-) -> tuple[tuple[Keyframe, ...], Any, bool]:
+) -> tuple[tuple[Keyframe, ...], bool]:
     """A touch without a path: there from from_s to to_s, or always."""
-    law = law_from_table(table, choice(table, "law", "short_circuit", LAWS, where), where)
     start = (
         number(table, "from_s", 0.0, where, low=-MAX_TIME_S, high=MAX_TIME_S)
         if "from_s" in table
@@ -251,7 +275,7 @@ def _standing(
         keys = [
             Keyframe(t, first.x_mm, first.y_mm, first.radius_mm, first.drive) for t in (begin, end)
         ]
-    return tuple(keys), law, "to_s" not in table
+    return tuple(keys), "to_s" not in table
 
 
 def _keyframe(table: Mapping[str, Any], driving: str, where: str) -> Keyframe:
@@ -283,10 +307,7 @@ def _check_touches(scene: Scene) -> None:
         if len(scene.touches[k].keyframes) and not one.there.any():
             continue
         at = np.flatnonzero(one.there)
-        room = (
-            rim_distance_mm(scene.skin.outline, np.column_stack([one.x_mm[at], one.y_mm[at]]))
-            - one.radius_mm[at]
-        )
+        room = _room_mm(scene.skin.outline, one, at)
         if room.min() < -1e-9:
             worst = int(at[room.argmin()])
             raise ConfigError(
@@ -298,15 +319,45 @@ def _check_touches(scene: Scene) -> None:
     _refuse_overlaps(scene, samples, times)
 
 
+def _room_mm(outline: Outline, one: TrackSamples, at: npt.NDArray[np.int64]) -> FloatArray:
+    """How far inside the rim the touch's edge is in the frames ``at`` (k,): (k,)."""
+    places = np.column_stack([one.x_mm[at], one.y_mm[at]])
+    shape = one.shape
+    if shape is None:
+        return rim_distance_mm(outline, places) - one.radius_mm[at]
+    edges = [place + shape.rim_mm(r) for place, r in zip(places, one.radius_mm[at], strict=True)]
+    return np.array([rim_distance_mm(outline, edge).min() for edge in edges])
+
+
+def _gap_mm(one: TrackSamples, other: TrackSamples) -> FloatArray:
+    """The distance between the edges of two touches, (n,), below 0 where they overlap; of shapes
+    about, but with the right sign."""
+    x_mm, y_mm = other.x_mm - one.x_mm, other.y_mm - one.y_mm
+    away_mm = np.hypot(x_mm, y_mm)
+    if one.shape is None and other.shape is None:
+        return np.asarray(away_mm - one.radius_mm - other.radius_mm)
+    gap_mm = away_mm.copy()
+    for k in np.flatnonzero(one.there & other.there):
+        for here, there, sign in ((one, other, 1), (other, one, -1)):
+            shape, radius_mm = here.shape or _disc(), float(here.radius_mm[k])
+            edge = (there.shape or _disc()).rim_mm(float(there.radius_mm[k]))
+            from_here = edge + sign * np.array([x_mm[k], y_mm[k]])
+            rho = np.sqrt(shape.rho2(from_here[:, 0], from_here[:, 1], radius_mm).min())
+            gap_mm[k] = min(gap_mm[k], (rho - 1) * radius_mm)
+    return gap_mm
+
+
+def _disc() -> TouchShape:
+    from eitskin.scene.touch_shape import TouchShape
+
+    return TouchShape()
+
+
 def _refuse_overlaps(scene: Scene, samples: Sequence[TrackSamples], times: FloatArray) -> None:
     for k, one in enumerate(samples):
         for j in range(k):
             other = samples[j]
-            gap = (
-                np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm)
-                - one.radius_mm
-                - other.radius_mm
-            )
+            gap = _gap_mm(one, other)
             bad = np.flatnonzero(one.there & other.there & (gap < -1e-9))
             if len(bad):
                 worst = int(bad[gap[bad].argmin()])

@@ -171,13 +171,15 @@ class GeometryStep:
 @dataclass(frozen=True, eq=False)
 class MaterialStep:
     """``apply(conductivity (E,) S/m, time_s, frame) -> (E,)``, before touches; applied once unless
-    it ``varies``."""
+    it ``varies``. ``same(time_s, frame)``: frames for which it gives the same number share a solve;
+    without it each frame that varies has its own."""
 
     name: str
     cost: EffectCost
     note: str
     apply: Callable[[FloatArray, float, int], FloatArray]
     varies: bool = False
+    same: Callable[[float, int], float] | None = None
     stage: Stage = Stage.MATERIAL
 
 

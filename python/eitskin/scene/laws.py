@@ -12,6 +12,12 @@ A law gives the contrast, the conductivity under the touch divided by the sheet'
   with c = saturation_contrast - 1 and s the slope at no load, ``sensitivity_per_gram``. The slope
   that the paper sees fall towards the centre is one of the picture's peak, not of the conductivity,
   and so is no part of the law.
+- Press and conduct: both, as of a finger that is pressed on. Of two rough bodies the true contact
+  grows with the load at first (Greenwood and Williamson, Proc. R. Soc. A 295, 1966) and ends at the
+  whole, so that to the piezoresistive contrast (contrast - 1) (1 - exp(-grams / contact_grams)) is
+  added.
+- Insulating: what is pressed on pushes the sheet aside or parts it, as a plastic rod does in a
+  tank. The short circuit's formula with a contrast below 1.
 """
 
 from __future__ import annotations
@@ -28,12 +34,24 @@ from eitskin.errors import ConfigError
 
 FloatArray = npt.NDArray[np.float64]
 
-LAWS = ("short_circuit", "piezoresistive")
 LAW_KEYS: dict[str, tuple[str, ...]] = {
     "short_circuit": ("contrast",),
     "piezoresistive": ("sensitivity_per_gram", "saturation_contrast"),
+    "press_and_conduct": (
+        "contrast",
+        "contact_grams",
+        "sensitivity_per_gram",
+        "saturation_contrast",
+    ),
+    "insulating": ("contrast",),
 }
-DRIVING_KEY = {"short_circuit": "press", "piezoresistive": "grams"}
+LAWS = tuple(LAW_KEYS)
+DRIVING_KEY = {
+    "short_circuit": "press",
+    "piezoresistive": "grams",
+    "press_and_conduct": "grams",
+    "insulating": "press",
+}
 MAX_CONTRAST = 1e4
 
 
@@ -63,7 +81,41 @@ class Piezoresistive:
         return np.asarray(1.0 + most * -np.expm1(-self.sensitivity_per_gram * grams / most))
 
 
+@dataclass(frozen=True)
+class PressAndConduct(Piezoresistive):
+    """A conductor that is pressed on: load on the sheet, and current through the contact, of which
+    ``contact_grams`` make 63 %. Driven by ``grams``."""
+
+    contrast: float = 9.0
+    contact_grams: float = 50.0
+
+    def contrast_at(self, grams: FloatArray) -> FloatArray:
+        """Contrast for each load in ``grams``, the same shape."""
+        contact = -np.expm1(-grams / self.contact_grams)
+        return np.asarray(super().contrast_at(grams) + (self.contrast - 1.0) * contact)
+
+
+@dataclass(frozen=True)
+class Insulating(ShortCircuit):
+    """A body that does not conduct, pressed into the sheet; driven by ``press``, 0 to 1."""
+
+    contrast: float = 0.2
+
+
 Law: TypeAlias = ShortCircuit | Piezoresistive
+KINDS: dict[str, type[Law]] = {
+    "short_circuit": ShortCircuit,
+    "piezoresistive": Piezoresistive,
+    "press_and_conduct": PressAndConduct,
+    "insulating": Insulating,
+}
+LEAST = {"saturation_contrast": 1.0}  # exclusive; others 0
+MOST = {
+    "sensitivity_per_gram": 10.0,
+    "saturation_contrast": 1e4,
+    "contact_grams": 1e4,
+    "contrast": MAX_CONTRAST,
+}
 
 
 def law_from_table(table: Mapping[str, Any], name: str, where: str) -> Law:
@@ -71,36 +123,27 @@ def law_from_table(table: Mapping[str, Any], name: str, where: str) -> Law:
     looked at.
 
     Raises:
-        ConfigError: a parameter is out of range, or belongs to the other law.
+        ConfigError: a parameter is out of range, or belongs to another law.
     """
+    own = (*LAW_KEYS[name], DRIVING_KEY[name])
     for other, keys in LAW_KEYS.items():
         for key in (*keys, DRIVING_KEY[other]):
-            if other != name and key in table:
+            if key in table and key not in own:
                 raise ConfigError(
                     f'{where}: {key} goes with law = "{other}", but the law is "{name}"; remove one'
                 )
-    if name == "short_circuit":
-        return ShortCircuit(
-            number(table, "contrast", 9.0, where, low=0, high=MAX_CONTRAST, open_low=True)
-        )
-    default = Piezoresistive()
-    return Piezoresistive(
-        number(
-            table,
-            "sensitivity_per_gram",
-            default.sensitivity_per_gram,
-            where,
-            low=0,
-            high=10,
-            open_low=True,
-        ),
-        number(
-            table,
-            "saturation_contrast",
-            default.saturation_contrast,
-            where,
-            low=1,
-            high=1e4,
-            open_low=True,
-        ),
+    kind = KINDS[name]
+    return kind(
+        **{
+            key: number(
+                table,
+                key,
+                getattr(kind(), key),
+                where,
+                low=LEAST.get(key, 0),
+                high=1.0 if kind is Insulating else MOST[key],
+                open_low=True,
+            )
+            for key in LAW_KEYS[name]
+        }
     )

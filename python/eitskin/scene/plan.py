@@ -155,6 +155,9 @@ def make_plan(
     if scene.touches:
         moving = sum(track.moves for track in scene.touches)
         note_touches = f"{len(scene.touches)}, of which {moving} change while they are there"
+        shapes = {track.shape.profile for track in scene.touches if track.shape is not None}
+        if shapes:
+            note_touches += f"; shapes: {', '.join(sorted(shapes))}"
         cost = EffectCost(vector_passes_per_frame=states / total)
         touches = [PlanStep("touches", Stage.MATERIAL, note_touches, cost, False)]
     read = EffectCost(vector_passes_per_frame=1)

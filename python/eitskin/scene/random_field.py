@@ -1,29 +1,26 @@
-"""Smooth random fields over the plane: how much a sheet differs from one place to the next."""
+"""A smooth random field over the plane: how much a sheet differs from one place to the next.
+
+It has the covariance exp(-d^2 / (2 length^2)), as a sum of cosines whose wave vectors are normal
+with deviation 1 / length (random Fourier features; Rahimi and Recht, NIPS 2007). It is a function
+of place, so that another mesh samples the same field.
+"""
 
 from __future__ import annotations
+
+from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
-MODES = 256
+COSINES = 256
 
 
-class RandomField:
-    """A Gaussian random field of mean 0 and standard deviation 1 whose correlation falls with the
-    distance d as exp(-d^2 / (2 l^2)), l = ``correlation_mm``.
-
-    It is a sum of 256 plane waves with random directions, lengths and phases (M. Shinozuka and G.
-    Deodatis, Appl. Mech. Rev. 44 (1991) 191-204, doi 10.1115/1.3119501), so it depends on the
-    generator and the place alone and not on a mesh.
-    """
-
-    def __init__(self, generator: np.random.Generator, correlation_mm: float) -> None:
-        self._waves_per_mm = generator.standard_normal((2, MODES)) / correlation_mm
-        self._phases = generator.uniform(0.0, 2 * np.pi, MODES)
-
-    def at(self, points_mm: FloatArray) -> FloatArray:
-        """Its values (k,) at ``points_mm`` (k, 2)."""
-        waves = np.cos(points_mm @ self._waves_per_mm + self._phases)
-        return np.asarray(waves.sum(axis=1) * np.sqrt(2 / MODES))
+def random_field(
+    places_mm: FloatArray, length_mm: float, generator: np.random.Generator
+) -> FloatArray:
+    """A Gaussian random field of mean 0 and variance 1 at ``places_mm`` (k, 2): (k,)."""
+    waves_per_mm = generator.standard_normal((COSINES, 2)) / length_mm
+    phases = generator.uniform(0, 2 * np.pi, COSINES)
+    return np.asarray(np.cos(places_mm @ waves_per_mm.T + phases).sum(axis=1) * sqrt(2 / COSINES))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,9 @@ from eitskin.errors import GeometryError, UsageError
 from eitskin.scene.streams import stream
 from eitskin.skin.outline import Outline
 
+if TYPE_CHECKING:
+    from eitskin.scene.touch_shape import TouchShape
+
 FloatArray = npt.NDArray[np.float64]
 
 TRIES = 20_000
@@ -24,18 +28,21 @@ TRIES = 20_000
 
 @dataclass(frozen=True)
 class TrueTouch:
-    """A disc of another conductivity.
+    """A disc of another conductivity, or another shape.
 
     Attributes:
         x_mm, y_mm: its centre.
-        radius_mm: its radius.
-        contrast: conductivity inside / the sheet's; above 1 conductive, below 1 resistive.
+        radius_mm: its radius; of another shape that of the disc of equal area.
+        contrast: conductivity inside (of another shape in the middle) / the sheet's; above 1
+            conductive, below 1 resistive.
+        shape: None is an even disc.
     """
 
     x_mm: float
     y_mm: float
     radius_mm: float
     contrast: float
+    shape: TouchShape | None = None
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,12 @@ ENTRY_POINT_GROUP = "eitskin.effects"
 BUILT_IN: dict[str, str] = {
     name: f"eitskin.scene.effects.{name}"
     for name in (
+        "out_of_round",
         "misplacement",
         "gel_drying",
         "temperature",
         "background",
+        "sheet_change",
         "contact_impedance",
         "detached",
         "bridged",

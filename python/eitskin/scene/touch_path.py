@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from eitskin.scene.laws import Law, ShortCircuit
 from eitskin.scene.random_touches import TrueTouch
+
+if TYPE_CHECKING:
+    from eitskin.scene.touch_shape import TouchShape
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -35,12 +39,13 @@ class TouchTrack:
 
     It is there from its first keyframe to its last, both included; with ``hold`` it stays after the
     last. A track of one keyframe at t_s = -inf is there always. Between keyframes everything
-    changes in proportion to time.
+    changes in proportion to time, but its ``shape`` (None: an even disc).
     """
 
     keyframes: tuple[Keyframe, ...]
     law: Law = field(default_factory=ShortCircuit)
     hold: bool = False
+    shape: TouchShape | None = None
 
     @property
     def moves(self) -> bool:
@@ -61,6 +66,7 @@ class TrackSamples:
     y_mm: FloatArray
     radius_mm: FloatArray
     contrast: FloatArray
+    shape: TouchShape | None = None
 
 
 def always(
@@ -83,9 +89,9 @@ def sample(track: TouchTrack, times_s: FloatArray) -> TrackSamples:
         return np.asarray(np.interp(times_s, at, [getattr(k, name) for k in keys]))
 
     contrast = track.law.contrast_at(line("drive"))
-    return TrackSamples(
-        there & (contrast != 1.0), line("x_mm"), line("y_mm"), line("radius_mm"), contrast
-    )
+    there &= contrast != 1.0
+    places = line("x_mm"), line("y_mm"), line("radius_mm")
+    return TrackSamples(there, *places, contrast, track.shape)
 
 
 def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[TrueTouch, ...]:
@@ -96,6 +102,7 @@ def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[TrueTouch, 
             float(s.y_mm[frame]),
             float(s.radius_mm[frame]),
             float(s.contrast[frame]),
+            s.shape,
         )
         for s in samples
         if s.there[frame]

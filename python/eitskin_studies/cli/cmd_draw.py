@@ -1,4 +1,4 @@
-"""``eitskin draw effect | wiring | examples``: what the documentation and the examples show."""
+"""``eitskin draw effect | touch | wiring | examples``: the documentation's pictures, and drawings."""
 
 from __future__ import annotations
 
@@ -20,6 +20,10 @@ def add_parser(subparsers: Any) -> None:
     option(effect, "name NAME", "of the effect (eitskin scene effects)")
     option(effect, "-o --output PNG", None, Path, required=True)
     effect.set_defaults(run=run_effect)
+    touch = what.add_parser("touch", help="a touch's law or shape, and what it does to a frame")
+    option(touch, "name NAME", "of the law or shape (docs/guide/scenes.md)")
+    option(touch, "-o --output PNG", None, Path, required=True)
+    touch.set_defaults(run=run_touch)
     wiring = what.add_parser("wiring", help="the wiring of board, multiplexers and skin")
     option(wiring, "-o --output PNG", None, Path, required=True)
     wiring.set_defaults(run=run_wiring)
@@ -35,6 +39,17 @@ def run_effect(options: argparse.Namespace) -> int:
 
     refuse_unwritable(options.output)
     draw_effect(options.output, options.name)
+    print(f"picture: {options.output}")
+    return 0
+
+
+def run_touch(options: argparse.Namespace) -> int:
+    """Draw one law or shape."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.pictures.touch_pictures import draw_touch
+
+    refuse_unwritable(options.output)
+    draw_touch(options.output, options.name)
     print(f"picture: {options.output}")
     return 0
 

@@ -40,11 +40,14 @@ ELEMENTS = 2000
 FRAMES = 40
 RATE_HZ = 20.0
 
+PRESS = {"x_mm": 30.0, "y_mm": 20.0, "radius_mm": 12.0}
 SHOWN: dict[str, dict[str, Any]] = {
+    "out_of_round": {"spread": 0.05},
     "misplacement": {"spread_mm": 6.0},
     "background": {"spread": 0.2, "length_mm": 25.0},
     "temperature": {"offset_k": 2.0, "drift_k_per_min": 0.5},
     "gel_drying": {"time_constant_h": 0.01, "final_water": 0.5},
+    "sheet_change": {"spread": 0.02, "at_s": 0.5, "rise_s": 1.0},
     "contact_impedance": {"mean_ohm_m2": 0.01, "spread": 0.5},
     "detached": {"electrodes": [5]},
     "bridged": {"electrodes": [2, 4], "resistance_ohm": 100.0},
@@ -82,16 +85,19 @@ def draw_effect(path: str | Path, name: str) -> None:
         figure = matplotlib.figure.Figure(figsize=(8.2, 3.3), layout="compressed")
         left, right = figure.subplots(1, 2)
         SKETCHES[name](left, skin_session, parameters[name])
-        _draw_difference(right, frames[-1] - without[-1], without[-1])
+        draw_difference(right, frames[-1] - without[-1], without[-1])
         table = ", ".join(f"{key} = {value}" for key, value in SHOWN[name].items())
         figure.suptitle(
             f"[effects.{name}]  {table}", fontsize=10, fontweight="bold", family="monospace"
         )
-        _save_small_png(figure, path)
+        save_small_png(figure, path)
 
 
-def press_frames(effects: dict[str, Any]) -> tuple[FloatArray, dict[str, Any], EffectSession]:
-    """All frames (n, m) of the press, the effects' parameters, and a session to make effects in."""
+def press_frames(
+    effects: dict[str, Any], touch: dict[str, Any] | None = None
+) -> tuple[FloatArray, dict[str, Any], EffectSession]:
+    """All frames (n, m) of the press, the effects' parameters, and a session to make effects in.
+    ``touch`` adds keys to the touch's table, or replaces them."""
     table = {
         "scene": {
             "name": "press",
@@ -100,7 +106,7 @@ def press_frames(effects: dict[str, Any]) -> tuple[FloatArray, dict[str, Any], E
             "rate_hz": RATE_HZ,
             "elements": ELEMENTS,
         },
-        "touch": [{"x_mm": 30.0, "y_mm": 20.0, "radius_mm": 12.0, "contrast": 9.0}],
+        "touch": [{**PRESS, **(touch or {})}],
         "effects": effects,
     }
     compiled = compile_scene(scene_from_table(table, "the picture's scene", Path()))
@@ -126,7 +132,7 @@ def press_frames(effects: dict[str, Any]) -> tuple[FloatArray, dict[str, Any], E
     return simulate_frames(compiled).voltage_v, compiled.parameters, session
 
 
-def _draw_difference(axes: Axes, change_v: FloatArray, frame_v: FloatArray) -> None:
+def draw_difference(axes: Axes, change_v: FloatArray, frame_v: FloatArray) -> None:
     rows = np.arange(len(change_v))
     axes.axhline(0, color=LIGHT, linewidth=0.8)
     axes.plot(rows, 1e3 * change_v, color=STRONG, linewidth=0.9)
@@ -135,7 +141,7 @@ def _draw_difference(axes: Axes, change_v: FloatArray, frame_v: FloatArray) -> N
     axes.set_title(f"in a frame: rms {rms:.3g} mV of {whole:.3g} mV")
 
 
-def _save_small_png(figure: Figure, path: str | Path) -> None:
+def save_small_png(figure: Figure, path: str | Path) -> None:
     """With a palette, which takes a third of the bytes (Pillow comes with matplotlib)."""
     from PIL import Image
 

@@ -89,6 +89,42 @@ def misplacement(axes: Axes, session: EffectSession, parameters: Any) -> None:
     axes.set(xlabel="x (mm)", ylabel="y (mm)", title="electrodes along the rim")
 
 
+def out_of_round(axes: Axes, session: EffectSession, parameters: Any) -> None:
+    """The outline described and the true one."""
+    from eitskin.scene.effects.out_of_round import make
+
+    for skin, colour, label in (
+        (session.skin, LIGHT, "described"),
+        (make(parameters, session).apply(session.skin), STRONG, "true"),
+    ):
+        rim = skin.outline.points_at(np.linspace(0, skin.outline.perimeter_mm, 361))
+        axes.plot(*rim.T, color=colour, label=label)
+    axes.set_aspect("equal")
+    axes.legend(loc="center", frameon=False)
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title="the outline")
+
+
+def sheet_change(axes: Axes, session: EffectSession, parameters: Any) -> None:
+    """The whole change on the mesh."""
+    from eitskin.scene.effects.sheet_change import make
+
+    mesh, whole_s = session.mesh, parameters.at_s + parameters.rise_s
+    factors = make(parameters, session).apply(np.ones(mesh.n_elements), whole_s, 0)
+    size = 100 * float(np.abs(factors - 1).max())
+    colour: dict[str, Any] = {
+        "triangles": mesh.triangles,
+        "cmap": "RdBu_r",
+        "vmin": -size,
+        "vmax": size,
+    }
+    x, y = mesh.nodes_mm.T
+    shown = axes.tripcolor(x, y, facecolors=100 * (factors - 1), **colour)
+    axes.figure.colorbar(shown, ax=axes, shrink=0.8).set_label("change (%)")
+    axes.set_aspect("equal")
+    title = f"since the tare, whole at {whole_s:g} s"
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=title)
+
+
 def contact_impedance(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """Each electrode's impedance."""
     from eitskin.scene.effects.contact_impedance import impedances
@@ -326,7 +362,8 @@ def jitter(axes: Axes, session: EffectSession, parameters: Any) -> None:
 SKETCHES: dict[str, Callable[[Any, EffectSession, Any], None]] = {
     sketch.__name__: sketch
     for sketch in (
-        misplacement, background, temperature, gel_drying, contact_impedance, detached, bridged,
+        out_of_round, misplacement, background, temperature, gel_drying, sheet_change,
+        contact_impedance, detached, bridged,
         phase,
         source_impedance, amplitude_drift, crosstalk, mux, charge_injection, mains, common_mode,
         channel_gain, jitter,

@@ -21,14 +21,15 @@ import numpy.typing as npt
 from eitskin.config import nearest
 from eitskin.errors import GeometryError, UsageError
 from eitskin.fem.cem import ForwardModel
+from eitskin.fem.deform import Deformation
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.fileio import write_beside
-from eitskin.scene.cover import MIN_FACTOR, SUBDIVISION, sub_triangle_weights
-from eitskin.scene.random_field import RandomField
+from eitskin.scene.cover import Cover
+from eitskin.scene.random_field import random_field
 from eitskin.scene.random_touches import TouchScene, TrueTouch, rim_distance_mm
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.scene.streams import stream
-from eitskin.scene.touch_shape import TouchShape
+from eitskin.scene.touch_shape import named_shape
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin_studies.harness.sessions import converter_for
@@ -44,26 +45,12 @@ RIM_MARGIN_MM = 4.0
 TRIES = 20_000
 
 
-@dataclass(frozen=True)
-class ShapedTouch:
-    """A touch of any shape; ``disc`` has its middle, its area and the contrast in the middle."""
-
-    disc: TrueTouch
-    shape: TouchShape
-
-    @property
-    def reach_mm(self) -> float:
-        """How far from its middle it changes anything."""
-        return self.disc.radius_mm * self.shape.reach
-
-
 @dataclass(frozen=True, eq=False)
 class WorldScenes:
     """A set, simulated: scene k has ``quiet_v[k]`` (q, m) for its tare and ``frames_v[k]`` (m,), in
     V.
 
-    ``scenes[k]`` holds its touches as discs of the same middle and area, for scoring; ``shaped[k]``
-    as they are, where they were simulated in this process.
+    ``scenes[k]`` holds its touches.
     """
 
     name: str
@@ -71,7 +58,6 @@ class WorldScenes:
     scenes: tuple[TouchScene, ...]
     quiet_v: FloatArray
     frames_v: FloatArray
-    shaped: tuple[tuple[ShapedTouch, ...], ...] = ()
 
 
 @dataclass(eq=False)
@@ -91,6 +77,10 @@ class WorldFactory:
     @cached_property
     def _forward(self) -> ForwardModel:
         return ForwardModel(self.mesh, self.skin, self.protocol)
+
+    @cached_property
+    def _deformation(self) -> Deformation:
+        return Deformation(self.mesh)
 
     @cached_property
     def _radius_mm(self) -> float:
@@ -126,16 +116,15 @@ class WorldFactory:
         exact = self._kept(role, world.errors, drawn, seed, progress)
         quiet_v, frames_v = _measured(exact, world, seed, role)
         scenes = tuple(
-            TouchScene(f"{name}-{family}-s{seed}-{k}", tuple(t.disc for t in touches))
-            for k, touches in enumerate(drawn)
+            TouchScene(f"{name}-{family}-s{seed}-{k}", touches) for k, touches in enumerate(drawn)
         )
-        return WorldScenes(name, world, scenes, quiet_v, frames_v, tuple(drawn))
+        return WorldScenes(name, world, scenes, quiet_v, frames_v)
 
     def _kept(
         self,
         role: str,
         errors: Errors,
-        drawn: list[tuple[ShapedTouch, ...]],
+        drawn: list[tuple[TrueTouch, ...]],
         seed: int,
         progress: Progress | None,
     ) -> FloatArray:
@@ -161,7 +150,7 @@ class WorldFactory:
         self,
         role: str,
         errors: Errors,
-        drawn: list[tuple[ShapedTouch, ...]],
+        drawn: list[tuple[TrueTouch, ...]],
         seed: int,
         progress: Progress | None,
     ) -> FloatArray:
@@ -177,7 +166,7 @@ class WorldFactory:
         )
 
     def _solve(
-        self, errors: Errors, touches: tuple[ShapedTouch, ...], draw: Generators
+        self, errors: Errors, touches: tuple[TrueTouch, ...], draw: Generators
     ) -> FloatArray:
         """The untouched and the touched frame (2, m) of one skin."""
         forward = self._forward_with(errors, draw)
@@ -190,11 +179,13 @@ class WorldFactory:
             contact *= 1 + errors.contact_spread * draw("contact").uniform(-1, 1, len(contact))
         sheet = np.full(len(middles), self.skin.conductivity_s_per_m)
         if errors.uneven:
-            sheet *= np.exp(errors.uneven * self._field(errors, draw("uneven")).at(middles))
+            sheet *= np.exp(errors.uneven * self._field(errors, middles, draw("uneven")))
         untouched = forward.voltages(sheet, contact)
-        changed, amplitude = sheet * touched_factor(forward.mesh, touches), 1.0
+        elements, factors = Cover(forward.mesh).factor(touches)
+        changed, amplitude = sheet.copy(), 1.0
+        changed[elements] *= factors
         if errors.drift:
-            changed *= np.exp(errors.drift * self._field(errors, draw("drift")).at(middles))
+            changed *= np.exp(errors.drift * self._field(errors, middles, draw("drift")))
         if errors.contact_drift:
             change = errors.contact_drift * draw("contact drift").standard_normal(len(contact))
             contact = contact * np.exp(change)
@@ -202,29 +193,27 @@ class WorldFactory:
             amplitude += errors.amplitude_drift * float(draw("amplitude drift").standard_normal())
         return np.array([untouched, amplitude * forward.voltages(changed, contact)])
 
-    def _field(self, errors: Errors, generator: np.random.Generator) -> RandomField:
-        length_mm = self._radius_mm * float(generator.uniform(*errors.correlation))
-        return RandomField(generator, length_mm)
+    def _field(self, errors: Errors, at_mm: FloatArray, draw: np.random.Generator) -> FloatArray:
+        length_mm = self._radius_mm * float(draw.uniform(*errors.correlation))
+        return random_field(at_mm, length_mm, draw)
 
     def _forward_with(self, errors: Errors, draw: Generators) -> ForwardModel:
         """The forward model on the mesh with its nodes where this skin's are."""
         if not (errors.misplaced_mm or errors.out_of_round):
             return self._forward
-        nodes = self.mesh.nodes_mm
+        count, rim = self.skin.electrodes.count, self._deformation.rim
+        shifts, outwards = np.zeros(count), np.zeros(len(rim.nodes))
         if errors.misplaced_mm:
-            count = self.skin.electrodes.count
             shifts = errors.misplaced_mm * draw("misplaced").standard_normal(count)
-            nodes = turned_nodes(self.skin, nodes, shifts)
         if errors.out_of_round:
             generator = draw("out of round")
-            angle = np.arctan2(nodes[:, 1], nodes[:, 0])
-            waves = np.zeros(len(nodes))
+            x, y = (self.mesh.nodes_mm[rim.nodes] - self.skin.outline.centre_mm).T
             for harmonic in (2, 3):
                 size, phase = generator.standard_normal(), generator.uniform(0, 2 * math.pi)
-                waves += size * np.cos(harmonic * angle - phase)
-            share = np.hypot(nodes[:, 0], nodes[:, 1]) / self._radius_mm
-            nodes = nodes * (1 + errors.out_of_round * waves * share)[:, None]
-        return ForwardModel(replace(self.mesh, nodes_mm=nodes), self.skin, self.protocol)
+                outwards += size * np.cos(harmonic * np.arctan2(y, x) - phase)
+            outwards *= errors.out_of_round * self._radius_mm
+        mesh = self._deformation.moved(shifts, np.ones(count), outwards)
+        return ForwardModel(mesh, self.skin, self.protocol)
 
 
 def named_world(name: str) -> World:
@@ -238,52 +227,9 @@ def named_world(name: str) -> World:
     return WORLDS[name]
 
 
-def turned_nodes(skin: Skin, nodes_mm: FloatArray, shifts_mm: FloatArray) -> FloatArray:
-    """Nodes (N, 2) of a disk turned so that each electrode moves by ``shifts_mm`` (L,) along the
-    rim and keeps its width: between electrodes linearly, towards the middle with the cube of the
-    radius.
-
-    Raises:
-        GeometryError: the skin is no disk, or electrodes would meet.
-    """
-    if skin.outline.diameter_mm is None:
-        raise GeometryError("worlds: electrodes are misplaced on disks only")
-    radius = skin.outline.diameter_mm / 2
-    angles = skin.electrode_spans_mm() / radius  # arc length 0 is at angle 0
-    turn = np.repeat(shifts_mm / radius, 2)
-    at = angles.ravel()
-    order = np.argsort(at)
-    at, turn = at[order], turn[order]
-    if np.diff(np.concatenate([at + turn, at[:1] + turn[:1] + 2 * math.pi])).min() <= 0:
-        raise GeometryError("worlds: misplaced electrodes meet; use smaller shifts")
-    polar = np.mod(np.arctan2(nodes_mm[:, 1], nodes_mm[:, 0]), 2 * math.pi)
-    share = np.hypot(nodes_mm[:, 0], nodes_mm[:, 1]) / radius
-    by = np.interp(polar, at, turn, period=2 * math.pi) * share**3
-    cos, sin = np.cos(by), np.sin(by)
-    x, y = nodes_mm.T
-    return np.column_stack([x * cos - y * sin, x * sin + y * cos])
-
-
-def touched_factor(mesh: Mesh, touches: Iterable[ShapedTouch]) -> FloatArray:
-    """What touches multiply each element's conductivity by, (E,): the mean over 64 points of it.
-    Where touches overlap their changes add (never below a thousandth)."""
-    change = np.zeros(mesh.n_elements)
-    middles, weights = mesh.centroids_mm(), sub_triangle_weights(SUBDIVISION)
-    corners = mesh.nodes_mm[mesh.triangles]
-    own_reach = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
-    for touch in touches:
-        disc = touch.disc
-        centre = np.array([disc.x_mm, disc.y_mm])
-        distance = np.linalg.norm(middles - centre, axis=1)
-        near = np.flatnonzero(distance <= touch.reach_mm + own_reach)
-        part = touch.shape.change_at(weights @ corners[near] - centre, disc.radius_mm).mean(axis=1)
-        change[near] += part * (disc.contrast - 1.0)
-    return np.maximum(1.0 + change, MIN_FACTOR)
-
-
 def draw_touches(
     skin: Skin, kinds: TouchKinds, generator: np.random.Generator
-) -> tuple[ShapedTouch, ...]:
+) -> tuple[TrueTouch, ...]:
     """One scene's touches: sizes first, then places until all fit; after 200 misses for one touch
     all places are drawn again.
 
@@ -334,7 +280,7 @@ def _sizes(
 
 def _draw_pair(
     skin: Skin, kinds: TouchKinds, generator: np.random.Generator
-) -> tuple[ShapedTouch, ...]:
+) -> tuple[TrueTouch, ...]:
     """Two fingers side by side: long axes along one another to 20 degrees, and across the line of
     their middles, on which they do not overlap."""
     assert kinds.pair_mm is not None
@@ -361,15 +307,14 @@ def _shaped(
     contrasts: FloatArray,
     aspects: FloatArray,
     angles: FloatArray,
-) -> tuple[ShapedTouch, ...]:
+) -> tuple[TrueTouch, ...]:
+    shapes = [
+        None if kinds.shape is None else named_shape(kinds.shape, float(a), math.degrees(angle))
+        for a, angle in zip(aspects, angles, strict=True)
+    ]
     return tuple(
-        ShapedTouch(
-            TrueTouch(float(x), float(y), float(r), float(c)),
-            TouchShape(float(aspect), float(angle), kinds.profile),
-        )
-        for (x, y), r, c, aspect, angle in zip(
-            places, radii, contrasts, aspects, angles, strict=True
-        )
+        TrueTouch(float(x), float(y), float(r), float(c), shape)
+        for (x, y), r, c, shape in zip(places, radii, contrasts, shapes, strict=True)
     )
 
 

@@ -16,7 +16,7 @@ class TouchKinds:
         radius_mm: of the disc of the same area.
         contrast: conductivity in the middle over the sheet's.
         aspect: long over short axis.
-        profile: of ``eitskin.scene.touch_shape.PROFILES``.
+        shape: of ``eitskin.scene.touch_shape.SHAPES``; None: even discs.
         gap_mm: least distance between the edges of two touches.
         spacing_radii: least distance between two middles over the mean of their radii, instead.
         pair_mm: two touches side by side, their middles so far apart, instead.
@@ -26,7 +26,7 @@ class TouchKinds:
     radius_mm: Range = (6.0, 12.0)
     contrast: Range = (3.0, 10.0)
     aspect: Range = (1.0, 1.0)
-    profile: str = "flat"
+    shape: str | None = None
     gap_mm: float = 12.0
     spacing_radii: float | None = None
     pair_mm: Range | None = None
@@ -71,7 +71,7 @@ class World:
 
 
 NONE = TouchKinds(count=(0, 0))
-FINGERS = TouchKinds(aspect=(1.4, 2.2), profile="hertz")
+FINGERS = TouchKinds(aspect=(1.4, 2.2), shape="finger")
 MILD = Errors(
     contact_log_sd=0.3,
     misplaced_mm=0.5,
@@ -88,7 +88,7 @@ FIVE_UNLIKE = TouchKinds((5, 5), (6.5, 11.0), spacing_radii=2.5)
 
 def _two_fingers(low_mm: float, high_mm: float) -> TouchKinds:
     return TouchKinds(
-        (2, 2), (5.0, 8.0), aspect=(1.4, 2.2), profile="hertz", pair_mm=(low_mm, high_mm)
+        (2, 2), (5.0, 8.0), aspect=(1.4, 2.2), shape="finger", pair_mm=(low_mm, high_mm)
     )
 
 
@@ -129,11 +129,13 @@ WORLDS: dict[str, World] = {
     "out_of_round_2_percent": World(
         "1 to 3 discs; the outline is out of round", errors=Errors(out_of_round=0.02)
     ),
-    "ellipses": World("1 to 3 flat ellipses, axes 1.4 to 2.2", TouchKinds(aspect=(1.4, 2.2))),
-    "hertz_discs": World("1 to 3 discs with Hertz profile", TouchKinds(profile="hertz")),
+    "ellipses": World(
+        "1 to 3 flat ellipses, axes 1.4 to 2.2", TouchKinds(aspect=(1.4, 2.2), shape="ellipse")
+    ),
+    "hertz_discs": World("1 to 3 discs with Hertz profile", TouchKinds(shape="hertz")),
     "gaussian_blobs": World(
         "1 to 3 Gaussian blobs, half height at 4 to 8 mm",
-        TouchKinds(radius_mm=(4.0, 8.0), profile="gauss"),
+        TouchKinds(radius_mm=(4.0, 8.0), shape="gauss"),
     ),
     "fingers": World("1 to 3 ellipses with Hertz profile, axes 1.4 to 2.2", FINGERS),
     "fingers_mild_errors": World("the same with mild errors of all kinds", FINGERS, MILD),

@@ -10,6 +10,7 @@ from eitskin.errors import UsageError
 from eitskin.scene.registry import BUILT_IN
 from eitskin_studies.pictures.effect_pictures import SHOWN, draw_effect
 from eitskin_studies.pictures.effect_sketches import SKETCHES
+from eitskin_studies.pictures.touch_pictures import draw_touch
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -31,3 +32,11 @@ def test_an_unknown_effect_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no picture of an effect 'noice'; did you mean 'noise'"):
         draw_effect(tmp_path / "x.png", "noice")
     assert not (tmp_path / "x.png").exists()
+
+
+def test_a_touchs_law_and_shape_are_drawn(tmp_path: Path) -> None:
+    for name in ("insulating", "finger"):
+        draw_touch(tmp_path / name, name)
+        assert (tmp_path / name).read_bytes().startswith(PNG)
+    with pytest.raises(UsageError, match="no picture of a touch 'thumb'"):
+        draw_touch(tmp_path / "x.png", "thumb")

@@ -1,11 +1,9 @@
 """A sheet that is not even: a smooth random pattern of conductivity, its mean over the area kept.
 
-The pattern is a Gaussian random field with the covariance exp(-d^2 / (2 length^2)), as a sum of
-cosines whose wave vectors are normal with deviation 1 / length (random Fourier features; Rahimi and
-Recht, NIPS 2007). It is a function of place, so that another mesh samples the same pattern. With f
-of unit variance and q = ln(1 + spread^2), the conductivity is multiplied by exp(sqrt(q) f),
-log-normal with a relative deviation of ``spread``, so always above 0; dividing by its mean over the
-area makes the mean exactly what the skin's description says.
+The pattern is a Gaussian random field f of unit variance (``scene/random_field.py``). With q = ln(1
++ spread^2) the conductivity is multiplied by exp(sqrt(q) f), log-normal with a relative deviation
+of ``spread``, so always above 0; dividing by its mean over the area makes the mean exactly what the
+skin's description says.
 """
 
 from __future__ import annotations
@@ -17,12 +15,12 @@ import numpy as np
 
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, MaterialStep, Stage
 from eitskin.scene.parameter import parameter
+from eitskin.scene.random_field import COSINES, random_field
 
 NAME = "background"
 STAGE = Stage.MATERIAL
 ORDER = 10
 SUMMARY = "The skin's conductivity varies smoothly from place to place."
-COSINES = 256
 
 
 @dataclass(frozen=True)
@@ -35,15 +33,6 @@ class Parameters:
     length_mm: float = parameter(
         30.0, "mm", "distance over which the pattern is alike", low=0, open_low=True
     )
-
-
-def random_field(
-    places_mm: FloatArray, length_mm: float, generator: np.random.Generator
-) -> FloatArray:
-    """A smooth Gaussian random field of mean 0 and variance 1 at ``places_mm`` (k, 2): (k,)."""
-    waves_per_mm = generator.standard_normal((COSINES, 2)) / length_mm
-    phases = generator.uniform(0, 2 * np.pi, COSINES)
-    return np.asarray(np.cos(places_mm @ waves_per_mm.T + phases).sum(axis=1) * sqrt(2 / COSINES))
 
 
 def pattern(

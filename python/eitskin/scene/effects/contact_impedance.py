@@ -7,6 +7,9 @@ interface: phi + z sigma dphi/dn = U. Fitted to saline of 0.35 to 3.4 S/m on met
     found 58 down to 7.5
 ohm cm2 (6e-3 to 8e-4 ohm m2). z = 0 is an ideal shunt. Electrodes differ: z_l = mean (1 +
 uniform(-spread, spread)), drawn once.
+
+Contacts may change after the tare, suddenly, as by a knock, or slowly, as by drying: each is
+multiplied by exp(change p(t) n) with its own normal number n, p rising from 0 to 1.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eitskin.errors import ConfigError
+from eitskin.scene.change import part_at
 from eitskin.scene.effect import Contacts, ContactStep, EffectCost, EffectSession, FloatArray, Stage
 from eitskin.scene.parameter import parameter
 
@@ -36,6 +40,12 @@ class Parameters:
         0.0, "1", "each electrode's differs by up to this part of the mean", low=0, high=1
     )
 
+    change: float = parameter(
+        0.0, "1", "standard deviation of the logarithm of each one's change", low=0, high=3
+    )
+    change_at_s: float = parameter(0.0, "s", "when the change begins")
+    change_rise_s: float = parameter(0.0, "s", "time until it is whole; 0: at once", low=0)
+
     def __post_init__(self) -> None:
         if self.spread == 1:
             raise ConfigError("spread = 1 would make ideal contacts by chance; it must be below 1")
@@ -53,11 +63,25 @@ def make(parameters: Parameters, session: EffectSession) -> ContactStep:
     """Every electrode's contact impedance, drawn once."""
     count = session.skin.electrodes.count
     impedance = impedances(parameters, count, session)
+    note = f"{parameters.mean_ohm_m2:g} ohm m2, differing by up to {100 * parameters.spread:g} %"
+    numbers = count if parameters.spread else 0
+    if not parameters.change:
+        return ContactStep(
+            NAME,
+            EffectCost(random_numbers=numbers),
+            note,
+            lambda contacts, time_s, frame: replace(contacts, impedance_ohm_m2=impedance),
+        )
+    log_change = parameters.change * session.stream(f"{NAME} change").standard_normal(count)
+
+    def part(time_s: float) -> float:
+        return part_at(time_s, parameters.change_at_s, parameters.change_rise_s)
 
     def apply(contacts: Contacts, time_s: float, frame: int) -> Contacts:
-        return replace(contacts, impedance_ohm_m2=impedance)
+        changed = impedance * np.exp(part(time_s) * log_change)
+        return replace(contacts, impedance_ohm_m2=changed)
 
-    note = f"{parameters.mean_ohm_m2:g} ohm m2, differing by up to {100 * parameters.spread:g} %"
-    return ContactStep(
-        NAME, EffectCost(random_numbers=count if parameters.spread else 0), note, apply
-    )
+    note += f", changing by {100 * parameters.change:g} % from {parameters.change_at_s:g} s on"
+    parts = {part(float(t)) for t in session.times_s()}
+    cost = EffectCost(factorisations=len(parts) - 1, random_numbers=numbers + count)
+    return ContactStep(NAME, cost, note, apply, varies=True)

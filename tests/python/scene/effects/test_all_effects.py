@@ -24,10 +24,12 @@ from eitskin.skin.protocol import adjacent
 BENCH = MeshCache()  # keeps the meshes
 # The parameters under which each effect is looked at, so strong that breaking reciprocity shows.
 STRONG: dict[str, dict[str, Any]] = {
+    "out_of_round": {"spread": 0.05},
     "misplacement": {"spread_mm": 4.0},
     "background": {"spread": 0.4},
     "temperature": {"offset_k": 5.0, "drift_k_per_min": 10.0},
     "gel_drying": {"time_constant_h": 0.001},
+    "sheet_change": {"spread": 0.3},
     "contact_impedance": {"mean_ohm_m2": 0.05, "spread": 0.5},
     "detached": {"electrodes": [3, 11]},
     "bridged": {"electrodes": [2, 3, 9], "resistance_ohm": 50.0},
@@ -51,12 +53,12 @@ STRONG: dict[str, dict[str, Any]] = {
 # load, potentials or chance.
 KEEP = {
     "misplacement", "background", "temperature", "gel_drying", "contact_impedance", "detached",
-    "bridged", "phase",
+    "bridged", "phase", "out_of_round", "sheet_change",
     "amplitude_drift", "saturation", "adc",
 }  # fmt: skip
 RANDOM = {
     "misplacement", "background", "contact_impedance", "amplitude_drift", "channel_gain", "mux",
-    "charge_injection",
+    "charge_injection", "out_of_round", "sheet_change",
     "jitter", "noise",
 }  # fmt: skip
 
@@ -184,7 +186,10 @@ def test_the_page_has_every_effect_and_parameter(name: str) -> None:
     assert 2_000 < (folder / f"{name}.png").stat().st_size < 60_000
 
 
-def test_misplacement_is_the_only_geometry_step() -> None:
+def test_misplacement_and_outline_are_the_only_geometry_steps() -> None:
     stages = {name: importlib.import_module(module).STAGE for name, module in BUILT_IN.items()}
-    assert [name for name, stage in stages.items() if stage is Stage.GEOMETRY] == ["misplacement"]
+    assert [name for name, stage in stages.items() if stage is Stage.GEOMETRY] == [
+        "out_of_round",
+        "misplacement",
+    ]
     assert GeometryStep.__dataclass_fields__["stage"].default is Stage.GEOMETRY

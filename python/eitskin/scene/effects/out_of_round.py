@@ -1,0 +1,89 @@
+"""An outline that is not cut as described: its radius waves with the angle.
+
+The radius about the middle is multiplied by 1 + sum_k c_k cos(k angle - phase_k), k = 2 (oval) and
+3 (three-cornered), with normal c_k of deviation ``spread`` and even phases, drawn once, and scaled
+so that the area stays. Electrodes keep their parts of the rim. What a wrong outline does to images:
+Kolehmainen, Lassas and Ola, SIAM J. Appl. Math. 66, 2005; difference imaging cancels most of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+
+import numpy as np
+
+from eitskin.errors import ConfigError, GeometryError
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, GeometryStep, Stage
+from eitskin.scene.parameter import parameter
+from eitskin.skin.outline import Outline, polygon
+from eitskin.skin.skin import Skin
+
+NAME = "out_of_round"
+STAGE = Stage.GEOMETRY
+ORDER = 5
+SUMMARY = "The outline's radius waves with the angle."
+HARMONICS = (2, 3)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """How far from the outline described."""
+
+    spread: float = parameter(
+        0.02, "1", "standard deviation of each wave over the radius", low=0, high=0.2
+    )
+
+
+def waved(outline: Outline, sizes: FloatArray, phases: FloatArray) -> Outline:
+    """``outline`` as a polygon with its radius waved, of the same area.
+
+    Raises:
+        GeometryError: the rim would cross itself.
+    """
+    corners = np.array(outline.vertices_mm)
+    middle = np.array(outline.centre_mm)
+    offsets = corners - middle
+    angles = np.arctan2(offsets[:, 1], offsets[:, 0])
+    waves = [
+        size * np.cos(k * angles - phase)
+        for k, size, phase in zip(HARMONICS, sizes, phases, strict=True)
+    ]
+    factors = 1 + np.sum(waves, axis=0)
+    if factors.min() <= 0:
+        raise GeometryError("the radius would fall to 0")
+    offsets = offsets * factors[:, None]
+    shape = polygon((middle + offsets).tolist())
+    grow = sqrt(outline.area_mm2 / shape.area_mm2)
+    return polygon((middle + grow * offsets).tolist())
+
+
+def bent(skin: Skin, outline: Outline) -> Skin:
+    """``skin`` with another outline, its electrodes at the same parts of the rim."""
+    electrodes = skin.electrodes
+    if electrodes.positions_mm is not None:
+        ratio = outline.perimeter_mm / skin.outline.perimeter_mm
+        places = tuple(ratio * place for place in electrodes.positions_mm)
+        electrodes = replace(electrodes, positions_mm=places)
+    return replace(skin, outline=outline, electrodes=electrodes)
+
+
+def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
+    """The skin that is meshed.
+
+    Raises:
+        ConfigError: the outline would not be one any more.
+    """
+    generator = session.stream(NAME)
+    sizes = parameters.spread * generator.standard_normal(len(HARMONICS))
+    phases = generator.uniform(0, 2 * pi, len(HARMONICS))
+    try:
+        bent(session.skin, waved(session.skin.outline, sizes, phases))
+    except GeometryError as error:
+        raise ConfigError(f"spread = {parameters.spread:g}: {error}") from None
+
+    def apply(skin: Skin) -> Skin:
+        return bent(skin, waved(skin.outline, sizes, phases))
+
+    note = f"radius waves by up to {100 * np.abs(sizes).sum():.2g} %"
+    return GeometryStep(NAME, EffectCost(random_numbers=2 * len(HARMONICS)), note, apply)
