@@ -1,4 +1,4 @@
-"""``eitskin draw effect | touch | wiring | examples``: the documentation's pictures, and drawings."""
+"""``eitskin draw effect | touch | wiring | examples``: pictures of the documentation, drawings."""
 
 from __future__ import annotations
 
