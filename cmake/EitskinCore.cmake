@@ -5,14 +5,14 @@
 set(EITSKIN_CORE_SOURCES
     base/status.c base/texts.c
     kernels/kernels.c kernels/portable.c
-    model/model.c model/options.c model/force.c
+    model/model.c model/options.c model/force.c model/row_form.c
     context/column_cache.c context/products.c
     frame/projection.c frame/reference.c frame/fold.c frame/regularisation.c frame/whitening.c
     frame/whitening_products.c
     diagnostics/electrodes.c diagnostics/outliers.c diagnostics/model_mismatch.c
     diagnostics/crowded.c diagnostics/reference_outliers.c
     solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c solve/coordinate_descent.c
-    solve/active_set.c solve/violations.c solve/gram_factor.c
+    solve/active_set.c solve/violations.c solve/active_columns.c
     touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c
     touch/touch.c touch/tracker.c
     api/setup.c api/access.c api/save.c api/frame_stage.c api/reference.c api/reconstruct.c

@@ -11,7 +11,8 @@ their ``rows`` are members:
 - of a struct: name, type, what it is; where Python has it in another form, that form (FORMS in
   ``write_python.py``)
 - of ``[options]``: name, type, usual value, least, greatest, what it is
-- of a room in ``constants.toml``: name, value, what it is, what it trades, how it was chosen
+- of a group in ``constants.toml``: name, value, unit, what it is, what it trades; the group says
+  how its numbers were chosen, and what checks them
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pathlib import Path
 
 from table import ROOT, Tables, read_tables
 from write_c import c_headers, c_layouts, c_options, c_texts
+from write_constants import c_constants
 from write_docs import pages
 from write_python import python_modules
 
@@ -33,6 +35,7 @@ def written(tables: Tables) -> Iterator[tuple[Path, str]]:
         *c_texts(tables),
         *c_options(tables),
         *c_layouts(tables),
+        *c_constants(tables),
         *python_modules(tables),
         *pages(tables),
     ):

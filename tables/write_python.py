@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from table import Lines, Table, Tables, enum_of, origin, split_type, types_of, wrapped
+from write_constants import python_constants
 
 # how Python has a field that is not a plain number: its type, and its value where none is given
 FORMS = {
@@ -28,6 +29,7 @@ def python_modules(tables: Tables) -> Iterator[tuple[str, Lines]]:
     """Each module with its lines."""
     yield "python/eitskin/core/options_table.py", _options_module(tables)
     yield "python/eitskin/core/diagnostics_table.py", _diagnostics_module(tables)
+    yield "python/eitskin/core/constants_table.py", _constants_module(tables)
     if "link" in tables:
         yield "python/eitskin/device/wire/link_table.py", _link_module(tables)
 
@@ -202,6 +204,15 @@ def _diagnostics_module(tables: Tables) -> Lines:
     yield from _names(types["eits_stop"], "STOPS")
     yield from _dataclass(types["eits_info"])
     yield from _dataclass(types["eits_touch"])
+
+
+def _constants_module(tables: Tables) -> Lines:
+    yield from docstring(
+        "The core's numbers that are a choice; docs/reference/constants.md has their reasons."
+        f" {origin('constants')}",
+        "",
+    )
+    yield from python_constants(tables)
 
 
 # ---- link ----

@@ -22,7 +22,6 @@
 #define FW_READ_BYTES        256u
 #define FW_UPLOAD_TIMEOUT_US 10000000u /* without MODEL_DATA: the model in use goes on */
 #define FW_RETRY_US          500000u   /* between attempts to start what failed */
-#define FW_RECIPROCITY_FRAMES 3u       /* checked frames in a row that raise or clear the fault */
 
 typedef struct fw_stream {
     uint16_t what, every; /* EITS_STREAM_* */

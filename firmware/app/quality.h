@@ -3,19 +3,9 @@
 #ifndef FW_QUALITY_H
 #define FW_QUALITY_H
 
+#include "app/constants.h"
 #include "app/engine.h"
 #include "eitskin/link.h"
-
-/* A row takes part in the judgement of its electrodes where the model expects at least this
- * fraction of the rms of all rows. */
-#define FW_OPEN_SIGNIFICANT     0.3f
-/* Such a row is dead below this fraction of what is expected. */
-#define FW_OPEN_FRACTION        0.02f
-#define FW_OPEN_MIN_ROWS        3u
-/* Reciprocal rows disagree by more than this fraction of the frame's rms. Channels whose gains
- * differ by a few parts in a hundred, which a tare takes out, give half of it (scene real_board:
- * 0.054); electrodes that are mixed up give far more. */
-#define FW_RECIPROCITY_FRACTION 0.1f
 
 typedef struct fw_quality {
     uint32_t saturated, first_saturated; /* rows, masked ones apart */

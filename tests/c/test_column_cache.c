@@ -7,7 +7,7 @@
 #include "context/column_cache.h"
 #include "context/products.h"
 #include "kernels/kernels.h"
-#include "solve/working_set.h"
+#include "solve/solve.h"
 
 #include <string.h>
 

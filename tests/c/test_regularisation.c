@@ -4,7 +4,7 @@
 
 #include "eitskin/frame.h"
 #include "eitskin/touch.h"
-#include "frame/regularisation.h"
+#include "frame/whitening.h"
 
 static const double FACTOR = 5, MAX = 1;
 

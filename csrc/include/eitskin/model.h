@@ -23,6 +23,7 @@
 extern "C" {
 #endif
 
+/* A file of another major version is rejected; of a later minor one, what is new is skipped. */
 #define EITS_MODEL_MAJOR          1
 #define EITS_MODEL_MINOR          2
 #define EITS_MODEL_ALIGNMENT      16
@@ -48,9 +49,10 @@ typedef enum eits_data_kind {
 } eits_data_kind;
 
 /* A matrix of `cols` columns of `rows` numbers each, column after column, `stride` numbers apart.
- */
+ * `stride` is `rows` rounded up to eight, filled with zeros, so that kernels read whole vectors.
+ * Number i of column j is data[j stride + i], times scale[j] where there are scales. */
 typedef struct eits_matrix {
-    const void *data;
+    const void *data;   /* cols x stride numbers of `storage`, 16-byte aligned */
     const float *scale; /* one per column for integer storage, else NULL */
     uint32_t rows;
     uint32_t cols;
@@ -113,6 +115,7 @@ typedef struct eits_golden {
     const float *image;     /* n_pixels, S/m, bits as the float32 core gives them */
 } eits_golden;
 
+/* Greatest table and polynomial of a calibration; a file with more is EITS_E_MODEL_VALUE. */
 #define EITS_MAX_FORCE_POINTS 64
 #define EITS_MAX_FORCE_ORDER  4
 
@@ -127,6 +130,7 @@ typedef struct eits_force_head {
     uint32_t reserved[3];
 } eits_force_head;
 
+/* The calibration of forces (section LOAD), as eits_force_n uses it. */
 typedef struct eits_force {
     const eits_force_head *head; /* NULL: the model is not calibrated */
     const float *strength;       /* points, from 0 ascending: S/m mm^2 where the gain is 1 */
@@ -147,17 +151,19 @@ typedef struct eits_row_form {
     float s1_square; /* |S_1|^2 */
 } eits_row_form;
 
+/* An open model. All pointers go into the blob; a caller reads it and never writes it. */
 typedef struct eits_model {
-    uint32_t n_electrodes;
-    uint32_t n_rows;   /* rows of the protocol table: voltages in a frame */
-    uint32_t n_folded; /* after the reciprocity fold */
-    uint32_t rank;     /* rows of the reduced Jacobian */
-    uint32_t n_pixels;
+    uint32_t n_electrodes; /* electrodes that the protocol's table counts from 0 */
+    uint32_t n_rows;       /* rows of the protocol table: voltages in a frame */
+    uint32_t n_folded;     /* after the reciprocity fold */
+    uint32_t rank;         /* rows of the reduced Jacobian */
+    uint32_t n_pixels;     /* kept pixels: length of images and coefficients */
+    /* columns and rows of the grid that they lie in; cells off the skin are not kept */
     uint32_t nx, ny;
     eits_data_kind data_kind;
-    float pixel_mm;
+    float pixel_mm;                 /* width and height of a pixel */
     float origin_x_mm, origin_y_mm; /* lower left corner of pixel (0, 0) */
-    float current_a;
+    float current_a;                /* drive current that v_ref was modelled with, A */
     float lipschitz; /* at least the greatest eigenvalue of S'S as stored, and 2^-126 */
     /* max over pixels of the deviation of (S'P n)_j for unit white noise n on the folded rows */
     float noise_gain;

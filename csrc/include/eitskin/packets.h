@@ -69,12 +69,15 @@ typedef enum eits_packet_type {
 typedef enum eits_reply_status {
     /* MODEL_BEGIN: [0] the offset to go on from */
     EITS_REPLY_OK = 0,
+    /* no command has this packet type */
     EITS_REPLY_UNKNOWN_COMMAND = 1,
     /* [0] bytes of payload that are expected */
     EITS_REPLY_LENGTH = 2,
     /* [0] offset in the payload of the field out of range; [1] the limit it broke */
     EITS_REPLY_RANGE = 3,
+    /* no model is in use: send one first */
     EITS_REPLY_NO_MODEL = 4,
+    /* there is no reference: send a TARE first */
     EITS_REPLY_NOT_TARED = 5,
     /* [0] type of the command under way */
     EITS_REPLY_BUSY = 6,
@@ -169,8 +172,11 @@ typedef enum eits_raw_flags {
 
 /* Bits of what is streamed of each frame. */
 typedef enum eits_stream {
+    /* its voltages, as a RAW */
     EITS_STREAM_RAW = 1,
+    /* its image, as an IMAGE */
     EITS_STREAM_IMAGE = 2,
+    /* its touches, as TOUCHES */
     EITS_STREAM_TOUCHES = 4
 } eits_stream;
 
@@ -202,10 +208,15 @@ typedef struct eits_packet_info {
     uint32_t n_electrodes;
     /* of its protocol */
     uint32_t n_rows;
+    /* its rows once reciprocal ones are averaged */
     uint32_t n_folded;
+    /* numbers of the reduced data */
     uint32_t rank;
+    /* pixels of an IMAGE */
     uint32_t n_pixels;
+    /* columns of the grid that the pixels lie in */
     uint32_t nx;
+    /* rows of that grid */
     uint32_t ny;
     /* eits_storage: 0 f32, 1 f16, 2 i16, 3 i8 */
     uint32_t storage;
@@ -213,6 +224,7 @@ typedef struct eits_packet_info {
     uint32_t bank;
     /* as the generator's tuning word gives it */
     uint32_t excitation_millihz;
+    /* of the converter */
     uint32_t sample_rate_hz;
     /* of a measurement */
     uint16_t samples;
@@ -238,6 +250,7 @@ typedef struct eits_packet_info {
 
 /* How the command with this request number ended. */
 typedef struct eits_packet_reply {
+    /* of the command that is answered */
     uint32_t request;
     /* its packet type */
     uint16_t command;
@@ -256,6 +269,7 @@ typedef struct eits_packet_raw {
     uint32_t time_us;
     /* how long the scan took */
     uint32_t scan_us;
+    /* voltages, and quality bytes, that follow */
     uint16_t n_rows;
     /* bits of eits_raw_flags */
     uint16_t flags;
@@ -263,6 +277,7 @@ typedef struct eits_packet_raw {
 
 /* Head of IMAGE and TOUCHES: what eits_info says, and the times. */
 typedef struct eits_packet_solved {
+    /* number of the scanned frame, as in its RAW */
     uint32_t frame;
     /* when its scan began */
     uint32_t time_us;
@@ -280,6 +295,7 @@ typedef struct eits_packet_solved {
     uint16_t stop;
     /* rows left out */
     uint16_t masked;
+    /* that the solver took */
     uint32_t iterations;
     /* coefficients that are not zero */
     uint32_t nonzeros;
@@ -287,13 +303,17 @@ typedef struct eits_packet_solved {
     uint32_t macs;
     /* of the touches */
     uint32_t touch_macs;
+    /* as used for this frame */
     float lambda;
+    /* the least lambda whose image is zero */
     float lambda_max;
+    /* max(S'y) of noise, by the reference; 0: unknown */
     float lambda_noise;
     /* relative duality gap */
     float gap_rel;
     /* its norm */
     float residual;
+    /* norm of the reduced data */
     float data_norm;
     /* bits of eits_diagnostic */
     uint32_t diagnostics;
@@ -305,18 +325,25 @@ typedef struct eits_packet_solved {
     float model_mismatch;
     /* bit e: electrode e */
     uint64_t open_electrodes;
+    /* likewise, of one or more pairs */
     uint64_t bridged_electrodes;
+    /* likewise */
     uint64_t noisy_electrodes;
 } eits_packet_solved;
 
 /* A touch, as eits_touch. */
 typedef struct eits_packet_touch {
+    /* from 1; stays with a touch from frame to frame */
     uint32_t id;
+    /* of the centre, in the model's coordinates */
     float x_mm;
+    /* of the centre */
     float y_mm;
+    /* of the disc that was fitted */
     float radius_mm;
     /* S mm^2/m */
     float strength_s_per_m_mm2;
+    /* fraction of the data that it alone explains, 0 to 1; 0: held, not found */
     float confidence;
     /* 0 where the model is not calibrated */
     float force_n;
@@ -324,10 +351,15 @@ typedef struct eits_packet_touch {
 
 /* Stages that are timed. */
 typedef enum eits_stage {
+    /* from the first measurement of a frame to its last */
     EITS_STAGE_SCAN = 0,
+    /* processor time in interrupts within the scan */
     EITS_STAGE_DEMODULATE = 1,
+    /* frame stage and solver */
     EITS_STAGE_SOLVE = 2,
+    /* touch detection and fit, where touches are streamed */
     EITS_STAGE_TOUCHES = 3,
+    /* what is left between scan and end: packets are made and queued */
     EITS_STAGE_SEND = 4,
     /* the whole frame */
     EITS_STAGE_FRAME = 5
@@ -336,18 +368,25 @@ typedef enum eits_stage {
 
 /* Times of one stage. */
 typedef struct eits_stage_stats {
+    /* frames that were timed */
     uint32_t count;
+    /* of the last such frame */
     uint32_t last_us;
     /* 99th percentile: the upper edge of its bin, an eighth of an octave wide */
     uint32_t p99_us;
+    /* of all since the start, or since GET_STATS set the times to zero */
     uint32_t worst_us;
 } eits_stage_stats;
 
 /* The board's counters. */
 typedef struct eits_packet_stats {
+    /* of the GET_STATS that asked */
     uint32_t request;
+    /* since the start */
     uint32_t uptime_ms;
+    /* streamed or not */
     uint32_t frames_scanned;
+    /* where image or touches were streamed */
     uint32_t frames_solved;
     /* since the link came up */
     uint32_t packets_sent;
@@ -361,13 +400,19 @@ typedef struct eits_packet_stats {
     uint32_t outliers;
     /* commands received */
     uint32_t link_packets;
+    /* whole packets whose checksum does not fit */
     uint32_t link_crc_errors;
+    /* ended inside a COBS block, or shorter than head and checksum */
     uint32_t link_framing_errors;
+    /* longer than the receive buffer */
     uint32_t link_overruns;
+    /* that are set aside */
     uint32_t stack_bytes;
     /* the most so far */
     uint32_t stack_used;
+    /* for the model's context and its frames */
     uint32_t workspace_bytes;
+    /* of them by the model in use */
     uint32_t workspace_used;
     /* by eits_stage */
     eits_stage_stats stage[6];
@@ -379,21 +424,25 @@ typedef struct eits_packet_fault {
     uint16_t code;
     /* 1: it is there; 0: it has gone */
     uint16_t raised;
+    /* in which it rose or went */
     uint32_t frame;
     /* by code, as value and words */
     int32_t index;
+    /* by code */
     int32_t value;
+    /* by code; 0 where it has none */
     uint32_t words[5];
 } eits_packet_fault;
 
 /* A command without parameters. */
 typedef struct eits_command_plain {
-    /* never 0 */
+    /* never 0; the reply repeats it */
     uint32_t request;
 } eits_command_plain;
 
 /* What to send of each frame. */
 typedef struct eits_command_stream {
+    /* never 0; the reply repeats it */
     uint32_t request;
     /* bits of eits_stream; 0 stops */
     uint16_t what;
@@ -405,6 +454,7 @@ typedef struct eits_command_stream {
 
 /* Take the reference; the reply comes when that is done. */
 typedef struct eits_command_tare {
+    /* never 0; the reply repeats it */
     uint32_t request;
     /* 1, or 4 to 1024 */
     uint32_t frames;
@@ -412,6 +462,7 @@ typedef struct eits_command_tare {
 
 /* How frames are scanned; forgets the reference. */
 typedef struct eits_command_scan {
+    /* never 0; the reply repeats it */
     uint32_t request;
     /* 1,000 to 250,000,000, below half the sample rate */
     uint32_t excitation_millihz;
@@ -432,6 +483,7 @@ typedef struct eits_command_scan {
 
 /* The solver's options, from the next frame on until another model or a restart. */
 typedef struct eits_command_solver {
+    /* never 0; the reply repeats it */
     uint32_t request;
     /* 1 to 1000 */
     uint32_t iterations;
@@ -457,6 +509,7 @@ typedef struct eits_command_solver {
 
 /* Announces a model. */
 typedef struct eits_command_model_begin {
+    /* never 0; the reply repeats it */
     uint32_t request;
     /* of the model, at least 64 */
     uint32_t bytes;
@@ -466,6 +519,7 @@ typedef struct eits_command_model_begin {
 
 /* Bytes of the model follow: a multiple of 4, but for the last. */
 typedef struct eits_command_model_data {
+    /* never 0; the reply repeats it */
     uint32_t request;
     /* of the first byte */
     uint32_t offset;
@@ -473,6 +527,7 @@ typedef struct eits_command_model_data {
 
 /* Send a STATS. */
 typedef struct eits_command_get_stats {
+    /* never 0; the reply repeats it */
     uint32_t request;
     /* 1: set the times to zero after sending them */
     uint32_t reset;
@@ -480,6 +535,7 @@ typedef struct eits_command_get_stats {
 
 /* Leave a row out, or use it again. */
 typedef struct eits_command_mask_row {
+    /* never 0; the reply repeats it */
     uint32_t request;
     /* of the protocol */
     uint16_t row;

@@ -22,6 +22,7 @@ extern "C" {
 #error "eitskin reads little-endian models in place; this target is big-endian"
 #endif
 
+/* Of the library that is linked; a mismatch shows in eits_real_size alone, so compare at start. */
 #ifdef EITS_DOUBLE
 typedef double eits_real;
 #else

@@ -11,14 +11,13 @@
  * had begun. */
 #include "eitskin/frame.h"
 
+#include "api/constants.h"
 #include "api/stages.h"
 #include "base/vec.h"
 #include "context/products.h"
 #include "diagnostics/diagnostics.h"
 #include "frame/reference.h"
 #include "frame/whitening.h"
-
-enum { MIN_REFERENCE_FRAMES = 4 };
 
 /* Coefficients of another reference are no start. */
 static eits_status fit(eits_context *ctx)
@@ -64,7 +63,7 @@ eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t
 
 eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
 {
-    if (ctx == NULL || count < MIN_REFERENCE_FRAMES)
+    if (ctx == NULL || count < EITS_MIN_REFERENCE_FRAMES)
         return EITS_E_ARGUMENT;
     eits_reference *b = &ctx->reference;
     eits_zero(b->v0, ctx->model->n_rows);
@@ -145,7 +144,7 @@ eits_status eits_reference_finish(eits_context *ctx)
     if (ctx == NULL)
         return EITS_E_ARGUMENT;
     eits_reference *b = &ctx->reference;
-    if (b->count < MIN_REFERENCE_FRAMES || b->count != b->wanted)
+    if (b->count < EITS_MIN_REFERENCE_FRAMES || b->count != b->wanted)
         return EITS_E_REFERENCE_SHORT;
     const eits_status status = fit(ctx);
     if (status != EITS_OK)

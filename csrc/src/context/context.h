@@ -131,7 +131,8 @@ typedef struct eits_solve_state {
     eits_real *working_panels; /* the working set's columns in panels; NULL: not prepared */
     uint32_t *working_slot;    /* EITS_CACHED(n_pixels): where the column cache has them */
     uint32_t working_cached;   /* 1: all of them are there */
-    /* rank x stride, lent: rows that make the active set's columns orthonormal (gram_factor.h) */
+    /* rank x stride, lent: rows that make the active set's columns orthonormal (active_columns.h)
+     */
     eits_real *factor;
 } eits_solve_state;
 

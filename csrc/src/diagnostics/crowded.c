@@ -13,24 +13,6 @@
 /* A linear score of what the touch fit found, the logarithm of the odds that every touch is found
  * and nothing else: fitted on mixed tuning scenes of 1 to 12 touches at 40, 60 and 80 dB by eitskin
  * study multitouch, whose page has how well it is calibrated. */
-static const eits_real OFFSET = R(-0.3583);
-/* each, with so many electrodes */
-static const eits_real TOUCHES = R(-0.2429), OF_ELECTRODES = R(16.0);
-/* the least distance over the sum of the radii, at most this */
-static const eits_real NEAREST = R(3.645), FAR = R(2.0);
-/* the greatest radius over the seed's */
-static const eits_real WIDEST = R(-4.607);
-/* the root of the fraction of |y|^2 that is left */
-static const eits_real LEFT = R(-3.659);
-/* the weakest touch over noise, at most this */
-static const eits_real WEAKEST = R(0.1329), STRONG = R(10.0);
-/* it over what is left, at most this */
-static const eits_real CLEAREST = R(0.7892), CLEAR = R(3.0);
-/* below it the count is a guess */
-static const eits_real MIN = R(1.078);
-/* max(S'y) over that of noise: below it what is there may be noise, and no crowd */
-static const eits_real FAINT = R(3.0);
-
 static eits_real lesser(eits_real a, eits_real b)
 {
     return a < b ? a : b;
@@ -38,7 +20,7 @@ static eits_real lesser(eits_real a, eits_real b)
 
 static eits_real nearest(const eits_touch *touches, uint32_t count)
 {
-    eits_real min = FAR;
+    eits_real min = EITS_CROWD_FAR;
     for (uint32_t k = 0; k < count; ++k) {
         for (uint32_t l = 0; l < k; ++l) {
             const eits_real dx = touches[k].x_mm - touches[l].x_mm,
@@ -64,23 +46,27 @@ static eits_real score(const eits_context *ctx, const eits_touch *touches, uint3
         weakest = lesser(weakest, touches[k].confidence);
     }
     const eits_real above =
-        noise > 0 ? lesser(STRONG, eits_sqrt(weakest) * ctx->info.lambda_max / noise) : STRONG;
-    const eits_real clear = weakest < CLEAR * CLEAR * left ? eits_sqrt(weakest / left) : CLEAR;
-    eits_real sum = eits_fma(TOUCHES * OF_ELECTRODES / (eits_real)ctx->model->n_electrodes,
-                             (eits_real)count, OFFSET);
-    sum = eits_fma(NEAREST, nearest(touches, count), sum);
-    sum = eits_fma(WIDEST, widest / ctx->options.touch_seed_radius_mm, sum);
-    sum = eits_fma(LEFT, eits_sqrt(left), sum);
-    sum = eits_fma(WEAKEST, above, sum);
-    return eits_fma(CLEAREST, clear, sum);
+        noise > 0 ? lesser(EITS_CROWD_STRONG, eits_sqrt(weakest) * ctx->info.lambda_max / noise)
+                  : EITS_CROWD_STRONG;
+    const eits_real clear = weakest < EITS_CROWD_CLEAR * EITS_CROWD_CLEAR * left
+                                ? eits_sqrt(weakest / left)
+                                : EITS_CROWD_CLEAR;
+    eits_real sum =
+        eits_fma(EITS_CROWD_TOUCHES * EITS_CROWD_ELECTRODES / (eits_real)ctx->model->n_electrodes,
+                 (eits_real)count, EITS_CROWD_OFFSET);
+    sum = eits_fma(EITS_CROWD_NEAREST, nearest(touches, count), sum);
+    sum = eits_fma(EITS_CROWD_WIDEST, widest / ctx->options.touch_seed_radius_mm, sum);
+    sum = eits_fma(EITS_CROWD_LEFT, eits_sqrt(left), sum);
+    sum = eits_fma(EITS_CROWD_WEAKEST, above, sum);
+    return eits_fma(EITS_CROWD_CLEAREST, clear, sum);
 }
 
 void eits_check_crowd(eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
     ctx->info.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_CROWDED;
     if (count == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED) ||
-        ctx->info.lambda_max < FAINT * ctx->info.lambda_noise)
+        ctx->info.lambda_max < EITS_CROWD_FAINT * ctx->info.lambda_noise)
         return;
-    if (count >= ctx->options.max_touches || score(ctx, touches, count) < MIN)
+    if (count >= ctx->options.max_touches || score(ctx, touches, count) < EITS_CROWD_MIN)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_CROWDED;
 }

@@ -4,46 +4,7 @@
 #define EITSKIN_EXAMINE_H
 
 #include "context/context.h"
-
-/* Thresholds; docs/reference/diagnostics.md says what they were chosen on. */
-#define EITS_ROW_SIGNIFICANT \
-    R(0.3) /* of the reference's rms: rows that tell whether an electrode lives */
-#define EITS_ROW_DEAD_FRACTION R(0.02) /* of the reference */
-#define EITS_ROW_DEAD_NOISE \
-    R(5.0) /* times the noise; a significant row's reference is at least ten times that */
-#define EITS_ROWS_TO_JUDGE                                                                         \
-    3u /* so many significant rows of an electrode or a pair must agree; so many turned ones are a \
-          mismatch */
-#define EITS_ROW_GROWN \
-    R(8.0) /* times the reference, or times this fraction of its rms where that is more: */
-#define EITS_ROW_SMALL R(0.05)
-#define EITS_ROBUST \
-    R(1.4826) /* the deviation of a normal distribution over the median of its magnitudes */
-#define EITS_OUTLIER_NOISE \
-    R(6.5) /* reciprocals that differ by so many times their difference's noise, */
-#define EITS_OUTLIER_ROBUST                                                             \
-    R(16.0) /* the same where no noise was learned, of the robust deviation of all such \
-               differences, */
-#define EITS_OUTLIER_LARGEST \
-    R(0.03) /* and by this fraction of the largest datum: common modes scale with that, */
-#define EITS_OUTLIER_FRACTION                                                                      \
-    R(0.25) /* and by this fraction of the larger: channel gains that differ scale with the change \
-             */
-#define EITS_OUTLIER_NEARER \
-    R(0.5) /* the side stays that is at most so many times as far from what the others predict */
-#define EITS_OUTLIER_MAX   8u      /* folds; more are no outliers */
-#define EITS_OUTLIER_PIVOT R(0.05) /* below it the others predict nothing */
-#define EITS_OUTLIER_RIDGE \
-    R(1e-4) /* of the prediction, relative to the greatest squared singular value */
-#define EITS_OUTLIER_UNPAIRED \
-    R(16.0) /* without reciprocals: so many times the robust deviation of the prediction errors */
-#define EITS_OUTLIER_ENERGY    R(0.5)  /* of all that is not predicted is in that fold */
-#define EITS_NOISY_FRACTION    R(0.9)  /* of the flagged folds share a noisy electrode */
-#define EITS_MISMATCH_FRACTION R(0.05) /* of |d| */
-#define EITS_MISMATCH_NOISE \
-    R(3.0) /* and so many times what noise leaves outside of the model's range */
-#define EITS_STALE_RATIO R(1.7) /* the change against the sign rule to that along it, */
-#define EITS_STALE_NOISE R(5.0) /* and so many lambda_noise */
+#include "diagnostics/constants.h"
 
 /* Whether a diagnostic is looked for. */
 static inline int eits_wants(const eits_context *ctx, eits_diagnostic diagnostic)

@@ -24,13 +24,16 @@ typedef struct limits {
 } limits;
 
 /* Against noise as well as against the reference: a row may have a reference smaller than the
- * noise, and is then neither dead nor alive. Ten times the limit for being dead: the noise of a
+ * noise, and is then neither dead nor alive. Many times the limit for being dead: the noise of a
  * significant row then never makes it look dead. */
 static limits limits_of(const eits_context *ctx)
 {
     const eits_real fraction = EITS_ROW_SIGNIFICANT * ctx->reference.v0_rms,
                     noise = EITS_ROW_DEAD_NOISE * ctx->reference.noise_v;
-    return (limits){fraction > 10 * noise ? fraction : 10 * noise, noise};
+    return (limits){fraction > EITS_ROW_SIGNIFICANT_NOISE * noise
+                        ? fraction
+                        : EITS_ROW_SIGNIFICANT_NOISE * noise,
+                    noise};
 }
 
 /* Only rows with a clear reference tell anything: a row that is small by geometry is small with

@@ -19,13 +19,6 @@
 
 #include "base/vec.h"
 
-/* robust deviations; and of the greatest voltage */
-static const eits_real PAIRED = R(12.0), PAIRED_MIN = R(1e-3);
-/* the same where rows have no reciprocals, or copied ones */
-static const eits_real UNPAIRED = R(16.0), UNPAIRED_MIN = R(1e-2);
-/* and of the row's own voltage: noise may go with that */
-static const eits_real OWN_MIN = R(0.05);
-
 /* Below are comparisons of `newer` with `older`; rows without a voltage in either do not count. */
 static int in_use(const eits_context *ctx, uint32_t row, const eits_real *older)
 {
@@ -83,8 +76,8 @@ static eits_real limit_of(const eits_context *ctx, const eits_scratch *scratch,
             continue;
         *paired = way;
         const eits_real spread = EITS_ROBUST * eits_kth(scratch->value, folds, folds / 2);
-        const eits_real limit = way ? PAIRED * spread : UNPAIRED * spread,
-                        min = (way ? PAIRED_MIN : UNPAIRED_MIN) * largest;
+        const eits_real limit = way ? EITS_PAIRED * spread : EITS_UNPAIRED * spread,
+                        min = (way ? EITS_PAIRED_MIN : EITS_UNPAIRED_MIN) * largest;
         return limit > min ? limit : min;
     }
     *paired = 0;
@@ -100,7 +93,7 @@ uint32_t eits_reference_compare(eits_context *ctx, const eits_scratch *scratch,
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_real off = oddity(ctx, k, newer, older, paired);
-        const int odd = off > limit && off > OWN_MIN * size_of(ctx, k, older);
+        const int odd = off > limit && off > EITS_OWN_MIN * size_of(ctx, k, older);
         scratch->index[k] = (scratch->index[k] & ~(uint32_t)bit) | (odd ? bit : 0u);
         count += (uint32_t)odd;
     }
@@ -118,9 +111,9 @@ static uint32_t odd_rows(const eits_context *ctx, uint32_t k, const eits_real *n
     const eits_real first = eits_fabs(change(ctx, fold.first, newer, older)),
                     second = eits_fabs(change(ctx, fold.second, newer, older));
     uint32_t count = 0;
-    if (first > 0 && first >= R(0.5) * second)
+    if (first > 0 && first >= EITS_CHANGED_AS_MUCH * second)
         rows[count++] = fold.first;
-    if (second > 0 && second >= R(0.5) * first)
+    if (second > 0 && second >= EITS_CHANGED_AS_MUCH * first)
         rows[count++] = fold.second;
     return count;
 }

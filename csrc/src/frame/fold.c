@@ -23,15 +23,16 @@
 
 #include "base/log.h"
 #include "base/vec.h"
+#include "frame/constants.h"
 #include "frame/projection.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 
-/* v0 log(v / v0): beyond a ratio of 16 either way it is no touch; and the logarithm must not meet
+/* v0 log(v / v0): beyond EITS_MAX_RATIO either way it is no touch; and the logarithm must not meet
  * zero or a turned sign. */
 static eits_real log_datum(const eits_context *ctx, eits_real v, eits_real v0)
 {
-    const eits_real q = v / v0, low = R(1.0 / 16.0), high = R(16.0);
+    const eits_real q = v / v0, low = 1 / EITS_MAX_RATIO, high = EITS_MAX_RATIO;
     return ctx->reference.gain * v0 * eits_log(q < low ? low : (q > high ? high : q));
 }
 
@@ -54,17 +55,17 @@ static eits_real datum(const eits_context *ctx, eits_real v, eits_real v0)
 static int ratio_undefined(const eits_context *ctx, eits_real v0)
 {
     return ctx->model->data_kind != EITS_DATA_DIFFERENCE &&
-           eits_fabs(v0) < R(1e-6) * ctx->reference.v0_rms;
+           eits_fabs(v0) < EITS_RATIO_DEFINED * ctx->reference.v0_rms;
 }
 
 /* A row and its reciprocal that differ by less than rounding of their references agree: quantised
  * voltages often do. */
 static int exceeds_rounding(const eits_context *ctx, eits_real difference, eits_real v0)
 {
-    const eits_real rounding = sizeof(eits_real) == 4 ? R(0x1p-20) : R(0x1p-49);
-    return eits_fabs(difference) > rounding * (ctx->model->data_kind == EITS_DATA_NORMALISED
-                                                   ? 1
-                                                   : eits_fabs(ctx->reference.gain * v0));
+    return eits_fabs(difference) >
+           EITS_FOLD_ROUNDING * (ctx->model->data_kind == EITS_DATA_NORMALISED
+                                     ? 1
+                                     : eits_fabs(ctx->reference.gain * v0));
 }
 
 /* d_k: the mean of a row and its reciprocal, or whichever is usable; reciprocity_error_k: their
@@ -125,7 +126,7 @@ static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)
         macs += eits_project(ctx, candidate);
     const eits_real after = eits_dot(ctx->kernels, candidate, candidate, rank);
     /* What is left is rounding: the direction is there already. */
-    if (!(after > R(1e-6) * before))
+    if (!(after > EITS_BASIS_TOLERANCE * before))
         return macs;
     const eits_real scale = 1 / eits_sqrt(after);
     eits_real *slot = ctx->projection.basis + stride * ctx->projection.count++;
@@ -208,7 +209,7 @@ uint64_t eits_reduce(eits_context *ctx, const eits_scratch *scratch, uint32_t co
  * all but zero stay differences. */
 uint64_t eits_reduce_log(eits_context *ctx, const eits_scratch *scratch, const eits_real *frame)
 {
-    const eits_real *v0 = ctx->reference.v0, min = R(1e-6) * ctx->reference.v0_rms;
+    const eits_real *v0 = ctx->reference.v0, min = EITS_RATIO_DEFINED * ctx->reference.v0_rms;
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_fold fold = ctx->model->fold[k];

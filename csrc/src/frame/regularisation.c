@@ -6,22 +6,12 @@
  * reference raises it, in proportion to its noise over its rms; rows left out lower it, since they
  * speak of fewer directions, down to what float32 still solves.
  *
- * The result is D (regularisation.h), `rank` weights applied to y and in each product: the stored
+ * The result is D (whitening.h), `rank` weights applied to y and in each product: the stored
  * model stays as it is, in flash. Weights never exceed 1, so the step of FISTA stays valid. */
-#include "frame/regularisation.h"
+#include "frame/whitening.h"
 
 #include "base/vec.h"
-
-/* The model's regularisation for the rows left, over that for all: fewer rows speak of fewer
- * directions, and what is left of the weak ones is to be heard. Chosen on training scenes with one
- * to three electrodes out. */
-static const eits_real MIN_REGULARISATION_FRACTION = R(0.1);
-/* of s_1^2, where rows are left out: what float32 needs */
-static const eits_real MIN_REGULARISATION = R(1e-4);
-/* of s_1^2: beyond, all directions weigh as they are seen already */
-static const eits_real MAX_REGULARISATION = R(1.0);
-/* what a lift by less would change cannot be seen */
-static const eits_real AS_IT_IS = R(1.01);
+#include "frame/constants.h"
 
 /* What the noise asks for.
  *
@@ -33,25 +23,26 @@ static eits_real asked_regularisation(const eits_context *ctx)
     const eits_reference *b = &ctx->reference;
     const eits_real asked =
         b->noise_v > 0 ? ctx->options.regularisation_noise_factor * (b->noise_v / b->v0_rms) : 0;
-    return asked < MAX_REGULARISATION ? asked : MAX_REGULARISATION;
+    return asked < EITS_MAX_REGULARISATION ? asked : EITS_MAX_REGULARISATION;
 }
 
 /* A lift of a per cent would cost weights in every product and change nothing that can be seen. */
 eits_real eits_regularisation_of_all(const eits_context *ctx)
 {
     const eits_real asked = asked_regularisation(ctx);
-    return asked > AS_IT_IS * ctx->whitening.mu ? asked : ctx->whitening.mu;
+    return asked > EITS_REGULARISATION_KEPT * ctx->whitening.mu ? asked : ctx->whitening.mu;
 }
 
 eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing)
 {
     const eits_real left = 1 - missing, cube = left * left * left,
-                    lowered =
-                        cube > MIN_REGULARISATION_FRACTION ? cube : MIN_REGULARISATION_FRACTION;
+                    lowered = cube > EITS_MIN_REGULARISATION_FRACTION
+                                  ? cube
+                                  : EITS_MIN_REGULARISATION_FRACTION;
     const eits_real of_model = lowered * ctx->whitening.mu,
                     asked = left * asked_regularisation(ctx),
                     wanted = asked > of_model ? asked : of_model;
-    return wanted > MIN_REGULARISATION ? wanted : MIN_REGULARISATION;
+    return wanted > EITS_MIN_REGULARISATION ? wanted : EITS_MIN_REGULARISATION;
 }
 
 /* D_i, so scaled that the strongest direction keeps its weight. None exceeds 1, so the model's

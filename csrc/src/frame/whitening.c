@@ -1,17 +1,11 @@
 #include "frame/whitening.h"
 
 #include "base/vec.h"
+#include "frame/constants.h"
 #include "frame/projection.h"
-#include "frame/regularisation.h"
 #include "frame/triangle.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"
-
-/* e over mu': how little a direction that no row sees is held to zero */
-static const eits_real LOST = R(0.01);
-/* Rounding makes the rows of S a little less than orthogonal, and F with a lower regularisation
- * must not exceed the stated constant. */
-static const eits_real STEP_MARGIN = R(0.995);
 
 /* |P|^2. */
 static eits_real energy_of(const eits_context *ctx, eits_real *copy)
@@ -86,8 +80,8 @@ static uint64_t factor_products(const eits_context *ctx, eits_real lost, eits_re
     uint64_t macs = 0;
     for (uint32_t i = 0; i < rank; ++i) {
         eits_real *r = row_of(ctx, n, i);
-        const eits_real left = r[i] > R(0.5) * lost ? r[i] : R(0.5) * lost, pivot = eits_sqrt(left),
-                        fraction = 1 / pivot;
+        const eits_real left = r[i] > EITS_LOST_PIVOT * lost ? r[i] : EITS_LOST_PIVOT * lost,
+                        pivot = eits_sqrt(left), fraction = 1 / pivot;
         eits_zero(r + first_of(i), i - first_of(i));
         r[i] = pivot;
         for (uint32_t j = i + 1; j < rank; ++j)
@@ -158,18 +152,16 @@ static uint64_t finish_whitening(const eits_context *ctx, eits_real fraction, ei
 
 static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v);
 
-enum { PROBES = 8 };
-
 /* Noise in S'F'y, over that in S'y with all rows. White noise on the rows has the covariance
  * (G'G)^-1 in y; its mean square over S's columns is the trace of S'F' (G'G)^-1 F S, found by
- * PROBES sign vectors that are orthogonal within each PROBES directions. The greatest of the
- * columns grows faster than their mean does by rows left out, by an exponent found on masks of one
- * row to three electrodes. */
+ * EITS_NOISE_PROBES sign vectors that are orthogonal within each EITS_NOISE_PROBES directions. The
+ * greatest of the columns grows faster than their mean does by rows left out, by an exponent found
+ * on masks of one row to three electrodes. */
 static uint64_t measure_noise(eits_context *ctx, const eits_scratch *scratch)
 {
     const uint32_t rank = ctx->model->rank;
     eits_real *v = scratch->row[3], sum = 0, total = 0;
-    for (uint32_t p = 0; p < PROBES; ++p) {
+    for (uint32_t p = 0; p < EITS_NOISE_PROBES; ++p) {
         for (uint32_t i = 0; i < rank; ++i) {
             const uint32_t both = i & p, odd = (both ^ both >> 1 ^ both >> 2) & 1u;
             const eits_real size =
@@ -185,9 +177,10 @@ static uint64_t measure_noise(eits_context *ctx, const eits_scratch *scratch)
         total = eits_fma(ctx->whitening.row_strength[i] * w2, w2, total);
     }
     const eits_real of_all = eits_regularisation_noise(ctx, eits_regularisation_of_all(ctx));
-    const eits_real ratio = eits_sqrt(ctx->whitening.square * sum / (PROBES * total)) / of_all;
+    const eits_real ratio =
+        eits_sqrt(ctx->whitening.square * sum / (EITS_NOISE_PROBES * total)) / of_all;
     ctx->whitening.noise_ratio = of_all * (ratio * eits_sqrt(eits_sqrt(ratio)));
-    return PROBES * 2u * triangle_macs(ctx);
+    return EITS_NOISE_PROBES * 2u * triangle_macs(ctx);
 }
 
 eits_real eits_lambda_noise(const eits_context *ctx)
@@ -220,9 +213,9 @@ static void raise_regularisation(eits_context *ctx)
 static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
                                eits_real regularisation, uint32_t missing)
 {
-    const eits_real lost = LOST * regularisation;
+    const eits_real lost = EITS_LOST * regularisation;
     ctx->whitening.square =
-        STEP_MARGIN * ctx->whitening.s1_square * (1 + regularisation) / (1 + lost);
+        EITS_STEP_MARGIN * ctx->whitening.s1_square * (1 + regularisation) / (1 + lost);
     eits_real *f = ctx->whitening.map, *g = ctx->whitening.metric;
     uint64_t macs = sum_products(ctx, scratch, missing, lost, f);
     macs += factor_products(ctx, lost, f);

@@ -3,10 +3,7 @@
 #include "eitskin/force.h"
 
 #include "base/vec.h"
-
-/* A polynomial is trusted near what it was fitted to only: its gain is kept within a factor of so
- * much of 1. */
-static const eits_real MAX_GAIN = R(4.0);
+#include "model/constants.h"
 
 /* The place in units of the calibration's radius, no further out than it was calibrated. */
 static void place_of(const eits_force *force, eits_real x_mm, eits_real y_mm, eits_real *u,
@@ -37,7 +34,8 @@ static eits_real gain_at(const eits_force *force, eits_real u, eits_real v)
         for (uint32_t b = 0; b <= degree; ++b)
             power[b] *= u;
     }
-    return gain > 1 / MAX_GAIN ? (gain < MAX_GAIN ? gain : MAX_GAIN) : 1 / MAX_GAIN;
+    return gain > 1 / EITS_MAX_GAIN ? (gain < EITS_MAX_GAIN ? gain : EITS_MAX_GAIN)
+                                    : 1 / EITS_MAX_GAIN;
 }
 
 eits_real eits_force_n(const eits_model *model, eits_real x_mm, eits_real y_mm,

@@ -3,8 +3,8 @@
 #include "eitskin/model.h"
 
 #include "model/options.h"
+#include "model/sections.h"
 
-#include <float.h>
 #include <string.h>
 
 enum {
@@ -12,19 +12,13 @@ enum {
     ENTRY_SIZE = 16,
     DIMS_SIZE = 64,
     FIELDS_HEAD = 16,
-    ROW_FORM_HEAD = 16,
     MIRROR_ROWS = 4,
     MAX_SECTIONS = 256
 };
 
-typedef struct section {
-    const uint8_t *data; /* NULL where absent */
-    uint32_t size;
-} section;
-
 typedef struct sections {
-    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds, force,
-        whit;
+    eits_section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds,
+        force, whit;
 } sections;
 
 static uint32_t read_u32(const uint8_t *bytes)
@@ -41,25 +35,10 @@ static uint16_t read_u16(const uint8_t *bytes)
     return value;
 }
 
-static float read_f32(const uint8_t *bytes)
-{
-    float value;
-    memcpy(&value, bytes, sizeof value);
-    return value;
-}
-
-/* Finite without libm, and whatever -ffast-math a caller may have set: by the exponent's bits. */
-static int is_finite_f32(float value)
-{
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return (bits & 0x7F800000u) != 0x7F800000u;
-}
-
 static int all_finite(const float *values, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {
-        if (!is_finite_f32(values[i]))
+        if (!eits_is_finite_f32(values[i]))
             return 0;
     }
     return 1;
@@ -114,12 +93,12 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
     return EITS_OK;
 }
 
-static section *find_slot(sections *found, const uint8_t *tag)
+static eits_section *find_slot(sections *found, const uint8_t *tag)
 {
     static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOADWHIT";
-    section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref,  &found->redu,
-                        &found->sens, &found->scal, &found->colw, &found->grid,  &found->defs,
-                        &found->gold, &found->meta, &found->flds, &found->force, &found->whit};
+    eits_section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref,  &found->redu,
+                             &found->sens, &found->scal, &found->colw, &found->grid,  &found->defs,
+                             &found->gold, &found->meta, &found->flds, &found->force, &found->whit};
     for (size_t i = 0; i < sizeof slots / sizeof slots[0]; ++i) {
         if (memcmp(tags + 4 * i, tag, 4) == 0)
             return slots[i];
@@ -141,7 +120,7 @@ static eits_status read_table(sections *found, const uint8_t *bytes)
         if (offset % EITS_MODEL_ALIGNMENT != 0 || offset < HEADER_SIZE + count * ENTRY_SIZE ||
             offset > total || size > total - offset)
             return EITS_E_MODEL_SECTION;
-        section *slot = find_slot(found, entry);
+        eits_section *slot = find_slot(found, entry);
         if (slot == NULL) {
             if (required)
                 /* a later minor version may not add what older readers must know */
@@ -156,12 +135,12 @@ static eits_status read_table(sections *found, const uint8_t *bytes)
     return EITS_OK;
 }
 
-static int has_size(const section *s, size_t size)
+static int has_size(const eits_section *s, size_t size)
 {
     return s->data != NULL && s->size == size;
 }
 
-static eits_status read_dims(eits_model *model, const section *dims)
+static eits_status read_dims(eits_model *model, const eits_section *dims)
 {
     if (!has_size(dims, DIMS_SIZE))
         return EITS_E_MODEL_SECTION;
@@ -176,12 +155,12 @@ static eits_status read_dims(eits_model *model, const section *dims)
     model->ny = read_u32(p + 28);
     const uint32_t storage = read_u32(p + 32);
     const uint32_t kind = read_u32(p + 36);
-    model->pixel_mm = read_f32(p + 40);
-    model->origin_x_mm = read_f32(p + 44);
-    model->origin_y_mm = read_f32(p + 48);
-    model->current_a = read_f32(p + 52);
-    model->lipschitz = read_f32(p + 56);
-    model->noise_gain = read_f32(p + 60);
+    model->pixel_mm = eits_read_f32(p + 40);
+    model->origin_x_mm = eits_read_f32(p + 44);
+    model->origin_y_mm = eits_read_f32(p + 48);
+    model->current_a = eits_read_f32(p + 52);
+    model->lipschitz = eits_read_f32(p + 56);
+    model->noise_gain = eits_read_f32(p + 60);
     if (model->n_electrodes < 4 || model->n_electrodes > 255 || model->n_rows == 0 ||
         model->n_rows >= EITS_MAX_ROWS || model->n_folded == 0 || model->n_folded > model->n_rows ||
         model->rank == 0 || model->rank > EITS_MAX_RANK || stride != ((model->rank + 7u) & ~7u) ||
@@ -267,11 +246,6 @@ static int halves_finite(const uint16_t *values, size_t count)
     return 1;
 }
 
-static int between(float value, float low, float high)
-{
-    return is_finite_f32(value) && value >= low && value <= high;
-}
-
 /* A model's own defaults are always good options. */
 static int defaults_in_range(const eits_model *model)
 {
@@ -280,7 +254,7 @@ static int defaults_in_range(const eits_model *model)
     (void)eits_options_default(model, &own); /* neither is NULL */
     return d->iterations <= EITS_MAX_MODEL_ITERATIONS &&
            d->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET &&
-           d->touch_fit_left_out <= EITS_TOUCH_FIT_ALL && between(d->mask_threshold, 0, 1) &&
+           d->touch_fit_left_out <= EITS_TOUCH_FIT_ALL && eits_between(d->mask_threshold, 0, 1) &&
            eits_options_in_range(&own);
 }
 
@@ -302,7 +276,7 @@ static eits_status check_numbers(const eits_model *model)
 }
 
 /* Section FLDS, where there is one: two numbers, then halves. */
-static eits_status read_fields(eits_model *model, const section *flds)
+static eits_status read_fields(eits_model *model, const eits_section *flds)
 {
     if (flds->data == NULL)
         return EITS_OK;
@@ -310,14 +284,15 @@ static eits_status read_fields(eits_model *model, const section *flds)
     const size_t halves = (size_t)model->n_pixels * stride;
     if (flds->size != FIELDS_HEAD + halves * 2u)
         return EITS_E_MODEL_SECTION;
-    model->fields.volts = read_f32(flds->data);
-    model->fields.per_sheet = read_f32(flds->data + 4);
+    model->fields.volts = eits_read_f32(flds->data);
+    model->fields.per_sheet = eits_read_f32(flds->data + 4);
     model->fields.at = (eits_matrix){.data = flds->data + FIELDS_HEAD,
                                      .rows = rows,
                                      .cols = model->n_pixels,
                                      .stride = stride,
                                      .storage = EITS_STORAGE_F16};
-    if (!between(model->fields.volts, 0, 1e30f) || !between(model->fields.per_sheet, 0, 1e30f) ||
+    if (!eits_between(model->fields.volts, 0, 1e30f) ||
+        !eits_between(model->fields.per_sheet, 0, 1e30f) ||
         !halves_finite(model->fields.at.data, halves))
         return EITS_E_MODEL_VALUE;
     return EITS_OK;
@@ -326,14 +301,14 @@ static eits_status read_fields(eits_model *model, const section *flds)
 static int ascends_from_zero(const float *values, uint32_t count)
 {
     for (uint32_t k = 1; k < count; ++k) {
-        if (!between(values[k], 0, 1e30f) || !(values[k] > values[k - 1]))
+        if (!eits_between(values[k], 0, 1e30f) || !(values[k] > values[k - 1]))
             return 0;
     }
     return values[0] == 0.0f;
 }
 
 /* The optional calibration of forces. */
-static eits_status read_force(eits_force *force, const section *found)
+static eits_status read_force(eits_force *force, const eits_section *found)
 {
     if (found->data == NULL)
         return EITS_OK;
@@ -341,8 +316,8 @@ static eits_status read_force(eits_force *force, const section *found)
         return EITS_E_MODEL_SECTION;
     const eits_force_head *head = (const eits_force_head *)(const void *)found->data;
     if (head->points < 2 || head->points > EITS_MAX_FORCE_POINTS ||
-        head->order > EITS_MAX_FORCE_ORDER || !between(head->radius_mm, 1e-6f, 1e30f) ||
-        !between(head->reach, 0, 1e3f) || !between(head->uncertainty, 0, 1e30f))
+        head->order > EITS_MAX_FORCE_ORDER || !eits_between(head->radius_mm, 1e-6f, 1e30f) ||
+        !eits_between(head->reach, 0, 1e3f) || !eits_between(head->uncertainty, 0, 1e30f))
         return EITS_E_MODEL_VALUE;
     const uint32_t terms = (head->order + 1) * (head->order + 2) / 2;
     if (found->size != sizeof *head + (2 * head->points + terms) * 4)
@@ -353,61 +328,9 @@ static eits_status read_force(eits_force *force, const section *found)
         !ascends_from_zero(force->force_n, head->points))
         return EITS_E_MODEL_VALUE;
     for (uint32_t k = 0; k < terms; ++k) {
-        if (!between(force->gain[k], -1e6f, 1e6f))
+        if (!eits_between(force->gain[k], -1e6f, 1e6f))
             return EITS_E_MODEL_VALUE;
     }
-    return EITS_OK;
-}
-
-static int near(float value, float wanted, float tolerance)
-{
-    return between(value, wanted - tolerance * wanted, wanted + tolerance * wanted);
-}
-
-/* Whether row i says the same of itself in each of its numbers, and of P. */
-static int row_fits(const eits_model *model, const eits_row_form *form, uint32_t i)
-{
-    const float *p = model->reduction.data;
-    const float s1 = form->s1, energy = form->energy[i], square = form->square[i],
-                unit = form->scale[i] * s1;
-    float sum = 0;
-    for (uint32_t k = 0; k < model->n_folded; ++k) {
-        const float value = p[(size_t)k * model->reduction.stride + i];
-        sum += value * value;
-    }
-    return form->strength[i] >= 0 && square >= 0 && between(energy, FLT_MIN, 1e30f) &&
-           between(form->scale[i], FLT_MIN, 1e30f) && near(sum, energy, 1e-3f) &&
-           near(unit * unit * energy, 1, 1e-3f) &&
-           near(square * energy + form->mu * (s1 * s1) * energy, 1, 1e-2f) &&
-           between(form->strength[i] * (s1 * s1) - square, -1e-3f * (s1 * s1), 1e-3f * (s1 * s1));
-}
-
-/* How the model was whitened, where it says so: three numbers, then four rows of the stride. */
-static eits_status read_row_form(eits_model *model, const section *found)
-{
-    const uint32_t rank = model->rank, stride = model->reduction.stride;
-    if (found->data == NULL)
-        return EITS_OK;
-    if (found->size != ROW_FORM_HEAD + 16u * stride)
-        return EITS_E_MODEL_SECTION;
-    const float *rows = (const float *)(const void *)(found->data + ROW_FORM_HEAD);
-    const eits_row_form form = {.mu = read_f32(found->data),
-                                .s1 = read_f32(found->data + 4),
-                                .s1_square = read_f32(found->data + 8),
-                                .scale = rows,
-                                .strength = rows + stride,
-                                .energy = rows + 2 * stride,
-                                .square = rows + 3 * stride};
-    float greatest = 0;
-    int fits = between(form.mu, 0, 1e30f) && between(form.s1, 1e-15f, 1e15f) &&
-               between(form.s1_square, FLT_MIN, 1.01f);
-    for (uint32_t i = 0; fits && i < rank; ++i) {
-        fits = row_fits(model, &form, i);
-        greatest = form.square[i] > greatest ? form.square[i] : greatest;
-    }
-    if (!fits || !near(greatest, form.s1 * form.s1, 1e-3f))
-        return EITS_E_MODEL_VALUE;
-    model->row_form = form;
     return EITS_OK;
 }
 
@@ -457,7 +380,7 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
     if (status == EITS_OK)
         status = read_force(&opened.force, &found.force);
     if (status == EITS_OK)
-        status = read_row_form(&opened, &found.whit);
+        status = eits_read_row_form(&opened, &found.whit);
     if (status == EITS_OK)
         *model = opened;
     return status;

@@ -3,6 +3,7 @@
 #include "model/options.h"
 
 #include "base/vec.h"
+#include "model/constants.h"
 #include "model/options_table.h"
 
 #include <string.h>
@@ -32,10 +33,10 @@ eits_status eits_options_track(eits_options *options)
         return EITS_E_ARGUMENT;
     /* A lower threshold lets more noise through as touches; confirmation over two frames takes
      * those out again, and what remains is more of the light touches. Fitted on tuning streams. */
-    options->detection_factor *= R(0.75);
-    options->track_confirm = 2;
-    options->track_hold = 2;
-    options->track_smooth = R(0.66);
+    options->detection_factor *= EITS_TRACK_DETECTION;
+    options->track_confirm = EITS_TRACK_CONFIRM;
+    options->track_hold = EITS_TRACK_HOLD;
+    options->track_smooth = EITS_TRACK_SMOOTH;
     return EITS_OK;
 }
 

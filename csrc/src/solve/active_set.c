@@ -15,7 +15,7 @@
  *
  * On the active columns A with signs g the objective is a parabola, with the optimum at
  * S_A'(y - S_A x_A) = lambda g. "pull" is the difference of the two sides; Newton's step is
- * G^-1 pull (gram_factor.c). Scaling the step by t scales the pulls by 1 - t, so they need no
+ * G^-1 pull (active_columns.c). Scaling the step by t scales the pulls by 1 - t, so they need no
  * product within a round.
  *
  * Invariants: working[] with x[], sign[], pull[] are parallel lists, in no order of columns; the
@@ -25,199 +25,16 @@
  * coordinate descent, which needs no factor and starts from what was reached. */
 #include "base/vec.h"
 #include "context/products.h"
-#include "frame/projection.h"
 #include "frame/whitening.h"
-#include "kernels/column.h"
-#include "solve/gram_factor.h"
+#include "solve/active_columns.h"
+#include "solve/constants.h"
 #include "solve/solve.h"
-#include "solve/violations.h"
-#include "solve/working_set.h"
-
-typedef struct active {
-    eits_real lambda;
-    eits_real tolerance; /* a correlation beyond lambda by no more than this is rounding */
-    uint32_t max;        /* columns that can be independent */
-    /* of each active column: its correlation less lambda times its sign; zero at the optimum */
-    eits_real *pull;
-    /* of each active column: that of its coefficient, or of the correlation that brought it in */
-    eits_real *sign;
-    eits_real *work;
-    eits_real *step;
-    eits_real *reach;  /* of each active column: what fraction of the step it can go */
-    eits_real *column; /* the new column's part that counts */
-    eits_nearby near;  /* columns beside the active ones, now or before */
-    int limited;       /* the limit of MACs leaves no room for the next step */
-    int loose;         /* a column is active that the factor does not have */
-    int broken;        /* the factor is of no use */
-    int moved;         /* x is not as it was before the last columns were taken in */
-} active;
-
-/* The rounding of one operation, a unit in the last place of 1. */
-static const eits_real EPSILON = (eits_real)(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
-/* What must be left of a column's square after projection on the active ones, for it to count as
- * independent. It is a difference of squares, so it is known to about rank times epsilon of
- * the square and no better. */
-static const eits_real INDEPENDENT = (eits_real)(sizeof(eits_real) == 4 ? 1e-5 : 1e-10);
-
-/* a fraction of the objective: what a look nearby must have won to be followed by one */
-static const eits_real WORTHWHILE = R(1e-6);
-/* At most so many looks nearby after one at every column: a bound, so that a round ends. */
-enum { LOOKS_NEARBY = 20 };
-
-static uint64_t macs_to_finish(const eits_context *ctx, uint32_t count)
-{
-    return (uint64_t)count * ctx->model->rank + eits_gradient_macs(ctx);
-}
-
-/* Whether the limit leaves room for `macs`, S x of one more column, and the gap after it.
- *
- * Once a step is too dear the solve ends; what is cheaper is not tried instead, so that the
- * result does not depend on the order of tests. */
-static int affords(const eits_context *ctx, active *a, uint64_t macs)
-{
-    a->limited =
-        a->limited || !eits_affords(ctx, macs + macs_to_finish(ctx, ctx->solver.working_count + 1));
-    return !a->limited;
-}
-
-/* The last active column takes the place, so that nothing has to be shifted. Uses a->work and
- * a->step. */
-static void drop(eits_context *ctx, active *a, uint32_t place)
-{
-    const uint32_t count = ctx->solver.working_count, last = count - 1;
-    if (affords(ctx, a, eits_factor_macs(count))) { /* otherwise the factor is needed no longer */
-        ctx->info.macs += eits_factor_macs(count);
-        eits_factor_drop(ctx, count, place, a->work, a->step);
-    }
-    ctx->solver.working_count = last;
-    ctx->solver.working[place] = ctx->solver.working[last];
-    ctx->solver.x[place] = ctx->solver.x[last];
-    a->pull[place] = a->pull[last];
-    a->sign[place] = a->sign[last];
-}
-
-/* Hold column j without a row of the factor's: only where the solve ends or another solver goes on.
- */
-static void activate_dependent(eits_context *ctx, uint32_t j, eits_real x)
-{
-    ctx->solver.working[ctx->solver.working_count] = j;
-    ctx->solver.x[ctx->solver.working_count++] = x;
-}
-
-/* The part of column j that counts into a->column; returns its square, 0 where it is but rounding.
- */
-static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
-{
-    const eits_matrix *s = &ctx->model->sensitivity;
-    const uint32_t rank = ctx->model->rank;
-    const eits_real scale = eits_column_scale(s, j), *from = eits_column(s, j, ctx->solver.sz);
-    for (uint32_t i = 0; i < rank; ++i)
-        a->column[i] = scale * from[i];
-    const eits_real before = eits_dot(ctx->kernels, a->column, a->column, rank);
-    ctx->info.macs += rank;
-    /* Nothing is ignored and F = 1: the column counts as it is. */
-    if (ctx->projection.count == 0 && !ctx->whitening.form)
-        return before;
-    ctx->info.macs += rank + eits_forward(ctx, a->column);
-    const eits_real square = eits_dot(ctx->kernels, a->column, a->column, rank);
-    return square > INDEPENDENT * before ? square : 0;
-}
-
-/* a->step = the combination of the active columns that comes nearest to the new one; returns what
- * it leaves of its square. */
-static eits_real what_is_left(eits_context *ctx, active *a, eits_real square)
-{
-    const uint32_t count = ctx->solver.working_count;
-    ctx->kernels->dots(&ctx->model->sensitivity, ctx->solver.working, count,
-                       eits_adjoint(ctx, a->column, ctx->solver.adjoint), a->step);
-    eits_factor_solve(ctx, count, a->step, a->work, a->step);
-    ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_adjoint_macs(ctx) +
-                      eits_factor_macs(count) + count;
-    /* What the projection on the active columns leaves: |s_j|^2 - |K S_A's_j|^2, by Pythagoras. */
-    return square - eits_dot(ctx->kernels, a->work, a->work, count);
-}
-
-/* Column j becomes active, with what_is_left's combination in a->step as its new factor row. */
-static void activate(eits_context *ctx, active *a, uint32_t j, eits_real x, eits_real sign,
-                     eits_real pull, eits_real left)
-{
-    const uint32_t k = ctx->solver.working_count++;
-    eits_factor_append(ctx, k, a->step, left);
-    ctx->solver.working[k] = j;
-    ctx->solver.x[k] = x;
-    a->sign[k] = sign;
-    a->pull[k] = pull;
-}
-
-/* The new column depends on the active ones (a->step as above). Move along what leaves S x as it
- * is, if that lowers the objective, until a coefficient is zero, and drop that; returns by how much
- * the new one moved, 0 where there is no such way. */
-static eits_real exchange(eits_context *ctx, active *a, eits_real sign, eits_real pull)
-{
-    const uint32_t count = ctx->solver.working_count;
-    ctx->info.macs += count;
-    /* The objective's slope along the exchange is the pulls' sum, since S x does not change on the
-     * way. */
-    eits_real slope = sign * pull, shortest = R(INFINITY);
-    uint32_t place = count;
-    for (uint32_t k = 0; k < count; ++k) {
-        const eits_real d = -sign * a->step[k];
-        slope = eits_fma(d, a->pull[k], slope);
-        if (d * a->sign[k] < 0 && ctx->solver.x[k] / -d < shortest) {
-            shortest = ctx->solver.x[k] / -d;
-            place = k;
-        }
-    }
-    if (!(slope > 0) || place == count)
-        return 0;
-    for (uint32_t k = 0; k < count; ++k)
-        ctx->solver.x[k] = eits_fma(-sign * shortest, a->step[k], ctx->solver.x[k]);
-    drop(ctx, a, place);
-    a->moved = 1;
-    return shortest;
-}
-
-/* Take column j in, at zero.
- *
- * Where it depends on the active ones, or they fill all directions, one of them makes room by
- * exchange() and the test is made again: dropping a column changes what the others span. Each turn
- * drops one, so the loop ends. What the exchanges moved is kept in x; if no way on is left while x
- * is not zero, the column stays without a factor row and the solve goes on elsewhere. */
-static void add(eits_context *ctx, active *a, uint32_t j)
-{
-    const eits_real sign = ctx->solver.gradient[j] > 0 ? 1 : -1,
-                    pull = ctx->solver.gradient[j] - sign * a->lambda;
-    const uint32_t rank = ctx->model->rank;
-    eits_real x = 0, square = 0;
-    for (int first = 1;; first = 0) {
-        const uint32_t count = ctx->solver.working_count;
-        if (!affords(ctx, a,
-                     (uint64_t)rank * (count + 2u) + eits_forward_macs(ctx) +
-                         eits_adjoint_macs(ctx) + eits_factor_macs(count) + 2u * count))
-            break;
-        if (first && !((square = read_column(ctx, a, j)) > 0))
-            return;
-        const eits_real left = what_is_left(ctx, a, square);
-        if (count < a->max && left > INDEPENDENT * square) {
-            activate(ctx, a, j, sign * x, sign, pull, left);
-            return;
-        }
-        const eits_real moved = exchange(ctx, a, sign, pull);
-        x += moved;
-        if (ctx->solver.working_count == count) /* no way on */
-            break;
-    }
-    if (x == 0)
-        return;
-    activate_dependent(ctx, j, sign * x);
-    a->loose = 1;
-}
 
 /* How far coefficient k can go of its step: 2 where it keeps its sign to the end.
  *
  * A coefficient that would change sign stops at zero: beyond it lambda |x| has another slope,
  * and the step is not the optimum any more. */
-static eits_real reach(const eits_context *ctx, const active *a, uint32_t k)
+static eits_real reach(const eits_context *ctx, const eits_active *a, uint32_t k)
 {
     const eits_real x = ctx->solver.x[k], target = x + a->step[k];
     if (a->sign[k] * target > 0)
@@ -229,11 +46,11 @@ static eits_real reach(const eits_context *ctx, const active *a, uint32_t k)
  * change sign. All coefficients go the same fraction of their steps, that of the first one to reach
  * zero: along the step the objective falls all the way, coefficient by coefficient it need not.
  * Each turn drops a column or ends. */
-static void settle(eits_context *ctx, active *a)
+static void settle(eits_context *ctx, eits_active *a)
 {
     while (ctx->solver.working_count > 0) {
         const uint32_t count = ctx->solver.working_count;
-        if (!affords(ctx, a, eits_factor_macs(count)))
+        if (!eits_active_affords(ctx, a, eits_factor_macs(count)))
             return;
         eits_factor_solve(ctx, count, a->pull, a->work, a->step);
         ctx->info.macs += eits_factor_macs(count);
@@ -254,7 +71,7 @@ static void settle(eits_context *ctx, active *a)
         uint32_t dropped = 0;
         for (uint32_t k = count; k-- > 0;) {
             if (a->reach[k] <= fraction) { /* the last, which takes the place, is not among them */
-                drop(ctx, a, k);
+                eits_active_drop(ctx, a, k);
                 ++dropped;
             }
         }
@@ -265,7 +82,7 @@ static void settle(eits_context *ctx, active *a)
 
 /* The pull of the active columns, from solver.gradient, which is zero for them afterwards;
  * returns the greatest. */
-static eits_real take_pulls(eits_context *ctx, active *a)
+static eits_real take_pulls(eits_context *ctx, eits_active *a)
 {
     eits_real greatest = 0;
     for (uint32_t k = 0; k < ctx->solver.working_count; ++k) {
@@ -279,34 +96,12 @@ static eits_real take_pulls(eits_context *ctx, active *a)
 
 /* S x is computed again from x instead of updated along the steps: the gap is a bound only if it
  * belongs to the x that is returned. */
-static eits_duality_gap check_gap(eits_context *ctx, const eits_scratch *scratch, const active *a)
+static eits_duality_gap check_gap(eits_context *ctx, const eits_scratch *scratch,
+                                  const eits_active *a)
 {
     ctx->info.nonzeros = eits_apply_working(ctx, scratch, ctx->solver.x, ctx->solver.sx);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
     return eits_find_duality_gap(ctx, a->lambda, EITS_LAYOUT_WORKING);
-}
-
-/* From a warm start's coefficients: a factor of their columns, without those that depend on the
- * others. Returns 0, nothing changed, where the limit of MACs leaves no room for that. */
-static int begin_warm(eits_context *ctx, active *a)
-{
-    const uint64_t active_count = ctx->info.nonzeros, rank = ctx->model->rank;
-    if (!eits_affords(ctx, active_count * ((active_count + 2u) * rank + eits_forward_macs(ctx) +
-                                           eits_adjoint_macs(ctx)) +
-                               active_count * eits_factor_macs((uint32_t)active_count) +
-                               active_count * (rank + active_count) + 2u * eits_gradient_macs(ctx)))
-        return 0;
-    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
-        const eits_real x = ctx->solver.x[j];
-        const eits_real square =
-            x != 0 && ctx->solver.working_count < a->max ? read_column(ctx, a, j) : 0;
-        if (!(square > 0))
-            continue;
-        const eits_real left = what_is_left(ctx, a, square);
-        if (left > INDEPENDENT * square)
-            activate(ctx, a, j, x, x > 0 ? 1 : -1, 0, left);
-    }
-    return 1;
 }
 
 static void start_over_from_zero(eits_context *ctx)
@@ -322,11 +117,11 @@ static void start_over_from_zero(eits_context *ctx)
  *
  * A column that comes in loosely ends the round: the factor does not have it, so no step may be
  * based on it. */
-static int take_in(eits_context *ctx, const eits_scratch *scratch, active *a, uint32_t missing)
+static int take_in(eits_context *ctx, const eits_scratch *scratch, eits_active *a, uint32_t missing)
 {
     a->moved = 0;
     for (uint32_t k = 0; k < missing && !a->limited && !a->loose; ++k)
-        add(ctx, a, scratch->index[k]);
+        eits_active_add(ctx, a, scratch->index[k]);
     if (!a->loose)
         settle(ctx, a);
     return a->moved;
@@ -334,13 +129,13 @@ static int take_in(eits_context *ctx, const eits_scratch *scratch, active *a, ui
 
 /* What joins next is mostly beside what is or was active: look there only. *objective is the last
  * one known. Returns whether anything moved. */
-static int look_nearby(eits_context *ctx, const eits_scratch *scratch, active *a,
+static int look_nearby(eits_context *ctx, const eits_scratch *scratch, eits_active *a,
                        eits_real *objective)
 {
     const uint64_t rank = ctx->model->rank;
     if (a->limited || a->loose || a->broken ||
         !eits_affords(ctx, ctx->solver.working_count * rank + eits_forward_macs(ctx) +
-                               macs_to_finish(ctx, ctx->solver.working_count)))
+                               eits_macs_to_finish(ctx, ctx->solver.working_count)))
         return 0;
     ctx->info.macs += rank * eits_apply_working(ctx, scratch, ctx->solver.x, ctx->solver.sx);
     ctx->info.macs += eits_take_residual(ctx, ctx->solver.sx);
@@ -350,12 +145,12 @@ static int look_nearby(eits_context *ctx, const eits_scratch *scratch, active *a
     const eits_real now = R(0.5) * eits_dot(ctx->kernels, ctx->solver.residual,
                                             ctx->solver.residual, ctx->model->rank) +
                           a->lambda * l1;
-    if (!(now < *objective * (1 - WORTHWHILE)))
+    if (!(now < *objective * (1 - EITS_WORTHWHILE)))
         return 0;
     *objective = now;
     eits_nearby_add(ctx, &a->near);
     if (!eits_affords(ctx, a->near.count * rank + eits_adjoint_macs(ctx) +
-                               macs_to_finish(ctx, ctx->solver.working_count)))
+                               eits_macs_to_finish(ctx, ctx->solver.working_count)))
         return 0;
     eits_take_gradient_nearby(ctx, scratch, &a->near);
     (void)take_pulls(ctx, a);
@@ -364,14 +159,14 @@ static int look_nearby(eits_context *ctx, const eits_scratch *scratch, active *a
 }
 
 /* One round; *c becomes the duality gap after it. */
-static int round_of(eits_context *ctx, const eits_scratch *scratch, active *a, uint32_t missing,
-                    eits_duality_gap *c)
+static int round_of(eits_context *ctx, const eits_scratch *scratch, eits_active *a,
+                    uint32_t missing, eits_duality_gap *c)
 {
     eits_real objective = c->objective;
     ++ctx->info.iterations;
     const int moved = take_in(ctx, scratch, a, missing);
-    for (int looks = 0; moved && looks < LOOKS_NEARBY && look_nearby(ctx, scratch, a, &objective);
-         ++looks)
+    for (int looks = 0;
+         moved && looks < EITS_LOOKS_NEARBY && look_nearby(ctx, scratch, a, &objective); ++looks)
         ;
     if (moved)
         *c = check_gap(ctx, scratch, a);
@@ -383,7 +178,8 @@ static int round_of(eits_context *ctx, const eits_scratch *scratch, active *a, u
  * At the level of rounding the objective no longer falls though columns still seem to violate. The
  * first such round is repeated with the worst column alone, since several at once may undo each
  * other; after the second this is the optimum as well as these numbers can have it. */
-static int rounds(eits_context *ctx, const eits_scratch *scratch, active *a, eits_duality_gap *c)
+static int rounds(eits_context *ctx, const eits_scratch *scratch, eits_active *a,
+                  eits_duality_gap *c)
 {
     const eits_options *o = &ctx->options;
     const eits_real enough = o->gap_rel * R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
@@ -398,20 +194,21 @@ static int rounds(eits_context *ctx, const eits_scratch *scratch, active *a, eit
         }
         const eits_real pull = take_pulls(ctx, a), before = c->objective;
         const uint32_t missing = eits_list_violations(ctx, scratch, a->lambda + a->tolerance, NULL);
-        if (stalls == 2 || (missing == 0 && pull <= a->tolerance)) {
+        if (stalls == EITS_MAX_STALLS || (missing == 0 && pull <= a->tolerance)) {
             ctx->info.stop = EITS_STOP_OPTIMUM;
             return 1;
         }
         const int moved = round_of(ctx, scratch, a, stalls > 0 && missing > 1 ? 1 : missing, c);
-        if (a->broken || (a->loose && !a->limited) || !(c->objective <= before * (1 + R(1e-3))))
+        if (a->broken || (a->loose && !a->limited) ||
+            !(c->objective <= before * (1 + EITS_MAX_RISE)))
             return 0;
         if (a->limited) {
             ctx->info.stop = EITS_STOP_MACS;
             return 1;
         }
-        stalls = c->objective < before * (1 - EPSILON) ? 0 : stalls + 1;
+        stalls = c->objective < before * (1 - EITS_EPSILON) ? 0 : stalls + 1;
         if (!moved) /* the gradient is as it was, but for the active columns, set to zero */
-            stalls = 2;
+            stalls = EITS_MAX_STALLS;
     }
 }
 
@@ -419,10 +216,12 @@ void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_re
                          int gradient_known)
 {
     const uint32_t free = ctx->model->rank - ctx->projection.count;
-    active a = {.lambda = lambda, .max = free < ctx->model->n_pixels ? free : ctx->model->n_pixels};
+    eits_active a = {.lambda = lambda,
+                     .max = free < ctx->model->n_pixels ? free : ctx->model->n_pixels};
     /* Rounding of a correlation is about epsilon |s_j| |y|, and |s_j|^2 at most the Lipschitz
      * constant. */
-    a.tolerance = 2 * EPSILON * eits_sqrt((eits_real)ctx->model->lipschitz) * ctx->info.data_norm;
+    a.tolerance = EITS_TOLERANCE_EPSILONS * EITS_EPSILON *
+                  eits_sqrt((eits_real)ctx->model->lipschitz) * ctx->info.data_norm;
     a.pull = scratch->row[5], a.sign = scratch->row[6], a.work = scratch->row[7],
     a.step = ctx->solver.sz;
     a.reach = ctx->solver.x_next, a.column = ctx->solver.sx_next;
@@ -433,7 +232,7 @@ void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_re
     if (gradient_known) {
         eits_copy(ctx->solver.residual, ctx->frame.y, EITS_STRIDE(ctx->model->rank));
         c = eits_duality_gap_of(ctx, lambda, EITS_LAYOUT_WORKING);
-    } else if (begin_warm(ctx, &a)) {
+    } else if (eits_active_begin_warm(ctx, &a)) {
         c = check_gap(ctx, scratch, &a);
         if (!(c.objective < eits_ceiling(ctx))) {
             start_over_from_zero(ctx);
@@ -453,7 +252,7 @@ void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_re
         eits_report_duality_gap(ctx, c);
         return;
     }
-    if (!eits_affords(ctx, macs_to_finish(ctx, ctx->info.nonzeros + 1))) {
+    if (!eits_affords(ctx, eits_macs_to_finish(ctx, ctx->info.nonzeros + 1))) {
         ctx->info.stop = EITS_STOP_MACS;
         eits_report_duality_gap(ctx, ctx->info.nonzeros == 0 ? eits_duality_gap_at_zero(ctx, lambda)
                                                              : c);

@@ -20,8 +20,8 @@
 #include "frame/whitening.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"
+#include "solve/constants.h"
 #include "solve/solve.h"
-#include "solve/working_set.h"
 
 typedef struct descent {
     eits_real lambda;
@@ -124,10 +124,6 @@ static eits_real visit(eits_context *ctx, descent *d, uint32_t j)
     return norm * step * step;
 }
 
-/* A sweep worth less than this fraction of the first since the last look: what is missing from the
- * list matters more than what is left to gain within it. */
-static const eits_real SETTLED = R(0.001);
-
 typedef enum sweep_end { SWEEP_DONE, SWEEP_LIMIT } sweep_end;
 
 /* One sweep; leaves columns out of the list that stayed at zero. *worth is the sum of what its
@@ -173,8 +169,8 @@ static void choose(eits_context *ctx, const descent *d)
 /* What all steps of a sweep are worth when only rounding moves: (8 epsilon |y|)^2. */
 static eits_real rounding(const eits_context *ctx)
 {
-    const eits_real epsilon = R(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
-    return 64 * epsilon * epsilon * ctx->info.data_norm * ctx->info.data_norm;
+    return EITS_REST_EPSILONS * EITS_EPSILON * EITS_EPSILON * ctx->info.data_norm *
+           ctx->info.data_norm;
 }
 
 /* Sweeps until a look is due: after sweep `last`, or once a sweep is worth little beside the first,
@@ -186,7 +182,7 @@ static int descend(eits_context *ctx, descent *d, uint32_t last)
     eits_copy(ctx->solver.residual, eits_adjoint(ctx, ctx->solver.residual, ctx->solver.adjoint),
               EITS_STRIDE(ctx->model->rank));
     ctx->info.macs += eits_adjoint_macs(ctx);
-    for (int begun = 0; ctx->info.iterations < last && !(begun && worth <= SETTLED * first);
+    for (int begun = 0; ctx->info.iterations < last && !(begun && worth <= EITS_SETTLED * first);
          begun = 1) {
         if (sweep(ctx, d, &worth) == SWEEP_LIMIT) {
             ctx->info.stop = EITS_STOP_MACS;
@@ -220,7 +216,8 @@ void eits_run_coordinate(eits_context *ctx, const eits_scratch *scratch, eits_re
         c = look(ctx, scratch, &d);
     }
     ctx->info.stop = EITS_STOP_ITERATIONS;
-    /* Looks grow rare as in fista.c: six times the interval each, unless a gap is to be met. */
+    /* Looks grow rare as in fista.c: EITS_LOOK_GROWTH times the interval each, unless a gap is to
+     * be met. */
     uint32_t interval = o->gap_every;
     while (ctx->info.iterations < end) {
         choose(ctx, &d);
@@ -246,7 +243,9 @@ void eits_run_coordinate(eits_context *ctx, const eits_scratch *scratch, eits_re
             ctx->info.stop = EITS_STOP_OPTIMUM;
             break;
         }
-        interval = o->gap_rel > 0 || interval > UINT32_MAX / 12 ? interval : 6 * interval;
+        interval = o->gap_rel > 0 || interval > UINT32_MAX / (2 * EITS_LOOK_GROWTH)
+                       ? interval
+                       : EITS_LOOK_GROWTH * interval;
     }
     eits_report_duality_gap(ctx, c);
 }

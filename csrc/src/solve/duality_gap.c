@@ -8,6 +8,7 @@
  *
  * Everything is relative to |y|^2 / 2, the objective at x = 0: gap_rel = 0.01 says that the
  * objective is within a hundredth of what explaining nothing would cost. */
+#include "solve/constants.h"
 #include "solve/solve.h"
 
 #include "base/vec.h"
@@ -51,7 +52,7 @@ static eits_real half_square_of_data(const eits_context *ctx)
  * rounding and far below what a step too long does. */
 eits_real eits_ceiling(const eits_context *ctx)
 {
-    return half_square_of_data(ctx) * (1 + R(1e-3));
+    return half_square_of_data(ctx) * (1 + EITS_MAX_RISE);
 }
 
 /* With r = y - S x, c = S' r and s = min(1, lambda / max c), the dual point s r gives

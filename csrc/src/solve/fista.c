@@ -26,11 +26,8 @@
 #include "context/products.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
+#include "solve/constants.h"
 #include "solve/solve.h"
-#include "solve/working_set.h"
-
-/* L too small by a factor of 256 is no rounding: the model is at fault. */
-enum { MAX_STEP_HALVINGS = 8 };
 
 static int by_working_set(const eits_context *ctx)
 {
@@ -118,15 +115,12 @@ static int iterate(eits_context *ctx, const eits_scratch *scratch, eits_real lam
 }
 
 /* When the working set is looked after: a look at every column after gap_every iterations, then
- * after LOOK_GROWTH times as many, and so on: early looks matter, later ones change little; where a
- * gap is to be reached, always after gap_every. In between, columns at rest are left out every few
- * iterations. */
+ * after EITS_LOOK_GROWTH times as many, and so on: early looks matter, later ones change little;
+ * where a gap is to be reached, always after gap_every. In between, columns at rest are left out
+ * every few iterations. */
 typedef struct schedule {
     uint32_t next_look, interval;
 } schedule;
-
-/* Pruning repacks the set, which costs about an iteration: every fifth pays. */
-enum { PRUNE_EVERY = 5, LOOK_GROWTH = 6 };
 
 static int looks_at_every_column(const eits_context *ctx, uint32_t k, const schedule *s)
 {
@@ -154,13 +148,13 @@ static void prepare_gradient(eits_context *ctx, const eits_scratch *scratch, eit
             return;
         eits_working_set_choose(ctx, scratch, lambda);
         s->next_look = s->interval < UINT32_MAX - k ? k + s->interval : UINT32_MAX;
-        s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / LOOK_GROWTH / 2
+        s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / EITS_LOOK_GROWTH / 2
                           ? s->interval
-                          : LOOK_GROWTH * s->interval;
+                          : EITS_LOOK_GROWTH * s->interval;
         return;
     }
     take_working_gradient(ctx, ctx->solver.sz);
-    if (k % PRUNE_EVERY == 1)
+    if (k % EITS_PRUNE_EVERY == 1)
         eits_working_set_prune(ctx, lambda);
 }
 
@@ -207,8 +201,8 @@ static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, e
         gap_known = 1;
         /* too long a step may also throw all coefficients beyond their sign, to zero: then the gap
          * is that of the start */
-        if (!(c.objective <= ceiling) || (none && c.gap > R(1e-3) * scale)) {
-            if (ctx->info.step_halvings == MAX_STEP_HALVINGS || k == o->iterations) {
+        if (!(c.objective <= ceiling) || (none && c.gap > EITS_ZERO_GAP * scale)) {
+            if (ctx->info.step_halvings == EITS_MAX_STEP_HALVINGS || k == o->iterations) {
                 ctx->info.stop = EITS_STOP_DIVERGED;
                 break;
             }

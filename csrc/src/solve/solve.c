@@ -23,6 +23,7 @@
 #include "diagnostics/diagnostics.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
+#include "solve/constants.h"
 
 static void start_from_zero(eits_context *ctx)
 {
@@ -101,10 +102,6 @@ static void run(eits_context *ctx, const eits_scratch *scratch, int gradient_kno
     }
 }
 
-/* Data whose square is hardly a number any more: objective and gap would be rounding. 2^24 (2^53)
- * times the smallest normal number, so that the square times epsilon is normal, too. */
-static const eits_real MIN_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 0x1p-102 : 0x1p-969);
-
 /* info holds what the frame stage counted, and zeros; `from_last`: start from the last
  * coefficients.
  *
@@ -142,7 +139,7 @@ eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int
     }
     /* Zero is the exact optimum where no correlation exceeds lambda (the KKT conditions at x = 0).
      */
-    if (!(ctx->info.lambda_max > ctx->info.lambda) || square < MIN_SQUARE) {
+    if (!(ctx->info.lambda_max > ctx->info.lambda) || square < EITS_MIN_SQUARE) {
         eits_answer_zero(ctx, EITS_STOP_ZERO);
         return EITS_OK;
     }

@@ -19,6 +19,7 @@
 #include "base/vec.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
+#include "solve/constants.h"
 
 /* The correlations, signed so that more is a greater violation. Where the sign rule allows
  * increases alone they are so already, and no copy is made. */
@@ -79,10 +80,6 @@ static uint32_t consider(const eits_context *ctx, const eits_scratch *scratch, c
     return count + 1;
 }
 
-/* So many columns are tested at a time. Most blocks have none above the limit and are done with one
- * vector comparison. */
-enum { BLOCK = 32 };
-
 /* Pixel j's two coordinates as one number: a neighbour in the row differs by one's. */
 static inline uint32_t place_of(const eits_pixel *pixel)
 {
@@ -91,22 +88,22 @@ static inline uint32_t place_of(const eits_pixel *pixel)
     return place;
 }
 
-/* Of BLOCK columns from v and p on, which exceed `min` and are no less than their neighbours in the
- * row; returns whether any is. A cheap sieve before eits_is_peak, which looks at all eight
- * neighbours through the cell map. The columns before and after the block must exist. Without a
- * branch, so that compilers make vectors of it. */
+/* Of EITS_SIEVE_BLOCK columns from v and p on, which exceed `min` and are no less than their
+ * neighbours in the row; returns whether any is. A cheap sieve before eits_is_peak, which looks at
+ * all eight neighbours through the cell map. The columns before and after the block must exist.
+ * Without a branch, so that compilers make vectors of it. */
 static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real min,
-                              uint32_t flag[BLOCK])
+                              uint32_t flag[EITS_SIEVE_BLOCK])
 {
     const eits_pixel one = {.ix = 1};
     const uint32_t next = place_of(&one);
     uint32_t any = 0;
-    for (uint32_t l = 0; l < BLOCK; ++l)
+    for (uint32_t l = 0; l < EITS_SIEVE_BLOCK; ++l)
         any |= v[l] > min;
     if (!any)
         return 0;
     any = 0;
-    for (int l = 0; l < BLOCK; ++l) {
+    for (int l = 0; l < EITS_SIEVE_BLOCK; ++l) {
         const uint32_t before =
             (place_of(p + l) - place_of(p + l - 1) == next) & (v[l - 1] >= v[l]);
         const uint32_t after = (place_of(p + l + 1) - place_of(p + l) == next) & (v[l + 1] > v[l]);
@@ -120,10 +117,10 @@ static uint32_t of_all(const eits_context *ctx, const eits_scratch *scratch, con
                        eits_real min)
 {
     const uint32_t n = ctx->model->n_pixels;
-    uint32_t count = 0, flag[BLOCK];
-    for (uint32_t first = 0; first < n; first += BLOCK) {
-        const uint32_t end = first + BLOCK < n ? first + BLOCK : n;
-        const int whole = first > 0 && first + BLOCK < n;
+    uint32_t count = 0, flag[EITS_SIEVE_BLOCK];
+    for (uint32_t first = 0; first < n; first += EITS_SIEVE_BLOCK) {
+        const uint32_t end = first + EITS_SIEVE_BLOCK < n ? first + EITS_SIEVE_BLOCK : n;
+        const int whole = first > 0 && first + EITS_SIEVE_BLOCK < n;
         if (whole && !peaks_of_rows(v + first, ctx->model->pixel + first, min, flag))
             continue;
         for (uint32_t j = first; j < end; ++j) {

@@ -11,7 +11,7 @@
  * Invariants while a set is in force: working[] ascends, so that lists and sums have the order of
  * the full problem; x[k], z[k] and gradient[k] belong to column working[k]; every column outside is
  * zero in x and in z. Begin and end convert from and to the layout by pixel. */
-#include "solve/working_set.h"
+#include "solve/solve.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"

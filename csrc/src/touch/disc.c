@@ -20,6 +20,7 @@
 #include "frame/whitening.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"
+#include "touch/constants.h"
 
 /* The kept pixels that the disc covers, in list_index, how much of each, and the cover's derivative
  * by distance, times pixel_mm. */
@@ -83,7 +84,7 @@ static covered cover(eits_context *ctx, const eits_scratch *scratch, const eits_
                 continue;
             /* At the very centre no direction is the way to it; the slope there is zero by
              * symmetry. */
-            const eits_real from = distance > R(1e-6) ? 1 / distance : 0;
+            const eits_real from = distance > EITS_NO_DIRECTION ? 1 / distance : 0;
             c.index[c.count] = j;
             c.cover[c.count] = fraction < 1 ? fraction : 1;
             c.ramp[c.count] = fraction < 1 ? 1 : 0;

@@ -26,20 +26,7 @@
 #include "base/vec.h"
 #include "diagnostics/diagnostics.h"
 #include "kernels/kernels.h"
-
-enum { STRENGTH_PASSES = 10 };
-
-/* Relative deviation of the radius that strength suggests: contrasts of 3 to 10 make 2 (c - 1) / (c
- * + 1) = 1.0 to 1.6, so that the root of strength tells the radius to about 12 %. */
-static const eits_real RADIUS_DEVIATION = R(0.12);
-/* Of the unit diagonal: holds a direction that the data leave open, and slows the others by a
- * thousandth. */
-static const eits_real DAMPING = R(1e-3);
-/* A move by less ends the sweeps: it could not be seen. */
-static const eits_real SETTLED_PIXELS = R(1.0 / 256.0);
-/* The covers are linear in the radius over one pixel at most: a longer step would leave the range
- * in which its slope is true. */
-static const eits_real MAX_RADIUS_STEP_PIXELS = R(0.5);
+#include "touch/constants.h"
 
 eits_fit eits_fit_none(const eits_context *ctx, const eits_scratch *scratch)
 {
@@ -76,7 +63,7 @@ void eits_fit_strengths(eits_context *ctx, const eits_scratch *scratch, eits_fit
     }
     /* Few discs that overlap little: a few rounds, each disc after the other, are as good as a
      * solve of all at once, and keep every sign. */
-    for (int pass = 0; pass < STRENGTH_PASSES; ++pass) {
+    for (int pass = 0; pass < EITS_STRENGTH_PASSES; ++pass) {
         for (uint32_t k = 0; k < f->count; ++k) {
             eits_disc *disc = &f->disc[k];
             eits_axpy(ctx->kernels, f->residual, disc->change, eits_atom(ctx, k), rank);
@@ -110,11 +97,13 @@ static void damped_step(const eits_real h[4][4], const eits_real g[4], eits_real
         scale[i] = h[i][i] > 0 ? 1 / eits_sqrt(h[i][i]) : 0;
     for (int i = 0; i < 4; ++i) {
         for (int j = 0; j <= i; ++j) {
-            eits_real sum = i == j ? 1 + DAMPING : h[i][j] * scale[i] * scale[j];
+            eits_real sum = i == j ? 1 + EITS_DAMPING : h[i][j] * scale[i] * scale[j];
             for (int k = 0; k < j; ++k)
                 sum = eits_fma(-l[i][k], l[j][k], sum);
             if (i == j)
-                l[i][i] = eits_sqrt(sum > DAMPING * R(0.1) ? sum : DAMPING * R(0.1));
+                l[i][i] = eits_sqrt(sum > EITS_DAMPING * EITS_DAMPING_PIVOT
+                                        ? sum
+                                        : EITS_DAMPING * EITS_DAMPING_PIVOT);
             else
                 l[i][j] = sum / l[j][j];
         }
@@ -174,7 +163,7 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
      * strength suggests a radius: a prior whose weight is the touch's energy, or the noise where
      * that is more. */
     const eits_real expected = eits_expected_radius(o, disc),
-                    deviation = RADIUS_DEVIATION * expected;
+                    deviation = EITS_RADIUS_DEVIATION * expected;
     const eits_real by_energy = f->radius_weight * energy, by_noise = f->noise / (eits_real)rank;
     const eits_real weight =
         (by_energy > by_noise ? by_energy : by_noise) / (deviation * deviation);
@@ -194,13 +183,13 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
      * size. */
     damped_step((const eits_real(*)[4])h, g, step);
     const eits_real reach = (eits_real)ctx->model->pixel_mm,
-                    radius_reach = MAX_RADIUS_STEP_PIXELS * reach;
+                    radius_reach = EITS_MAX_RADIUS_STEP_PIXELS * reach;
     const eits_real off = disc->radius_mm - expected;
     const eits_real cost = eits_dot(ctx->kernels, left, left, rank) + weight * off * off;
     /* The step is tried whole, then by halves: the model is linear only near by. What does not
      * lower the cost is not done at all, so that the fit never gets worse. */
     eits_real moved = 0, fraction = 1;
-    for (int attempt = 0; attempt < 3; ++attempt, fraction *= R(0.5)) {
+    for (int attempt = 0; attempt < EITS_STEP_TRIALS; ++attempt, fraction *= R(0.5)) {
         eits_disc trial = *disc;
         trial.x_mm += fraction * eits_clamp(step[0], -reach, reach);
         trial.y_mm += fraction * eits_clamp(step[1], -reach, reach);
@@ -241,7 +230,7 @@ void eits_fit_move(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, 
             farthest = moved > farthest ? moved : farthest;
         }
         /* Further moves would not be seen. */
-        if (farthest < SETTLED_PIXELS * (eits_real)ctx->model->pixel_mm)
+        if (farthest < EITS_SETTLED_PIXELS * (eits_real)ctx->model->pixel_mm)
             break;
     }
 }

@@ -21,8 +21,8 @@
 #include "base/vec.h"
 #include "frame/fold.h"
 #include "kernels/kernels.h"
+#include "touch/constants.h"
 
-static const eits_real MAX = R(0.25); /* of |y|^2: what interaction may add */
 static const eits_real PI = R(3.14159265358979323846);
 
 typedef struct complex_number {
@@ -40,7 +40,7 @@ static complex_number product(complex_number a, complex_number b)
 static complex_number inverse_square(complex_number a)
 {
     const eits_real square = eits_fma(a.re, a.re, a.im * a.im);
-    if (!(square > R(1e-6)))
+    if (!(square > EITS_NO_DIPOLE_MM2))
         return (complex_number){0, 0};
     const complex_number inverse = {a.re / square, -(a.im / square)};
     return product(inverse, inverse);
@@ -157,7 +157,8 @@ uint64_t eits_remove_interaction(eits_context *ctx, const eits_scratch *scratch,
     macs += reduce(ctx, scratch, added_data);
     const eits_real total = eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, model->rank),
                     added = eits_dot(ctx->kernels, added_data, added_data, model->rank);
-    if (!(added <= MAX * total)) /* far beyond the second order: discs that are no touches */
+    if (!(added <= EITS_INTERACTION_MAX *
+                       total)) /* far beyond the second order: discs that are no touches */
         return macs + 2u * model->rank;
     for (uint32_t i = 0; i < model->rank; ++i)
         data[i] -= added_data[i];

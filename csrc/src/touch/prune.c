@@ -9,14 +9,13 @@
  * no refit for each candidate: one Cholesky factor of at most EITS_MAX_TOUCHES squared serves all.
  * In: f with its atoms and residual. Out: fewer discs, f->explained of those that stay, which is
  * reported as the touch's confidence. */
+#include "touch/constants.h"
 #include "touch/disc_fit.h"
 
 #include "base/vec.h"
 #include "frame/whitening.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"
-
-enum { DROP_SWEEPS = 3 };
 
 /* What each disc alone explains: change^2 / (G^-1)_kk of the atoms' Gram matrix G, by Cholesky and
  * its inverse. */
@@ -31,7 +30,7 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
             /* On a unit diagonal, lifted a little: two discs in one place are dependent, and would
              * make the factor's last pivot zero or less. They then explain about nothing each, and
              * one goes. */
-            eits_real sum = i == j ? 1 + R(1e-5)
+            eits_real sum = i == j ? 1 + EITS_GAIN_LIFT
                                    : (both > 0 ? eits_dot(ctx->kernels, eits_atom(ctx, i),
                                                           eits_atom(ctx, j), rank) /
                                                      both
@@ -39,7 +38,7 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
             for (uint32_t k = 0; k < j; ++k)
                 sum = eits_fma(-l[i][k], l[j][k], sum);
             if (i == j)
-                l[i][i] = eits_sqrt(sum > R(1e-6) ? sum : R(1e-6));
+                l[i][i] = eits_sqrt(sum > EITS_GAIN_PIVOT ? sum : EITS_GAIN_PIVOT);
             else
                 l[i][j] = sum / l[j][j];
         }
@@ -132,7 +131,7 @@ void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
             return;
         drop(ctx, f, weakest);
         eits_fit_move_all(ctx, scratch, f,
-                          ctx->options.touch_sweeps < DROP_SWEEPS ? ctx->options.touch_sweeps
-                                                                  : DROP_SWEEPS);
+                          ctx->options.touch_sweeps < EITS_DROP_SWEEPS ? ctx->options.touch_sweeps
+                                                                       : EITS_DROP_SWEEPS);
     }
 }

@@ -12,32 +12,11 @@
  * (f->noise / rank): the first guards against the model's own error, which scales with the touch,
  * the last against noise. A trial costs a few moves of disc_fit.c; the search is greedy, nearest
  * pair and largest disc first, since trying all subsets would grow without bound. */
+#include "touch/constants.h"
 #include "touch/disc_fit.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
-
-/* Chosen on scenes of 2 to 8 touches at 60 and 80 dB; eitskin study levers reports what they are
- * worth.
- *
- * edges nearer than this fraction of the smaller radius: one touch, perhaps, */
-static const eits_real NEAR = R(0.7);
-/* if one disc leaves at most so much more of |y|^2, */
-static const eits_real MERGE_TOTAL = R(0.002);
-static const eits_real MERGE_LEFT = R(0.5);    /* so much more of what is left */
-static const eits_real NOISE = R(20.0);        /* and so many directions of noise */
-static const eits_real SPLIT_TOTAL = R(0.001); /* with less than this fraction of |y|^2 left */
-/* and less than so many times the noise there is nothing to split */
-static const eits_real SPLIT_NOISE = R(1.3);
-/* two discs in their first places may leave so many times as much as the one, */
-static const eits_real SPLIT_FIRST = R(2.0);
-/* once fitted at most so much of it, */
-static const eits_real SPLIT_GAIN = R(0.85);
-/* and their edges must be so many times the smaller radius apart: they may overlap a little */
-static const eits_real SPLIT_DISTANCE = R(-0.1);
-/* of the disc's radius: where the two begin, and how large */
-static const eits_real SPLIT_OFFSET = R(1.3), SPLIT_RADIUS = R(0.7);
-enum { DIRECTIONS = 4, MERGE_SWEEPS = 3, SPLIT_SWEEPS = 4 };
 
 /* Enough to undo a trial: atoms and residual follow from the discs, and cost less to compute again,
  * seldom, than to keep. */
@@ -100,7 +79,7 @@ static int next_pair(const eits_fit *f, const pair *last, pair *next)
     for (uint32_t i = 0; i < f->count; ++i) {
         for (uint32_t j = i + 1u; j < f->count; ++j) {
             const pair here = {edge_distance(&f->disc[i], &f->disc[j]), i, j};
-            if (f->disc[i].polarity != f->disc[j].polarity || !(here.distance < NEAR) ||
+            if (f->disc[i].polarity != f->disc[j].polarity || !(here.distance < EITS_MERGE_NEAR) ||
                 (last != NULL && !comes_after(&here, last)))
                 continue;
             if (!found || comes_after(next, &here))
@@ -143,11 +122,12 @@ static int try_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
     f->disc[p->i].change = eits_best_change(ctx, &f->disc[p->i], eits_atom(ctx, p->i), f->residual);
     eits_axpy(ctx->kernels, f->residual, -f->disc[p->i].change, eits_atom(ctx, p->i), rank);
     f->macs += 3u * rank;
-    eits_fit_move(ctx, scratch, f, p->i, p->i, MERGE_SWEEPS);
+    eits_fit_move(ctx, scratch, f, p->i, p->i, EITS_MERGE_SWEEPS);
     eits_fit_move_all(ctx, scratch, f, 1);
     const eits_real more =
-        eits_fma(MERGE_TOTAL, f->total,
-                 eits_fma(MERGE_LEFT, before.left, NOISE * f->noise / (eits_real)rank));
+        eits_fma(EITS_MERGE_TOTAL, f->total,
+                 eits_fma(EITS_MERGE_LEFT, before.left,
+                          EITS_DIRECTIONS_OF_NOISE * f->noise / (eits_real)rank));
     if (eits_fit_left(ctx, f) <= before.left + more)
         return 1;
     restore(ctx, scratch, f, &before);
@@ -195,7 +175,7 @@ static eits_real both_changes(const eits_context *ctx, const eits_scratch *scrat
     /* Normal equations of two unknowns. Where the atoms are all but parallel there is no telling
      * them apart. */
     const eits_real determinant = eits_fma(aa, bb, -(ab * ab));
-    if (!(determinant > R(1e-5) * aa * bb))
+    if (!(determinant > EITS_PARALLEL * aa * bb))
         return -1;
     change[0] = eits_fma(bb, at, -(ab * bt)) / determinant;
     change[1] = eits_fma(aa, bt, -(ab * at)) / determinant;
@@ -212,22 +192,22 @@ static eits_real both_changes(const eits_context *ctx, const eits_scratch *scrat
  * not a result. Which direction is best hardly depends on the exact offset. */
 static two best_two(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
-    static const eits_real along[DIRECTIONS][2] = {
+    static const eits_real along[EITS_SPLIT_DIRECTIONS][2] = {
         {1, 0},
         {R(0.70710678118654752440), R(0.70710678118654752440)},
         {0, 1},
         {-R(0.70710678118654752440), R(0.70710678118654752440)}};
     const uint32_t rank = ctx->model->rank;
     const eits_disc one = f->disc[k];
-    const eits_real radius = SPLIT_RADIUS * one.radius_mm,
+    const eits_real radius = EITS_SPLIT_RADIUS * one.radius_mm,
                     smallest = ctx->options.touch_min_radius_mm;
     eits_real *target = scratch->row[3], *const atom[2] = {scratch->row[5], scratch->row[6]};
     two best = {.left = -1};
     eits_copy(target, f->residual, EITS_STRIDE(rank));
     eits_axpy(ctx->kernels, target, one.change, eits_atom(ctx, k), rank);
-    for (int d = 0; d < DIRECTIONS; ++d) {
-        const eits_real dx = SPLIT_OFFSET * one.radius_mm * along[d][0],
-                        dy = SPLIT_OFFSET * one.radius_mm * along[d][1];
+    for (int d = 0; d < EITS_SPLIT_DIRECTIONS; ++d) {
+        const eits_real dx = EITS_SPLIT_OFFSET * one.radius_mm * along[d][0],
+                        dy = EITS_SPLIT_OFFSET * one.radius_mm * along[d][1];
         two here = {.disc = {one, one}};
         for (int side = 0; side < 2; ++side) {
             here.disc[side].x_mm += side ? -dx : dx;
@@ -260,23 +240,24 @@ static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
     const uint32_t last = f->count;
     const saved before = save(ctx, f);
     const two begin = best_two(ctx, scratch, f, k);
-    if (begin.left < 0 || begin.left > SPLIT_FIRST * before.left)
+    if (begin.left < 0 || begin.left > EITS_SPLIT_FIRST * before.left)
         return 0;
     f->disc[k] = begin.disc[0];
     f->disc[last] = begin.disc[1];
     ++f->count;
     eits_fit_restart(ctx, scratch, f);
     /* These two first, since the others are where they belong; then all, once. */
-    for (int sweep = 0; sweep < SPLIT_SWEEPS; ++sweep) {
+    for (int sweep = 0; sweep < EITS_SPLIT_SWEEPS; ++sweep) {
         eits_fit_move(ctx, scratch, f, k, k, 1);
         eits_fit_move(ctx, scratch, f, last, last, 1);
     }
     eits_fit_move_all(ctx, scratch, f, 1);
     const eits_real left = eits_fit_left(ctx, f),
-                    min = eits_fma(SPLIT_TOTAL, f->total,
-                                   NOISE * f->noise / (eits_real)ctx->model->rank);
-    if (left <= SPLIT_GAIN * before.left && before.left - left >= min &&
-        edge_distance(&f->disc[k], &f->disc[last]) > SPLIT_DISTANCE)
+                    min =
+                        eits_fma(EITS_SPLIT_TOTAL, f->total,
+                                 EITS_DIRECTIONS_OF_NOISE * f->noise / (eits_real)ctx->model->rank);
+    if (left <= EITS_SPLIT_GAIN * before.left && before.left - left >= min &&
+        edge_distance(&f->disc[k], &f->disc[last]) > EITS_SPLIT_DISTANCE)
         return 1;
     restore(ctx, scratch, f, &before);
     return 0;
@@ -286,7 +267,7 @@ static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
 int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     uint8_t looked[EITS_MAX_TOUCHES] = {0};
-    const eits_real enough = eits_fma(SPLIT_TOTAL, f->total, SPLIT_NOISE * f->noise);
+    const eits_real enough = eits_fma(EITS_SPLIT_TOTAL, f->total, EITS_SPLIT_NOISE * f->noise);
     int any = 0;
     /* those that come by splitting are not split again at once */
     const uint32_t before = f->count;

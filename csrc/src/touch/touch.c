@@ -17,19 +17,13 @@
  *
  * Each stage can be switched off (options.touch_fit, .touch_sweeps), for what it costs a board;
  * info.touch_macs counts. docs/results/levers.md has what each is worth. */
+#include "touch/constants.h"
 #include "touch/disc_fit.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
 #include "solve/violations.h"
 #include "touch/interaction.h"
-
-/* The radius that strength suggests counts for more while it is open which discs there are, and for
- * less once the discs' interaction is known and the data are right to a thousandth. */
-static const eits_real EARLY_RADIUS = R(2.0), FINAL_RADIUS = R(0.4);
-/* So many turns of merging, splitting and interaction; and so many sweeps where discs are nearly
- * in place. */
-enum { ROUNDS = 2, LATER_SWEEPS = 2 };
 
 /* ---- peaks ---- */
 
@@ -77,7 +71,8 @@ static void seed(const eits_context *ctx, const eits_scratch *scratch, eits_fit 
 /* Later sweeps: few, for they begin near their end. */
 static uint32_t later(const eits_context *ctx)
 {
-    return ctx->options.touch_sweeps < LATER_SWEEPS ? ctx->options.touch_sweeps : LATER_SWEEPS;
+    return ctx->options.touch_sweeps < EITS_LATER_SWEEPS ? ctx->options.touch_sweeps
+                                                         : EITS_LATER_SWEEPS;
 }
 
 /* From here on the discs are to explain the data less their interaction, as far as that is known.
@@ -119,7 +114,7 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
               linear = ctx->frame.has_y_log || ctx->model->data_kind == EITS_DATA_LOG_RATIO;
     const int splits_merges =
         (ctx->options.touch_fit & EITS_TOUCH_FIT_SPLIT_MERGE) != 0 && (linear || interacts);
-    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EARLY_RADIUS : 1);
+    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EITS_EARLY_RADIUS : 1);
     begin(ctx, scratch, f);
     /* Peaks and strengths only, as asked. */
     if (ctx->options.touch_sweeps == 0)
@@ -128,11 +123,11 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
         (void)eits_fit_merge(ctx, scratch, f);
     /* Merging comes first: two halves of one touch are no two dipoles in each other's field. */
     /* Places and interaction depend on each other: in turn. */
-    for (int round = 0; interacts && f->count > 1 && round < ROUNDS; ++round) {
+    for (int round = 0; interacts && f->count > 1 && round < EITS_ROUNDS; ++round) {
         remove_interaction(ctx, scratch, f);
         eits_fit_move_all(ctx, scratch, f, later(ctx));
     }
-    for (int round = 0; splits_merges && round < ROUNDS; ++round) {
+    for (int round = 0; splits_merges && round < EITS_ROUNDS; ++round) {
         const int merged = eits_fit_merge(ctx, scratch, f), split = eits_fit_split(ctx, scratch, f);
         if (!merged && !split)
             break;
@@ -140,7 +135,7 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
         eits_fit_move_all(ctx, scratch, f, later(ctx));
         eits_fit_prune(ctx, scratch, f);
     }
-    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? FINAL_RADIUS : 1);
+    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EITS_FINAL_RADIUS : 1);
     remove_interaction(ctx, scratch, f);
     eits_fit_move_all(ctx, scratch, f, later(ctx));
     eits_fit_prune(ctx, scratch, f);

@@ -22,24 +22,9 @@
 #include "touch/tracker.h"
 
 #include "base/vec.h"
+#include "touch/constants.h"
 #include "touch/disc.h"
 
-/* Chosen on tuning streams, docs/guide/tracking.md. */
-/* a touch that explains less of |y|^2 may be half of another */
-static const eits_real SURE_FRACTION = R(0.05);
-/* and one whose own S'y is below so many times that of noise may be noise */
-static const eits_real SURE_CLEARNESS = R(1.5);
-/* of follow_mm, for touches that are not reported yet: noise is found anywhere, a touch beside
- * itself */
-static const eits_real TENTATIVE_REACH = R(0.6);
-/* of follow_mm: rms by which a velocity changes from frame to frame */
-static const eits_real SPEED_CHANGE = R(0.028);
-/* of follow_mm: rms of a new touch's velocity, a frame */
-static const eits_real FIRST_SPEED = R(0.12);
-/* of a pixel: no place is surer than this */
-static const eits_real MIN_DEVIATION = R(0.01);
-/* a faint touch that was found at least so often is reported while it is held */
-enum { KNOWN_FRAMES = 4 };
 enum { NONE = EITS_MAX_TOUCHES };
 
 static eits_real square(eits_real value)
@@ -89,7 +74,7 @@ static eits_real place_variance(const eits_context *ctx, const eits_touch *found
      * of any noisy peak. */
     const eits_real noise = own > 0 ? ctx->info.lambda_noise / own : 0;
     return eits_fma(square(ctx->options.track_smooth * noise), square(pixel),
-                    square(MIN_DEVIATION * pixel));
+                    square(EITS_MIN_DEVIATION * pixel));
 }
 
 /* A new touch has no velocity yet, but one of unknown size: so the next place it is found at is
@@ -98,7 +83,7 @@ static eits_followed track_start(const eits_context *ctx, const eits_touch *foun
 {
     return (eits_followed){.touch = *found,
                            .place_mm2 = place_variance(ctx, found),
-                           .speed_mm2 = square(FIRST_SPEED * ctx->options.follow_mm),
+                           .speed_mm2 = square(EITS_FIRST_SPEED * ctx->options.follow_mm),
                            .seen = 1,
                            .faint = (uint32_t)is_faint(ctx, found)};
 }
@@ -107,7 +92,7 @@ static eits_followed track_start(const eits_context *ctx, const eits_touch *foun
 static void predict(const eits_context *ctx, eits_followed *f)
 {
     eits_followed next = *f;
-    const eits_real change = square(SPEED_CHANGE * ctx->options.follow_mm);
+    const eits_real change = square(EITS_SPEED_CHANGE * ctx->options.follow_mm);
     if (!(ctx->options.track_smooth > 0))
         return;
     next.touch.x_mm += f->vx_mm;
@@ -129,7 +114,7 @@ static eits_followed updated(const eits_context *ctx, const eits_followed *befor
     eits_followed next = track_start(ctx, found);
     next.touch.id = before->touch.id;
     next.seen =
-        before->seen < KNOWN_FRAMES + EITS_MAX_TRACK_FRAMES ? before->seen + 1 : before->seen;
+        before->seen < EITS_KNOWN_FRAMES + EITS_MAX_TRACK_FRAMES ? before->seen + 1 : before->seen;
     if (!(ctx->options.track_smooth > 0))
         return next;
     const eits_followed restarted = next;
@@ -162,8 +147,8 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
     /* Greedy, nearest first: with touches further apart than they move in a frame, it is the best
      * assignment, too. */
     for (;;) { /* at most EITS_MAX_TOUCHES pairs */
-        const eits_real reach =
-            square(reported ? ctx->options.follow_mm : TENTATIVE_REACH * ctx->options.follow_mm);
+        const eits_real reach = square(reported ? ctx->options.follow_mm
+                                                : EITS_TENTATIVE_REACH * ctx->options.follow_mm);
         eits_real nearest = reach;
         uint32_t from = NONE, to = NONE;
         for (uint32_t k = 0; k < count; ++k) {
@@ -191,8 +176,8 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
  * enough that noise would not have been. */
 static void name(eits_context *ctx, eits_followed *f)
 {
-    const int clear = own_lambda(ctx, &f->touch) >= SURE_CLEARNESS * ctx->info.lambda_noise &&
-                      f->touch.confidence >= SURE_FRACTION;
+    const int clear = own_lambda(ctx, &f->touch) >= EITS_SURE_CLEARNESS * ctx->info.lambda_noise &&
+                      f->touch.confidence >= EITS_SURE_FRACTION;
     if (f->touch.id != 0 || (f->seen < ctx->options.track_confirm && !clear))
         return;
     f->touch.id = ctx->tracker.next_id;
@@ -244,7 +229,8 @@ uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count)
     update_tracks(ctx, touches, count, owner);
     for (uint32_t l = 0; l < ctx->tracker.count; ++l) {
         const eits_followed *f = &ctx->tracker.followed[l];
-        const int held = f->faint && f->seen >= KNOWN_FRAMES && reported < ctx->options.max_touches;
+        const int held =
+            f->faint && f->seen >= EITS_KNOWN_FRAMES && reported < ctx->options.max_touches;
         if (f->touch.id == 0 || (f->missed > 0 && !held))
             continue;
         uint32_t place = reported++;

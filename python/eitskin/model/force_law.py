@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import MAX_GAIN
 from eitskin.errors import ModelError
 
 FloatArray = npt.NDArray[np.float64]
 
 HEAD = struct.Struct("<IIfff12x")
 MAX_POINTS, MAX_ORDER = 64, 4
-MAX_GAIN = 4.0  # csrc/src/model/force.c
 MIN_RADIUS_MM, HUGE, MAX_REACH, MAX_COEFFICIENT = 1e-6, 1e30, 1e3, 1e6
 
 

@@ -14,6 +14,44 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import (
+    CROWD_CLEAR,
+    CROWD_CLEAREST,
+    CROWD_ELECTRODES,
+    CROWD_FAINT,
+    CROWD_FAR,
+    CROWD_LEFT,
+    CROWD_MIN,
+    CROWD_NEAREST,
+    CROWD_OFFSET,
+    CROWD_STRONG,
+    CROWD_TOUCHES,
+    CROWD_WEAKEST,
+    CROWD_WIDEST,
+    MISMATCH_FRACTION,
+    MISMATCH_NOISE,
+    NOISY_FRACTION,
+    OUTLIER_ENERGY,
+    OUTLIER_FRACTION,
+    OUTLIER_LARGEST,
+    OUTLIER_MAX,
+    OUTLIER_NEARER,
+    OUTLIER_NOISE,
+    OUTLIER_PIVOT,
+    OUTLIER_RIDGE,
+    OUTLIER_ROBUST,
+    OUTLIER_UNPAIRED,
+    ROBUST,
+    ROW_DEAD_FRACTION,
+    ROW_DEAD_NOISE,
+    ROW_GROWN,
+    ROW_SIGNIFICANT,
+    ROW_SIGNIFICANT_NOISE,
+    ROW_SMALL,
+    ROWS_TO_JUDGE,
+    STALE_NOISE,
+    STALE_RATIO,
+)
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.results import Options
 from eitskin.model.model import Model
@@ -22,31 +60,14 @@ from eitskin.model.row_form import RowForm
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-ROW_SIGNIFICANT, ROW_DEAD_SHARE, ROW_DEAD_NOISE, ROWS_TO_JUDGE = 0.3, 0.02, 5.0, 3
-ROW_GROWN, ROW_SMALL = 8.0, 0.05
-OUTLIER_NOISE, OUTLIER_ROBUST, OUTLIER_LARGEST, OUTLIER_FRACTION, OUTLIER_NEARER, OUTLIER_MAX = (
-    6.5,
-    16.0,
-    0.03,
-    0.25,
-    0.5,
-    8,
+CROWD_WEIGHTS = (
+    CROWD_TOUCHES,
+    CROWD_NEAREST,
+    CROWD_WIDEST,
+    CROWD_LEFT,
+    CROWD_WEAKEST,
+    CROWD_CLEAREST,
 )
-OUTLIER_PIVOT, OUTLIER_RIDGE, OUTLIER_UNPAIRED, OUTLIER_ENERGY, NOISY_SHARE = (
-    0.05,
-    1e-4,
-    16.0,
-    0.5,
-    0.9,
-)
-MISMATCH_FRACTION, MISMATCH_NOISE, STALE_RATIO, STALE_NOISE = 0.05, 3.0, 1.7, 5.0
-CROWD_WEIGHTS, CROWD_OFFSET, CROWD_MIN = (
-    (-0.2429, 3.645, -4.607, -3.659, 0.1329, 0.7892),
-    -0.3583,
-    1.078,
-)
-CROWD_FAR, CROWD_STRONG, CROWD_CLEAR, CROWD_FAINT = 2.0, 10.0, 3.0, 3.0
-ROBUST = 1.4826
 
 
 def robust(values: FloatArray) -> float:
@@ -152,8 +173,8 @@ class Examiner:
         along = np.where(
             unusable, 0.0, np.nan_to_num(frame) * np.where(np.nan_to_num(ref.v0) < 0, -1.0, 1.0)
         )
-        limit = np.maximum(ROW_DEAD_SHARE * size, noise)
-        judged = (size >= max(ROW_SIGNIFICANT * ref.rms_v, 10 * noise)) & ~masked
+        limit = np.maximum(ROW_DEAD_FRACTION * size, noise)
+        judged = (size >= max(ROW_SIGNIFICANT * ref.rms_v, ROW_SIGNIFICANT_NOISE * noise)) & ~masked
         dead = judged & (unusable | (np.abs(along) < limit))
         turned = judged & ~dead & (along < 0)
         alive = judged & ~dead
@@ -289,7 +310,7 @@ class Examiner:
             self.rows[self.model.fold.first[flagged]],
         )
         shared = np.array([(used == e).sum() for e in range(self.model.protocol.n_electrodes)])
-        found = tuple(int(e) for e in np.flatnonzero(shared >= NOISY_SHARE * len(flagged)))
+        found = tuple(int(e) for e in np.flatnonzero(shared >= NOISY_FRACTION * len(flagged)))
         if not found:
             self.found.names |= {"model mismatch"} & self.wanted
             return out
@@ -392,7 +413,7 @@ class Examiner:
         ]
         weakest = min(touch.confidence for touch in touches)
         features = (
-            count * 16 / self.model.protocol.n_electrodes,
+            count * CROWD_ELECTRODES / self.model.protocol.n_electrodes,
             min([CROWD_FAR, *apart]),
             max(touch.radius_mm for touch in touches) / options.touch_seed_radius_mm,
             np.sqrt(left),

@@ -9,17 +9,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import (
+    DAMPING,
+    DROP_SWEEPS,
+    GAIN_LIFT,
+    MAX_RADIUS_STEP_PIXELS,
+    NO_DIRECTION,
+    RADIUS_DEVIATION,
+    SETTLED_PIXELS,
+    STEP_TRIALS,
+    STRENGTH_PASSES,
+)
 from eitskin.core.results import Options
 from eitskin.model.model import Model
 
 FloatArray = npt.NDArray[np.float64]
-
-STRENGTH_PASSES = 10
-DROP_SWEEPS = 3
-RADIUS_DEVIATION = 0.12
-DAMPING = 1e-3
-SETTLED_PIXELS = 1 / 256
-MAX_RADIUS_STEP_PIXELS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +77,9 @@ class Fit:
         cover = np.clip(share, 0.0, 1.0)
         ramp = np.where((share > 0) & (share < 1), 1.0 / pixel, 0.0)
         toward = np.where(
-            distance[:, None] > 1e-6 * pixel, offset / np.maximum(distance, 1e-300)[:, None], 0.0
+            distance[:, None] > NO_DIRECTION * pixel,
+            offset / np.maximum(distance, 1e-300)[:, None],
+            0.0,
         )
         columns = np.column_stack([cover, ramp * toward[:, 0], ramp * toward[:, 1], ramp])
         reduced = self.per_change @ columns
@@ -174,7 +180,7 @@ class Fit:
         limit = reach * np.array([1.0, 1.0, MAX_RADIUS_STEP_PIXELS])
         step = np.clip(step[:3], -limit, limit)
         cost = float(left @ left) + weight * (disc.radius_mm - expected) ** 2
-        for share in (1.0, 0.5, 0.25):
+        for share in (0.5**trial for trial in range(STEP_TRIALS)):
             radius = float(
                 np.clip(
                     disc.radius_mm + share * step[2], o.touch_min_radius_mm, o.touch_max_radius_mm
@@ -223,7 +229,7 @@ class Fit:
         atoms = np.array([self.answers(disc)[0] for disc in self.discs])
         norm = np.linalg.norm(atoms, axis=1)
         unit = atoms / np.maximum(norm, 1e-300)[:, None]
-        inverse = np.linalg.inv(unit @ unit.T + 1e-5 * np.eye(len(norm)))
+        inverse = np.linalg.inv(unit @ unit.T + GAIN_LIFT * np.eye(len(norm)))
         size = np.array([disc.change for disc in self.discs]) * norm
         return np.asarray(size**2 / np.diag(inverse) / self.whole)
 

@@ -15,6 +15,14 @@ from time import perf_counter_ns
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import (
+    BASIS_TOLERANCE,
+    FOLD_ROUNDING,
+    MAX_RATIO,
+    MIN_REFERENCE_FRAMES,
+    MIN_SQUARE,
+    RATIO_DEFINED,
+)
 from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.options_table import INTERACTION, LOG_DATA
@@ -48,9 +56,6 @@ from eitskin.solve.options import default_options
 
 BoolArray = npt.NDArray[np.bool_]
 
-ROUNDING = 2.0**-49
-BASIS_TOLERANCE = 1e-6
-MIN_SQUARE = 2.0**-969
 SOLVED = ("iterations", "gap", "optimum")
 DEAD = "all voltages are zero; is the skin driven and connected?"
 
@@ -154,7 +159,7 @@ class ReferenceEngine:
         lambda_noise, self._noise_v, left = 0.0, 0.0, np.zeros(frames.shape, dtype=np.bool_)
         was_ready, self._ready = self._ready, False
         try:
-            if len(frames) >= 4:
+            if len(frames) >= MIN_REFERENCE_FRAMES:
                 if "outlier" in self._examiner.wanted:
                     frames, left = clean(frames, self.model.fold, ~self._bad)
                 lambda_noise = self._learn_lambda_noise(frames, left)
@@ -204,7 +209,7 @@ class ReferenceEngine:
             if kind == "normalised":
                 return (frame - v0) / v0
             if kind == "log-ratio":
-                return self._gain * v0 * np.log(np.clip(frame / v0, 1 / 16, 16))
+                return self._gain * v0 * np.log(np.clip(frame / v0, 1 / MAX_RATIO, MAX_RATIO))
         return self._gain * (frame - v0)
 
     def frame_stage(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, int]:
@@ -291,7 +296,9 @@ class ReferenceEngine:
         left out."""
         assert self._v0 is not None
         fold, kind = self.model.fold, kind or self.model.data_kind
-        out = unusable | ((kind != "difference") & (np.abs(self._v0) < 1e-6 * self._v0_rms))
+        out = unusable | (
+            (kind != "difference") & (np.abs(self._v0) < RATIO_DEFINED * self._v0_rms)
+        )
         value = np.where(out, 0.0, self._datum(np.where(out, self._v0, frame), self._v0, kind))
         sign = np.ones_like(fold.sign) if kind == "normalised" else fold.sign
         first, second = ~out[fold.first], (fold.second >= 0) & ~out[fold.second]
@@ -300,7 +307,7 @@ class ReferenceEngine:
         size = (
             np.ones(len(one)) if kind == "normalised" else np.abs(self._gain * self._v0[fold.first])
         )
-        apart = first & second & (np.abs(one - other) > ROUNDING * size)
+        apart = first & second & (np.abs(one - other) > FOLD_ROUNDING * size)
         return Folded(d, np.where(apart, one - other, 0.0), first, second)
 
     def _along(self, folded: Folded) -> FloatArray | None:

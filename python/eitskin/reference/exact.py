@@ -12,17 +12,23 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import (
+    EPSILON,
+    INDEPENDENT,
+    LOOK_GROWTH,
+    LOOKS_NEARBY,
+    MAX_RISE,
+    MAX_STALLS,
+    REST_EPSILONS,
+    SETTLED,
+    TOLERANCE_EPSILONS,
+    WORTHWHILE,
+)
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin.reference.problem import FloatArray, Problem, SolveResult, shrink
 
 IntArray = npt.NDArray[np.int64]
-
-EPSILON = 2.3e-16
-INDEPENDENT = 1e-10
-LOOK_GROWTH = 6
-SETTLED = 0.001
-WORTHWHILE, LOOKS_NEARBY = 1e-6, 20
 
 
 def coordinate(
@@ -33,7 +39,7 @@ def coordinate(
     p, lam = problem, problem.lam
     x = np.zeros(p.n) if start is None else start.copy()
     norms = np.einsum("ij,ij->j", p.s, p.s)
-    least = 64 * EPSILON**2 * float(p.y @ p.y)
+    least = REST_EPSILONS * EPSILON**2 * float(p.y @ p.y)
     certificate, gradient = p.check_gap(x)
     sweeps, stop, interval = done, "iterations", options.gap_every
     while sweeps < options.iterations:
@@ -102,7 +108,9 @@ class ActiveSet:
     def __init__(self, problem: Problem, options: Options, grid: Grid, lipschitz: float) -> None:
         self.p, self.options, self.held = problem, options, Held()
         self.most = min(len(problem.y) - len(problem.basis), problem.n)
-        self.tolerance = 2 * EPSILON * np.sqrt(lipschitz) * float(np.linalg.norm(problem.y))
+        self.tolerance = (
+            TOLERANCE_EPSILONS * EPSILON * np.sqrt(lipschitz) * float(np.linalg.norm(problem.y))
+        )
         self.near = neighbours(grid)
         self.nearby = np.zeros(problem.n + 1, dtype=bool)  # the last is no pixel
 
@@ -241,7 +249,7 @@ class ActiveSet:
             pull, before = max(map(abs, held.pull), default=0.0), c.objective
             gradient[held.columns] = 0.0
             missing = self._missing(gradient)
-            if stalls == 2 or (not missing and pull <= self.tolerance):
+            if stalls == MAX_STALLS or (not missing and pull <= self.tolerance):
                 return SolveResult(held.spread(p.n), rounds, "optimum", c, 0)
             rounds += 1
             moved, failed = self._take_in(missing[: 1 if stalls else None], gradient)
@@ -251,11 +259,11 @@ class ActiveSet:
                 looks, more = looks + 1, more and not failed
             if moved:
                 c, gradient = p.check_gap(held.spread(p.n))
-            if failed or not c.objective <= before * (1 + 1e-3):
+            if failed or not c.objective <= before * (1 + MAX_RISE):
                 x = held.spread(p.n)
                 return coordinate(p, o, x if c.objective <= p.ceiling else None, rounds)
             stalls = 0 if c.objective < before * (1 - EPSILON) else stalls + 1
-            stalls = stalls if moved else 2
+            stalls = stalls if moved else MAX_STALLS
 
 
 def neighbours(grid: Grid) -> IntArray:

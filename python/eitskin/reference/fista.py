@@ -5,6 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from eitskin.core.constants_table import (
+    LOOK_GROWTH,
+    MAX_RISE,
+    MAX_STEP_HALVINGS,
+    PRUNE_EVERY,
+    ZERO_GAP,
+)
 from eitskin.core.results import Options
 from eitskin.reference.problem import (
     Certificate,
@@ -14,9 +21,6 @@ from eitskin.reference.problem import (
     project,
     shrink,
 )
-
-MAX_STEP_HALVINGS = 8
-PRUNE_EVERY, LOOK_GROWTH = 5, 6
 
 
 def fista(
@@ -63,8 +67,8 @@ def fista(
         if not last and options.gap_rel == 0 and not none and float(sx @ sx) <= 8 * scale:
             continue
         certificate = check_gap(s, y, x, sx, lam, sign, basis)
-        if not certificate.objective <= scale * (1 + 1e-3) or (
-            none and certificate.gap > 1e-3 * scale
+        if not certificate.objective <= scale * (1 + MAX_RISE) or (
+            none and certificate.gap > ZERO_GAP * scale
         ):
             if halvings == MAX_STEP_HALVINGS or last:
                 stop = "diverged"

@@ -8,12 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import NO_DIPOLE_MM2
 from eitskin.model.model import Model
 from eitskin.reference.disc_fit import Disc
 
 FloatArray = npt.NDArray[np.float64]
-
-NO_DIPOLE_MM2 = 1e-6
 
 
 def interplay(model: Model, discs: Sequence[Disc]) -> FloatArray:

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import MAX_RISE
+
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -85,7 +87,7 @@ class Problem:
     @property
     def ceiling(self) -> float:
         """What the objective may not exceed, with room for rounding."""
-        return self.scale * (1 + 1e-3)
+        return self.scale * (1 + MAX_RISE)
 
     @cached_property
     def seen(self) -> FloatArray:

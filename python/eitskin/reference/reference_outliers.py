@@ -1,18 +1,25 @@
-"""Outliers in quiet frames, in numpy: the rules of csrc/src/frame/reference_outliers.c, written for
-reading."""
+"""Outliers in reference frames, in numpy: the rules of csrc/src/diagnostics/reference_outliers.c,
+written for reading."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.reference.diagnostics import OUTLIER_MAX, robust
+from eitskin.core.constants_table import (
+    CHANGED_AS_MUCH,
+    OUTLIER_MAX,
+    OWN_MIN,
+    PAIRED,
+    PAIRED_MIN,
+    UNPAIRED,
+    UNPAIRED_MIN,
+)
+from eitskin.reference.diagnostics import robust
 from eitskin.skin.protocol import Reciprocity
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
-
-PAIRED, PAIRED_MIN, UNPAIRED, UNPAIRED_MIN, OWN_MIN = 12.0, 1e-3, 16.0, 1e-2, 0.05
 
 
 def odd_rows(
@@ -37,8 +44,14 @@ def odd_rows(
     odd = (off > limit) & (off > OWN_MIN * own)
     if odd.sum() > OUTLIER_MAX:
         odd[:] = False
-    rows[fold.first[odd & (np.abs(first) > 0) & (np.abs(first) >= np.abs(second) / 2)]] = True
-    rows[fold.second[odd & (np.abs(second) > 0) & (np.abs(second) >= np.abs(first) / 2)]] = True
+    rows[
+        fold.first[odd & (np.abs(first) > 0) & (np.abs(first) >= CHANGED_AS_MUCH * np.abs(second))]
+    ] = True
+    rows[
+        fold.second[
+            odd & (np.abs(second) > 0) & (np.abs(second) >= CHANGED_AS_MUCH * np.abs(first))
+        ]
+    ] = True
     return odd, rows
 
 

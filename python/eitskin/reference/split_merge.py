@@ -7,12 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from eitskin.core.constants_table import (
+    DIRECTIONS_OF_NOISE,
+    MERGE_LEFT,
+    MERGE_NEAR,
+    MERGE_SWEEPS,
+    MERGE_TOTAL,
+    PARALLEL,
+    SPLIT_DIRECTIONS,
+    SPLIT_DISTANCE,
+    SPLIT_FIRST,
+    SPLIT_GAIN,
+    SPLIT_NOISE,
+    SPLIT_OFFSET,
+    SPLIT_RADIUS,
+    SPLIT_SWEEPS,
+    SPLIT_TOTAL,
+)
 from eitskin.reference.disc_fit import Disc, Fit
-
-NEAR, MERGE_TOTAL, MERGE_LEFT, NOISE = 0.7, 0.002, 0.5, 20.0
-SPLIT_TOTAL, SPLIT_NOISE, SPLIT_FIRST, SPLIT_GAIN, SPLIT_DISTANCE = 0.001, 1.3, 2.0, 0.85, -0.1
-SPLIT_OFFSET, SPLIT_RADIUS = 1.3, 0.7
-DIRECTIONS, MERGE_SWEEPS, SPLIT_SWEEPS = 4, 3, 4
 
 
 def edge_distance(a: Disc, b: Disc) -> float:
@@ -39,7 +51,9 @@ def _near_pairs(discs: list[Disc]) -> list[tuple[float, int, int]]:
         for i, a in enumerate(discs)
         for j in range(i + 1, len(discs))
     ]
-    return sorted(p for p in pairs if p[0] < NEAR and discs[p[1]].polarity == discs[p[2]].polarity)
+    return sorted(
+        p for p in pairs if p[0] < MERGE_NEAR and discs[p[1]].polarity == discs[p[2]].polarity
+    )
 
 
 def _try_join(fit: Fit, i: int, j: int) -> bool:
@@ -55,7 +69,10 @@ def _try_join(fit: Fit, i: int, j: int) -> bool:
     fit.discs[i] = replace(one, change=fit.best_change(one, fit.answers(one)[0], fit.residual()))
     fit.settle([i], MERGE_SWEEPS)
     fit.move_all(1)
-    if fit.left() <= left + MERGE_TOTAL * fit.whole + MERGE_LEFT * left + NOISE * fit.noise:
+    if (
+        fit.left()
+        <= left + MERGE_TOTAL * fit.whole + MERGE_LEFT * left + DIRECTIONS_OF_NOISE * fit.noise
+    ):
         return True
     fit.discs = before
     return False
@@ -85,7 +102,10 @@ def _try_part(fit: Fit, k: int) -> bool:
         fit.settle([last], 1)
     fit.move_all(1)
     now = fit.left()
-    gained = now <= SPLIT_GAIN * left and left - now >= SPLIT_TOTAL * fit.whole + NOISE * fit.noise
+    gained = (
+        now <= SPLIT_GAIN * left
+        and left - now >= SPLIT_TOTAL * fit.whole + DIRECTIONS_OF_NOISE * fit.noise
+    )
     if gained and edge_distance(fit.discs[k], fit.discs[last]) > SPLIT_DISTANCE:
         return True
     fit.discs = before
@@ -97,7 +117,7 @@ def _pairs_for(fit: Fit, k: int) -> list[tuple[float, Disc, Disc]]:
     one, target = fit.discs[k], fit.residual(leave_out=k)
     radius = max(SPLIT_RADIUS * one.radius_mm, fit.options.touch_min_radius_mm)
     found = []
-    for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
+    for angle in np.arange(SPLIT_DIRECTIONS) * np.pi / SPLIT_DIRECTIONS:
         dx, dy = (
             SPLIT_OFFSET * one.radius_mm * np.cos(angle),
             SPLIT_OFFSET * one.radius_mm * np.sin(angle),
@@ -110,7 +130,7 @@ def _pairs_for(fit: Fit, k: int) -> list[tuple[float, Disc, Disc]]:
             continue
         atoms = np.array([fit.answers(disc)[0] for disc in two])
         gram = atoms @ atoms.T
-        if not np.linalg.det(gram) > 1e-5 * gram[0, 0] * gram[1, 1]:
+        if not np.linalg.det(gram) > PARALLEL * gram[0, 0] * gram[1, 1]:
             continue
         change = np.linalg.solve(gram, atoms @ target)
         if (change * one.polarity > 0).all():

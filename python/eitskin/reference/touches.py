@@ -9,6 +9,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import (
+    EARLY_RADIUS,
+    FINAL_RADIUS,
+    INTERACTION_MAX,
+    LATER_SWEEPS,
+    ROUNDS,
+)
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import SPLIT_MERGE
 from eitskin.core.results import Options
@@ -18,10 +25,6 @@ from eitskin.reference.split_merge import join, part
 
 FloatArray = npt.NDArray[np.float64]
 Interplay = Callable[[Sequence[Disc]], FloatArray]
-
-EARLY_RADIUS, FINAL_RADIUS = 2.0, 0.4
-ROUNDS, LATER_SWEEPS = 2, 2
-MAX_INTERPLAY = 0.25
 
 
 def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | None) -> FloatArray:
@@ -41,7 +44,7 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
             if interplay is not None and len(fit.discs) > 1
             else np.zeros_like(frame.y)
         )
-        fit.data = frame.y - added if added @ added <= MAX_INTERPLAY * fit.whole else frame.y
+        fit.data = frame.y - added if added @ added <= INTERACTION_MAX * fit.whole else frame.y
 
     fit.radius_weight = o.touch_radius_weight * (EARLY_RADIUS if interplay is not None else 1.0)
     fit.data = frame.straight if frame.straight is not None and o.touch_sweeps > 0 else frame.y

@@ -11,6 +11,15 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import (
+    FIRST_SPEED,
+    KNOWN_FRAMES,
+    MIN_DEVIATION,
+    SPEED_CHANGE,
+    SURE_CLEARNESS,
+    SURE_FRACTION,
+    TENTATIVE_REACH,
+)
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import MAX_TOUCHES
 from eitskin.core.results import Options
@@ -18,14 +27,6 @@ from eitskin.fem.grid import Grid
 
 FloatArray = npt.NDArray[np.float64]
 Pairing: TypeAlias = Callable[[FloatArray, float], list[tuple[int, int]]]
-
-SURE_SHARE = 0.05
-SURE_CLEARNESS = 1.5
-NEWBORN_REACH = 0.6
-SPEED_CHANGE = 0.028
-FIRST_SPEED = 0.12
-MIN_DEVIATION = 0.01
-KNOWN_FRAMES = 4
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Tracker:
         owner: dict[int, int] = {}
         for known, reach_mm in (
             (True, options.follow_mm),
-            (False, NEWBORN_REACH * options.follow_mm),
+            (False, TENTATIVE_REACH * options.follow_mm),
         ):
             numbers = [number for number, one in enumerate(before) if (one.touch.id != 0) == known]
             free = [k for k in range(len(found)) if k not in owner]
@@ -93,7 +94,8 @@ class Tracker:
 
     def _named(self, one: Followed, options: Options, lambda_noise: float) -> Followed:
         sure = (
-            one.own_lambda >= SURE_CLEARNESS * lambda_noise and one.touch.confidence >= SURE_SHARE
+            one.own_lambda >= SURE_CLEARNESS * lambda_noise
+            and one.touch.confidence >= SURE_FRACTION
         )
         if one.touch.id or not (one.seen >= options.track_confirm or sure):
             return one

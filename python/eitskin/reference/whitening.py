@@ -8,16 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import (
+    LOST,
+    MAX_REGULARISATION,
+    MIN_REGULARISATION,
+    MIN_REGULARISATION_FRACTION,
+    NOISE_POWER,
+    NOISE_PROBES,
+    REGULARISATION_KEPT,
+    REST_POWER,
+    STEP_MARGIN,
+)
 from eitskin.model.model import Model
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
-
-MIN_REGULARISATION_FRACTION, MIN_REGULARISATION = 0.1, 1e-4
-LOST = 0.01
-MAX_REGULARISATION, AS_IT_IS = 1.0, 1.01
-STEP_MARGIN = 0.995
-PROBES, NOISE_POWER = 8, 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +76,11 @@ def whiten(form: WhitenedForm, known: BoolArray, asked: float) -> Whitening | No
     """The whitening of the folded rows where ``known`` (k,), the noise asking for a regularisation
     of at least ``asked`` for all of them: None for the model's own."""
     least = min(asked, MAX_REGULARISATION)
-    of_all = least if least > AS_IT_IS * form.regularisation else form.regularisation
+    of_all = least if least > REGULARISATION_KEPT * form.regularisation else form.regularisation
     if not known.all():
         left = float(known.mean())
         regularisation = max(
-            form.regularisation * max(left**3, MIN_REGULARISATION_FRACTION),
+            form.regularisation * max(left**REST_POWER, MIN_REGULARISATION_FRACTION),
             left * least,
             MIN_REGULARISATION,
         )
@@ -137,7 +142,7 @@ def _of_rest(
 def _noise_ratio(form: WhitenedForm, spread: FloatArray, share: float) -> float:
     """By sign vectors that are orthogonal within each eight directions; ``spread`` is G'^-1 F."""
     i = np.arange(len(form.scale))
-    odd = [(i & p ^ (i & p) >> 1 ^ (i & p) >> 2) & 1 for p in range(PROBES)]
+    odd = [(i & p ^ (i & p) >> 1 ^ (i & p) >> 2) & 1 for p in range(NOISE_PROBES)]
     probes = (1 - 2 * np.array(odd).T) * (np.sqrt(form.strength) / form.scale)[:, None]
     whole = float(np.sum(form.strength / form.scale**4))
-    return float(share * np.sqrt(np.sum((spread @ probes) ** 2) / (PROBES * whole)))
+    return float(share * np.sqrt(np.sum((spread @ probes) ** 2) / (NOISE_PROBES * whole)))

@@ -6,6 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from eitskin.core.constants_table import (
+    TRACK_CONFIRM,
+    TRACK_DETECTION,
+    TRACK_HOLD,
+    TRACK_SMOOTH,
+)
 from eitskin.core.options_table import ALL_TOUCH_FIT, MAX_TOUCHES, OF_MODEL
 from eitskin.core.results import Options
 from eitskin.model.model import Model
@@ -26,11 +32,11 @@ def tracking(options: Options) -> Options:
     """``options``, of :func:`default_options`, for frames that follow one another: as
     eits_options_track in the C core sets them, to the bit in float32. docs/guide/tracking.md says
     what that is worth."""
-    detection_factor = float(np.float32(options.detection_factor) * np.float32(0.75))
+    detection_factor = float(np.float32(options.detection_factor) * np.float32(TRACK_DETECTION))
     return replace(
         options,
         detection_factor=detection_factor,
-        track_confirm=2,
-        track_hold=2,
-        track_smooth=float(np.float32(0.66)),
+        track_confirm=TRACK_CONFIRM,
+        track_hold=TRACK_HOLD,
+        track_smooth=float(np.float32(TRACK_SMOOTH)),
     )

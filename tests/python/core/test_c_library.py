@@ -13,7 +13,7 @@ from build_tools import CSRC, build_core, run, tool
 
 SOURCES = sorted((CSRC / "src").rglob("*.[ch]"))
 HEADERS = sorted((CSRC / "include" / "eitskin").glob("*.h"))
-MAX_LINES = 420  # about 400; model.c has 419
+MAX_LINES = 400
 MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
 ARITHMETIC = {"f32": {"fmaf", "sqrtf"}, "f64": {"fma", "sqrt"}}
 # what a compiler refers to by itself: the processor's features, position-independent code,

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import importlib
 import re
+import shlex
 import subprocess
 import sys
 from dataclasses import asdict, fields
+from typing import Any
 
 import pytest
 from build_tools import CSRC, ROOT
@@ -16,9 +18,16 @@ from eitskin.core.engine import load_core
 from eitskin.core.options_table import CHOICES, OF_MODEL, RANGES, OptionFields
 from eitskin.model.eitm import encode_model
 from eitskin.solve.options import default_options
+from eitskin_studies.experiments.registry import EXPERIMENTS
 from small_models import prebuilt
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 WIDTHS = ("float32", "float64")
+CONSTANTS = tomllib.loads((ROOT / "tables" / "constants.toml").read_text(encoding="utf-8"))["room"]
 
 
 def test_what_is_written_from_the_tables_is_up_to_date() -> None:
@@ -29,6 +38,38 @@ def test_what_is_written_from_the_tables_is_up_to_date() -> None:
         check=False,
     )
     assert done.returncode == 0, f"run  python tables/make_tables.py\n{done.stdout}{done.stderr}"
+
+
+@pytest.mark.parametrize("room", CONSTANTS, ids=[room["name"] for room in CONSTANTS])
+def test_a_constant_is_used_where_its_room_has_it(room: dict[str, Any]) -> None:
+    header = ROOT / room.get("header", f"csrc/src/{room['name']}/constants.h")
+    others = [path for path in header.parent.glob("*.[ch]") if path != header]
+    text = "\n".join(path.read_text(encoding="ascii") for path in others)
+    for name, *_, last in (row for group in room["group"] for row in group["rows"]):
+        written_out = last in ("left * left * left", "ratio sqrt(sqrt(ratio))")
+        macro = f"{room.get('prefix', 'EITS_')}{name}"
+        assert re.search(rf"\b{macro}\b", text) or written_out, name
+
+
+def test_constants_have_one_name_and_a_check_that_exists() -> None:
+    groups = [group for room in CONSTANTS for group in room["group"]]
+    names = [row[0] for group in groups for row in group["rows"]]
+    assert len(set(names)) == len(names) > 100
+    tests = [f"{path.stem[5:]}_f32" for path in (ROOT / "tests" / "c").glob("test_*.c")]
+    tests += [f"fw_{path.stem[5:]}" for path in (ROOT / "tests" / "firmware").glob("test_*.c")]
+    benches = (ROOT / "python/eitskin_studies/cli/cmd_bench.py").read_text(encoding="utf-8")
+    for group in groups:
+        words = shlex.split(group["check"])
+        if words[0] == "ctest":
+            assert words[1:4] == ["--preset", "host", "-R"]
+            assert any(re.search(words[4], name) for name in tests), words
+        elif words[:2] == ["eitskin", "study"]:
+            assert words[2] in EXPERIMENTS
+        elif words[:2] == ["eitskin", "bench"]:
+            assert f"def run_{words[2]}(" in benches
+        else:
+            assert words[0] == "scripts/test", words
+            assert (ROOT / words[1]).exists(), words
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -77,12 +77,15 @@ class ReplyStatus(IntEnum):
 
     # MODEL_BEGIN: [0] the offset to go on from
     OK = 0
+    # no command has this packet type
     UNKNOWN_COMMAND = 1
     # [0] bytes of payload that are expected
     LENGTH = 2
     # [0] offset in the payload of the field out of range; [1] the limit it broke
     RANGE = 3
+    # no model is in use: send one first
     NO_MODEL = 4
+    # there is no reference: send a TARE first
     NOT_TARED = 5
     # [0] type of the command under way
     BUSY = 6
@@ -174,8 +177,11 @@ class RawFlags(IntFlag):
 class Stream(IntFlag):
     """eits_stream: Bits of what is streamed of each frame."""
 
+    # its voltages, as a RAW
     RAW = 1
+    # its image, as an IMAGE
     IMAGE = 2
+    # its touches, as TOUCHES
     TOUCHES = 4
 
 
@@ -244,10 +250,15 @@ class InfoPacket(Payload):
     n_electrodes: int
     # of its protocol
     n_rows: int
+    # its rows once reciprocal ones are averaged
     n_folded: int
+    # numbers of the reduced data
     rank: int
+    # pixels of an IMAGE
     n_pixels: int
+    # columns of the grid that the pixels lie in
     nx: int
+    # rows of that grid
     ny: int
     # eits_storage: 0 f32, 1 f16, 2 i16, 3 i8
     storage: int
@@ -255,6 +266,7 @@ class InfoPacket(Payload):
     bank: int
     # as the generator's tuning word gives it
     excitation_millihz: int
+    # of the converter
     sample_rate_hz: int
     # of a measurement
     samples: int
@@ -289,6 +301,7 @@ class ReplyPacket(Payload):
         ("status", "H", ""),
         ("detail", "2i", "pair"),
     )
+    # of the command that is answered
     request: int
     # its packet type
     command: int
@@ -319,6 +332,7 @@ class RawHead(Payload):
     time_us: int
     # how long the scan took
     scan_us: int
+    # voltages, and quality bytes, that follow
     n_rows: int
     # bits of eits_raw_flags
     flags: int
@@ -357,6 +371,7 @@ class SolvedPacket(Payload):
         ("bridged_electrodes", "Q", "electrodes"),
         ("noisy_electrodes", "Q", "electrodes"),
     )
+    # number of the scanned frame, as in its RAW
     frame: int
     # when its scan began
     time_us: int
@@ -374,6 +389,7 @@ class SolvedPacket(Payload):
     stop: str
     # rows left out
     masked: int
+    # that the solver took
     iterations: int
     # coefficients that are not zero
     nonzeros: int
@@ -381,13 +397,17 @@ class SolvedPacket(Payload):
     macs: int
     # of the touches
     touch_macs: int
+    # as used for this frame
     lambda_: float
+    # the least lambda whose image is zero
     lambda_max: float
+    # max(S'y) of noise, by the reference; 0: unknown
     lambda_noise: float
     # relative duality gap
     gap_rel: float
     # its norm
     residual: float
+    # norm of the reduced data
     data_norm: float
     # bits of eits_diagnostic
     diagnostics: int = 0
@@ -399,7 +419,9 @@ class SolvedPacket(Payload):
     model_mismatch: float = 0.0
     # bit e: electrode e
     open_electrodes: tuple[int, ...] = ()
+    # likewise, of one or more pairs
     bridged_electrodes: tuple[int, ...] = ()
+    # likewise
     noisy_electrodes: tuple[int, ...] = ()
 
 
@@ -417,12 +439,17 @@ class TouchPacket(Payload):
         ("confidence", "f", ""),
         ("force_n", "f", ""),
     )
+    # from 1; stays with a touch from frame to frame
     id: int
+    # of the centre, in the model's coordinates
     x_mm: float
+    # of the centre
     y_mm: float
+    # of the disc that was fitted
     radius_mm: float
     # S mm^2/m
     strength_s_per_m_mm2: float
+    # fraction of the data that it alone explains, 0 to 1; 0: held, not found
     confidence: float
     # 0 where the model is not calibrated
     force_n: float
@@ -439,10 +466,13 @@ class StageStats(Payload):
         ("p99_us", "I", ""),
         ("worst_us", "I", ""),
     )
+    # frames that were timed
     count: int
+    # of the last such frame
     last_us: int
     # 99th percentile: the upper edge of its bin, an eighth of an octave wide
     p99_us: int
+    # of all since the start, or since GET_STATS set the times to zero
     worst_us: int
 
 
@@ -471,9 +501,13 @@ class StatsPacket(Payload):
         ("workspace_used", "I", ""),
         ("stages", "24I", "stages"),
     )
+    # of the GET_STATS that asked
     request: int
+    # since the start
     uptime_ms: int
+    # streamed or not
     frames_scanned: int
+    # where image or touches were streamed
     frames_solved: int
     # since the link came up
     packets_sent: int
@@ -487,13 +521,19 @@ class StatsPacket(Payload):
     outliers: int
     # commands received
     link_packets: int
+    # whole packets whose checksum does not fit
     link_crc_errors: int
+    # ended inside a COBS block, or shorter than head and checksum
     link_framing_errors: int
+    # longer than the receive buffer
     link_overruns: int
+    # that are set aside
     stack_bytes: int
     # the most so far
     stack_used: int
+    # for the model's context and its frames
     workspace_bytes: int
+    # of them by the model in use
     workspace_used: int
     # by eits_stage
     stages: dict[str, StageStats]
@@ -516,10 +556,13 @@ class FaultPacket(Payload):
     code: int
     # 1: it is there; 0: it has gone
     raised: bool
+    # in which it rose or went
     frame: int
     # by code, as value and words
     index: int
+    # by code
     value: int
+    # by code; 0 where it has none
     words: tuple[int, int, int, int, int] = (0, 0, 0, 0, 0)
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import CROWD_CLEAR, CROWD_FAR, CROWD_STRONG
 from eitskin.errors import missing_extra
 from eitskin.scoring.matching import match
 from eitskin_studies.experiments.multitouch.counts import Share, share_of
@@ -33,8 +34,6 @@ FEATURES = (
     "weakest touch over noise: root of its confidence times max(S'y) / that of noise, at most 10",
     "root of the weakest touch's confidence / the share unexplained, at most 3",
 )
-FAR, STRONG, CLEARLY = 2.0, 10.0, 3.0
-ELECTRODES = 16
 RIDGE = 1e-3
 AIM, BAR_DB = 0.95, 60.0
 BINS = 10
@@ -87,15 +86,15 @@ def nearest(seen: SeenFrame) -> float:
 def features(seen: SeenFrame, near: float, seed_radius_mm: float) -> tuple[float, ...]:
     """As ``FEATURES`` says; of no touch those of one that is sure."""
     if not seen.x_mm:
-        return 0.0, FAR, 1.0, 0.0, STRONG, CLEARLY
+        return 0.0, CROWD_FAR, 1.0, 0.0, CROWD_STRONG, CROWD_CLEAR
     weakest, left = min(seen.confidence), seen.unexplained
     return (
         float(len(seen.x_mm)),
-        min(FAR, near),
+        min(CROWD_FAR, near),
         max(seen.radius_mm) / seed_radius_mm,
         math.sqrt(left),
-        min(STRONG, math.sqrt(weakest) * seen.clear) if seen.clear > 0 else STRONG,
-        math.sqrt(weakest / left) if weakest < CLEARLY**2 * left else CLEARLY,
+        min(CROWD_STRONG, math.sqrt(weakest) * seen.clear) if seen.clear > 0 else CROWD_STRONG,
+        math.sqrt(weakest / left) if weakest < CROWD_CLEAR**2 * left else CROWD_CLEAR,
     )
 
 

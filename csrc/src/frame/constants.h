@@ -1,0 +1,81 @@
+/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
+ * tables/constants.toml. */
+#ifndef EITSKIN_FRAME_CONSTANTS_H
+#define EITSKIN_FRAME_CONSTANTS_H
+
+#include "base/vec.h"
+
+/* clang-format off */
+
+/* ---- Chosen: by hand; not measured. A touch changes a row by less. Check: ctest --preset host -R
+ * frame_f */
+
+/* v / v0 is kept within this factor of 1 before the logarithm. larger: one bad row outweighs all
+ * others in the log data; smaller: bends what strong touches do */
+#define EITS_MAX_RATIO R(16.0)
+
+/* a row with a smaller reference says nothing as a ratio [of the reference's rms]. larger: leaves
+ * out small rows that are good; smaller: divides by noise */
+#define EITS_RATIO_DEFINED R(1e-06)
+
+/* ---- Chosen: by hand, from rounding: FOLD_ROUNDING is 16 times that of one voltage, 2^-24
+ * (2^-53); not measured. Check: ctest --preset host -R outliers */
+
+/* a row and its reciprocal that differ by less agree [of the reference]. larger: outliers of
+ * quantised voltages are overlooked; smaller: copied reciprocals seem to be measured */
+#define EITS_FOLD_ROUNDING R(sizeof(eits_real) == 4 ? 0x1p-20 : 0x1p-49)
+
+/* what must be left of a direction beside the basis, for it to join [of its square]. larger:
+ * ignores less than asked; smaller: takes rounding as a direction and ignores data */
+#define EITS_BASIS_TOLERANCE R(1e-06)
+
+/* ---- Chosen: on training scenes with one to three electrodes out, NOISE_POWER on masks of one row
+ * to three electrodes; their seeds were not kept. Check: scripts/test
+ * tests/python/acceptance/test_rows_left_out.py */
+
+/* where rows are left out mu falls with this power of the fraction that is left. larger: noise of
+ * the weak directions; smaller: a blurred image beside the electrode */
+/* REST_POWER = 3, in the source as left * left * left */
+
+/* but not below this [of the model's mu]. larger: blurs where many rows are out; smaller: lets
+ * their noise through */
+#define EITS_MIN_REGULARISATION_FRACTION R(0.1)
+
+/* max(S'y) of noise grows with this power of its rms, where rows are left out. larger: misses faint
+ * touches then; smaller: shows noise as touches */
+/* NOISE_POWER = 1.25, in the source as ratio sqrt(sqrt(ratio)) */
+
+/* ---- Chosen: by hand, for what float32 needs; not measured. Check: ctest --preset host -R
+ * masked_whitening */
+
+/* least mu where rows are left out [of s_1^2]. larger: blurs; smaller: the factor of float32 breaks
+ * down */
+#define EITS_MIN_REGULARISATION R(0.0001)
+
+/* greatest mu that noise asks for: beyond, directions weigh as they are seen [of s_1^2]. larger:
+ * changes little; smaller: noisy boards keep noise */
+#define EITS_MAX_REGULARISATION R(1.0)
+
+/* a lift by less is none [of the model's mu]. larger: steps that show; smaller: pays weights in
+ * every product for nothing */
+#define EITS_REGULARISATION_KEPT R(1.01)
+
+/* how little a direction that no row sees is held to zero [of mu]. larger: biases directions that
+ * are seen; smaller: the factor's pivots are rounding */
+#define EITS_LOST R(0.01)
+
+/* least pivot of the rows' products [of LOST mu]. as LOST, and met only where rounding is as
+ * large */
+#define EITS_LOST_PIVOT R(0.5)
+
+/* F leaves so much room below the stated Lipschitz constant [of |S_1|^2]. larger: rounding may
+ * exceed the constant and FISTA rises; smaller: shorter steps */
+#define EITS_STEP_MARGIN R(0.995)
+
+/* by which noise in S'F'y is estimated [sign vectors]. larger: each costs two triangles when rows
+ * change; smaller: a rougher lambda_noise. They are orthogonal within each eight directions */
+#define EITS_NOISE_PROBES 8
+
+/* clang-format on */
+
+#endif

@@ -1,0 +1,51 @@
+/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
+ * tables/constants.toml. */
+#ifndef EITSKIN_MODEL_CONSTANTS_H
+#define EITSKIN_MODEL_CONSTANTS_H
+
+#include "base/vec.h"
+
+/* clang-format off */
+
+/* ---- Chosen: by hand; not measured. Check: ctest --preset host -R force */
+
+/* a calibration's gain by place is kept within this factor of 1. larger: a polynomial that runs
+ * away beyond its places gives absurd forces; smaller: cuts off gains that were measured */
+#define EITS_MAX_GAIN R(4.0)
+
+/* ---- Chosen: on tuning streams (the study's, seed 100001 by default): no other number of
+ * confirmations, smoothing or threshold has more exact frames at 40 dB; holding for 0 or 1 frame
+ * has 0.3 to 0.4 points more. Check: eitskin study tracking */
+
+/* the detection threshold while tracking [of detection_factor]. larger: misses faint touches;
+ * smaller: lets noise in, more than confirmation takes out */
+#define EITS_TRACK_DETECTION R(0.75)
+
+/* track_confirm while tracking [frames]. larger: reports faint touches later; smaller: reports
+ * noise */
+#define EITS_TRACK_CONFIRM 2
+
+/* track_hold while tracking [frames]. larger: touches end late; smaller: a faint touch loses its id
+ * where one frame misses it */
+#define EITS_TRACK_HOLD 2
+
+/* track_smooth while tracking [pixels]. larger: places lag behind fast fingers; smaller: places
+ * jitter with the noise */
+#define EITS_TRACK_SMOOTH R(0.66)
+
+/* ---- Chosen: by hand; not measured. Check: ctest --preset host -R model_values */
+
+/* what a row of section WHIT may differ by from what it says elsewhere, and from P [relative].
+ * larger: a wrong section is believed; smaller: rounding makes a good model fail */
+#define EITS_FORM_TOLERANCE 1e-3f
+
+/* the same for (s^2 + mu s_1^2) |P_i|^2, which gathers the rounding of four numbers [relative]. as
+ * FORM_TOLERANCE */
+#define EITS_FORM_WEIGHT_TOLERANCE 1e-2f
+
+/* greatest |S_1|^2 of section WHIT, 1 by construction. as FORM_TOLERANCE */
+#define EITS_FORM_MAX_NORM 1.01f
+
+/* clang-format on */
+
+#endif

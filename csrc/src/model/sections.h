@@ -1,0 +1,39 @@
+/* What readers of a model's sections share: a section's place, and numbers out of its bytes. */
+#ifndef EITSKIN_SECTIONS_H
+#define EITSKIN_SECTIONS_H
+
+#include "eitskin/model.h"
+
+#include <string.h>
+
+typedef struct eits_section {
+    const uint8_t *data; /* NULL where absent */
+    uint32_t size;
+} eits_section;
+
+static inline float eits_read_f32(const uint8_t *bytes)
+{
+    float value;
+    memcpy(&value, bytes, sizeof value);
+    return value;
+}
+
+/* Finite without libm, and whatever -ffast-math a caller may have set: by the exponent's bits. */
+static inline int eits_is_finite_f32(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return (bits & 0x7F800000u) != 0x7F800000u;
+}
+
+/* Finite, and from `low` to `high`. */
+static inline int eits_between(float value, float low, float high)
+{
+    return eits_is_finite_f32(value) && value >= low && value <= high;
+}
+
+/* Section WHIT, where there is one, into model->row_form; model->reduction is known and finite.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (does not fit P). */
+eits_status eits_read_row_form(eits_model *model, const eits_section *found);
+
+#endif

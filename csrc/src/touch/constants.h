@@ -1,0 +1,175 @@
+/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
+ * tables/constants.toml. */
+#ifndef EITSKIN_TOUCH_CONSTANTS_H
+#define EITSKIN_TOUCH_CONSTANTS_H
+
+#include "base/vec.h"
+
+/* clang-format off */
+
+/* ---- Chosen: by hand; no run was kept. The study says what the fit's parts are worth, and that
+ * more sweeps do not help, not each number. Check: eitskin study levers */
+
+/* weight of the expected radius while it is open which discs there are [of touch_radius_weight].
+ * larger: radii stay as strength suggests; smaller: two touches grow into one disc */
+#define EITS_EARLY_RADIUS R(2.0)
+
+/* and once the interaction is out of the data [of touch_radius_weight]. larger: biased radii;
+ * smaller: radii of noise */
+#define EITS_FINAL_RADIUS R(0.4)
+
+/* of merging, splitting and interaction [rounds]. larger: costs, and hardly changes; smaller:
+ * counts before the places are right */
+#define EITS_ROUNDS 2
+
+/* where discs are nearly in place [sweeps]. larger: costs; smaller: places lag behind the data */
+#define EITS_LATER_SWEEPS 2
+
+/* of those that stay after one was dropped [sweeps]. larger: costs; smaller: two halves of a touch
+ * are both dropped */
+#define EITS_DROP_SWEEPS 3
+
+/* over all discs' strengths at the start [passes]. larger: costs; smaller: strengths of near discs
+ * are not settled */
+#define EITS_STRENGTH_PASSES 10
+
+/* a step is tried whole, halved, quartered. larger: costs atoms; smaller: steps that a half would
+ * have saved are not done */
+#define EITS_STEP_TRIALS 3
+
+/* greatest interaction that is taken out [of |y|^2]. larger: discs that are no touches spoil the
+ * data; smaller: strong touches keep their interaction */
+#define EITS_INTERACTION_MAX R(0.25)
+
+/* ---- Chosen: on scenes of 2 to 8 touches at 60 and 80 dB; their seed was not kept. The study says
+ * what merging and splitting are worth, not each number. Check: eitskin study levers */
+
+/* edges nearer than this: one touch, perhaps [of the smaller radius]. larger: more trials, and near
+ * touches become one; smaller: halves of a touch stay */
+#define EITS_MERGE_NEAR R(0.7)
+
+/* one disc may leave so much more [of |y|^2]. larger: two touches become one; smaller: halves stay,
+ * by the model's own error */
+#define EITS_MERGE_TOTAL R(0.002)
+
+/* and so much more [of what is left]. as MERGE_TOTAL */
+#define EITS_MERGE_LEFT R(0.5)
+
+/* and what noise gives so many; a split must gain as much [directions]. larger: two touches become
+ * one in noise; smaller: noise splits touches */
+#define EITS_DIRECTIONS_OF_NOISE R(20.0)
+
+/* with less left there is nothing to split; it must gain this [of |y|^2]. larger: near touches stay
+ * one; smaller: model error splits touches */
+#define EITS_SPLIT_TOTAL R(0.001)
+
+/* and with less left [of the noise in |y|^2]. as SPLIT_TOTAL, in noise */
+#define EITS_SPLIT_NOISE R(1.3)
+
+/* two discs in their first places may leave so much [of what one leaves]. larger: hopeless trials;
+ * smaller: good ones are not made */
+#define EITS_SPLIT_FIRST R(2.0)
+
+/* once fitted at most so much [of what one leaves]. larger: splits one touch; smaller: keeps two as
+ * one */
+#define EITS_SPLIT_GAIN R(0.85)
+
+/* and their edges must be so far apart [of the smaller radius]. larger: touches that press together
+ * stay one; smaller: one disc on another */
+#define EITS_SPLIT_DISTANCE R(-0.1)
+
+/* where the two begin [of the disc's radius]. either way: the fit starts further from where it
+ * ends */
+#define EITS_SPLIT_OFFSET R(1.3)
+
+/* how large they begin [of the disc's radius]. as SPLIT_OFFSET */
+#define EITS_SPLIT_RADIUS R(0.7)
+
+/* in which two discs are tried [directions]. larger: costs; smaller: starts across the two
+ * touches */
+#define EITS_SPLIT_DIRECTIONS 4
+
+/* of the one disc [sweeps]. larger: costs; smaller: judged too soon */
+#define EITS_MERGE_SWEEPS 3
+
+/* of the two discs [sweeps]. larger: costs; smaller: judged too soon */
+#define EITS_SPLIT_SWEEPS 4
+
+/* ---- Chosen: from the contrasts 3 to 10 that scenes have: 2 (c - 1) / (c + 1) is 1.0 to 1.6, so
+ * the root of strength tells the radius to about 12 %. Check: ctest --preset host -R touch_fit */
+
+/* how well strength tells the radius [of the radius]. larger: radii of noise; smaller: radii that
+ * strength dictates */
+#define EITS_RADIUS_DEVIATION R(0.12)
+
+/* ---- Chosen: by hand; not measured. Check: ctest --preset host -R
+ * 'touch_fit|split_merge|disc|interaction' */
+
+/* holds a direction that the data leave open, and slows the others by a thousandth [of the unit
+ * diagonal]. larger: slow; smaller: steps along what the data do not say */
+#define EITS_DAMPING R(0.001)
+
+/* least pivot of the step's factor [of DAMPING]. met only where rounding is as large */
+#define EITS_DAMPING_PIVOT R(0.1)
+
+/* a move by less ends the sweeps: 1 / 256 [pixels]. larger: places that show; smaller: sweeps that
+ * do not */
+#define EITS_SETTLED_PIXELS R(0.00390625)
+
+/* covers are linear in the radius over one pixel at most [pixels]. larger: beyond where the slope
+ * is true; smaller: more sweeps */
+#define EITS_MAX_RADIUS_STEP_PIXELS R(0.5)
+
+/* of the atoms' products, so that their factor exists [of the unit diagonal]. larger: near discs
+ * explain too much; smaller: two in one place break the factor */
+#define EITS_GAIN_LIFT R(1e-05)
+
+/* least pivot of that factor [of the unit diagonal]. met only where rounding is as large */
+#define EITS_GAIN_PIVOT R(1e-06)
+
+/* least determinant of two atoms that can be told apart [of the squares]. larger: near discs cannot
+ * split; smaller: strengths of rounding */
+#define EITS_PARALLEL R(1e-05)
+
+/* discs nearer than its root have no field at each other [mm^2]. larger: none; smaller: the field
+ * is infinite */
+#define EITS_NO_DIPOLE_MM2 R(1e-06)
+
+/* nearer to a disc's centre no direction is the way to it [pixels]. larger: a pixel at the centre
+ * has no slope; smaller: divides by rounding */
+#define EITS_NO_DIRECTION R(1e-06)
+
+/* ---- Chosen: on tuning streams, whose seed and runs were not kept. The study says what tracking
+ * is worth; it varies its options, not these. Check: eitskin study tracking */
+
+/* a touch that explains less waits for confirmation: it may be half of another [of |y|^2]. larger:
+ * light touches start late; smaller: halves are reported */
+#define EITS_SURE_FRACTION R(0.05)
+
+/* and one whose own S'y is less [lambda_noise]. larger: faint touches start late; smaller: noise is
+ * reported at once */
+#define EITS_SURE_CLEARNESS R(1.5)
+
+/* how far a tentative touch may move: noise is found anywhere, a touch beside itself [of
+ * follow_mm]. larger: noise confirms noise; smaller: fast fingers start late */
+#define EITS_TENTATIVE_REACH R(0.6)
+
+/* rms by which a velocity changes [of follow_mm a frame]. larger: places jitter; smaller: places
+ * overshoot turns */
+#define EITS_SPEED_CHANGE R(0.028)
+
+/* rms of a new touch's velocity [of follow_mm a frame]. larger: first places jitter; smaller: fast
+ * fingers lag at first */
+#define EITS_FIRST_SPEED R(0.12)
+
+/* no place is surer than this [pixels]. larger: clear touches are smoothed; smaller: a gain of
+ * rounding */
+#define EITS_MIN_DEVIATION R(0.01)
+
+/* a faint touch found so often is reported while held [frames]. larger: faint touches flicker;
+ * smaller: noise is held */
+#define EITS_KNOWN_FRAMES 4
+
+/* clang-format on */
+
+#endif

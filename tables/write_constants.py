@@ -1,0 +1,81 @@
+"""The table of constants: a header a room, the Python module and the reference page's tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from table import Lines, Table, Tables, origin, plain
+from write_c import comment
+
+
+def c_constants(tables: Tables) -> Iterator[tuple[str, Lines]]:
+    """A header a room."""
+    for room in tables["constants"]["room"]:
+        yield room.get("header", f"csrc/src/{room['name']}/constants.h"), _header(room)
+
+
+def _header(room: Table) -> Lines:
+    core = "header" not in room
+    prefix = room.get("prefix", "EITS_")
+    yield from comment(f"What is a choice in this room, with its reason. {origin('constants')}")
+    guard = f"EITSKIN_{room['name'].upper()}_CONSTANTS_H"
+    yield from (f"#ifndef {guard}", f"#define {guard}", "")
+    if core:
+        yield from ('#include "base/vec.h"', "")
+    yield "/* clang-format off */"
+    for group in room["group"]:
+        yield ""
+        yield from comment(f"---- Chosen: {plain(group['chosen'])}. Check: {group['check']}")
+        for name, value, unit, what, trades, *written_out in group["rows"]:
+            yield ""
+            yield from comment(f"{_said(what, unit)}. {trades}")
+            if written_out:
+                yield f"/* {name} = {value}, in the source as {written_out[0]} */"
+            else:
+                yield f"#define {prefix}{name} {_c_value(value)}"
+    yield from ("", "/* clang-format on */", "", "#endif")
+
+
+def _said(what: str, unit: str) -> str:
+    return f"{what} [{unit}]" if unit else what
+
+
+def _c_value(value: Any) -> str:
+    """Its bits are those of a double literal that is cast; a text is C as it stands."""
+    if isinstance(value, list):
+        return f"R(sizeof(eits_real) == 4 ? {value[0]} : {value[1]})"
+    return f"R({value!r})" if isinstance(value, float) else str(value)
+
+
+def python_constants(tables: Tables) -> Lines:
+    """Names and values, those of float64 where there are two; the page says the rest."""
+    for room in tables["constants"]["room"]:
+        if "header" in room:  # not the core's
+            continue
+        yield from ("", f"# {room['name']}")
+        for name, value, *_ in (row for group in room["group"] for row in group["rows"]):
+            yield f"{name} = {_number(value)!r}"
+
+
+def _number(value: Any) -> float:
+    """As Python has it."""
+    if isinstance(value, list):
+        return _number(value[1])
+    if isinstance(value, str):
+        return float.fromhex(value) if value.startswith("0x") else float(value.removesuffix("f"))
+    return value  # type: ignore[no-any-return]
+
+
+def page_of_constants(table: Table) -> Lines:
+    """A table a group, below how it was chosen and what checks it."""
+    for room in table["room"]:
+        yield from ("", f"## {room['name']}")
+        for group in room["group"]:
+            yield from ("", f"Chosen: {plain(group['chosen'])}. Check: `{group['check']}`.", "")
+            yield from ("| name | value | unit | what | trades |", "|---|---|---|---|---|")
+            for name, value, unit, what, trades, *_ in group["rows"]:
+                shown = " / ".join(map(str, value)) if isinstance(value, list) else value
+                cells = (f"`{name}`", shown, unit, what, trades)
+                yield "| " + " | ".join(plain(str(c)).replace("|", "\\|") for c in cells) + " |"
+    yield ""
