@@ -39,7 +39,7 @@
  * larger: a wrong section is believed; smaller: rounding makes a good model fail */
 #define EITS_FORM_TOLERANCE 1e-3f
 
-/* the same for (s^2 + mu s_1^2) |P_i|^2, which gathers the rounding of four numbers [relative]. as
+/* the same for (s^2 + mu s_1^2) |P_i|^2, which is 1: S is rounded to 8 bits at worst. as
  * FORM_TOLERANCE */
 #define EITS_FORM_WEIGHT_TOLERANCE 1e-2f
 

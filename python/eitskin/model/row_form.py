@@ -13,13 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import (
+    FORM_MAX_NORM,
+    FORM_TOLERANCE,
+    FORM_WEIGHT_TOLERANCE,
+)
 from eitskin.errors import ModelError
 from eitskin.model.storage import StoredMatrix, stride_for
 
 Float32s = npt.NDArray[np.float32]
 
 ORTHOGONAL = 1e-5  # cosine between two rows of P
-FORM = 0.01  # |S_i|^2 + mu s_1^2 |P_i|^2 is 1 within this: S is rounded to 8 bits at worst
 HEAD = struct.Struct("<3f4x")
 HUGE = 1e30
 TINY = float(np.finfo(np.float32).tiny)
@@ -56,15 +60,15 @@ class RowForm:
         return bool(
             0 <= self.mu <= HUGE
             and 1e-15 <= self.s1 <= 1e15
-            and TINY <= self.s1_square <= 1.01
+            and TINY <= self.s1_square <= FORM_MAX_NORM
             and all(np.isfinite(row).all() and (row >= 0).all() for row in wide)
             and min(scale.min(), energy.min()) >= TINY
             and max(scale.max(), energy.max()) <= HUGE
-            and _near(sums, energy, 1e-3)
-            and _near(scale**2 * s1 * energy, 1, 1e-3)
-            and _near((square + self.mu * s1) * energy, 1, FORM)
-            and (np.abs(strength * s1 - square) <= 1e-3 * s1).all()
-            and _near(square.max(), s1, 1e-3)
+            and _near(sums, energy, FORM_TOLERANCE)
+            and _near(scale**2 * s1 * energy, 1, FORM_TOLERANCE)
+            and _near((square + self.mu * s1) * energy, 1, FORM_WEIGHT_TOLERANCE)
+            and (np.abs(strength * s1 - square) <= FORM_TOLERANCE * s1).all()
+            and _near(square.max(), s1, FORM_TOLERANCE)
         )
 
 
@@ -120,7 +124,7 @@ def _taken_apart(projection: Float32s, stored: StoredMatrix) -> RowForm | None:
     per_square = (one - s2[weakest]) / w2[weakest]  # mu s_1^2
     top, top_w2 = s2[strongest], w2[strongest]
     fused = (np.float64(per_square) * w2 + s2).astype(np.float32)
-    if not (np.abs(fused - one) <= FORM).all():
+    if not (np.abs(fused - one) <= FORM_WEIGHT_TOLERANCE).all():
         return None
     return RowForm(
         mu=float(per_square * top_w2 / top) if per_square > 0 else 0.0,
