@@ -197,6 +197,21 @@ static void mismatches_on_both_sides_of_the_limits(void)
     dense_bench_close(&b);
 }
 
+/* Two norms of the folds' data and one of the reduced: where the gain is not ignored nothing is
+ * learned of its drift. */
+static void a_gain_that_counts_costs_nothing(void)
+{
+    dense_bench b;
+    uint64_t macs = 0;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    ctx->reference.noise_v = R(1e-4);
+    (void)model_mismatch(ctx, 0.06);
+    ctx->range.off_range_build = ctx->projection.builds + 1;
+    (void)eits_check_model_mismatch(ctx, &ctx->scratch, &macs);
+    CHECK_EQUAL(macs, 0);
+    dense_bench_close(&b);
+}
+
 /* Two measurements of a fold have half the variance of one; a copy is none. Ratios have that of the
  * voltage over the reference. */
 static void noise_of_the_data(void)
@@ -355,6 +370,7 @@ int main(void)
     crowds_on_both_sides_of_the_limit();
     stale_references_on_both_sides_of_the_limit();
     mismatches_on_both_sides_of_the_limits();
+    a_gain_that_counts_costs_nothing();
     noise_of_the_data();
     odd_readings_on_both_sides_of_the_limit();
     rows_out_of_use();

@@ -134,6 +134,8 @@ static void interplay(eits_context *ctx, const eits_disc *disc, uint32_t count, 
                       uint64_t *macs)
 {
     eits_real data[RANK + 8];
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) /* nobody's: whatever is in it */
+        ctx->scratch.value[j] = R(NAN);
     *macs = eits_remove_interaction(ctx, &ctx->scratch, disc, count, data);
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         added[i] = (double)ctx->frame.y[i] - (double)data[i];

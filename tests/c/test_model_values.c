@@ -102,8 +102,29 @@ static eits_status with_protocol_row(uint32_t row, uint32_t electrodes)
     return status;
 }
 
+/* Open with each row of the protocol on the first four of so many electrodes. */
+static eits_status with_electrodes(uint32_t count)
+{
+    small_model made = small_model_make(TINY);
+    eits_model model;
+    uint8_t *table = small_model_section(&made, "PROT", NULL);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        small_put_u32(table + 4 * i, 0x03020100u);
+    const uint64_t hash = eits_protocol_hash(count, SMALL_ROWS, table);
+    memcpy(made.blob + 24, &hash, sizeof hash);
+    small_put_u32(small_model_section(&made, "DIMS", NULL), count);
+    small_model_seal(&made);
+    const eits_status status = eits_model_open(&model, made.blob, made.size);
+    small_model_free(&made);
+    return status;
+}
+
 static void electrodes_folds_and_pixels(void)
 {
+    CHECK_EQUAL(with_electrodes(3), EITS_E_MODEL_VALUE);
+    CHECK_EQUAL(with_electrodes(4), EITS_OK);
+    CHECK_EQUAL(with_electrodes(255), EITS_OK);
+    CHECK_EQUAL(with_electrodes(256), EITS_E_MODEL_VALUE);
     /* electrode 8 of 8 */
     static const uint32_t wrong[] = {0x03020108u, 0x03020800u, 0x03080100u, 0x08020100u,
                                      0xFF020100u,

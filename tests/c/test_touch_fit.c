@@ -4,6 +4,7 @@
 #include "small_model.h"
 
 #include "base/vec.h"
+#include "diagnostics/diagnostics.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
 #include "touch/disc.h"
@@ -221,11 +222,46 @@ static void each_touch_must_exceed_the_detection_threshold(void)
     small_model_free(&made);
 }
 
+/* Data that stand out of the noise tell the radius; in noise it is what strength suggests. */
+static void radius_by_the_data_or_by_the_noise(void)
+{
+    static const double noises[] = {1e-5, 0.02, 4};
+    static const double radii[] = {12, 12, 9};
+    for (int k = 0; k < 3; ++k) {
+        small_model made;
+        small_context c;
+        eits_context *ctx = set_up(&made, &c);
+        eits_options o = *eits_get_options(ctx);
+        eits_touch found[2];
+        uint32_t count;
+        o.touch_radius_weight = 0;
+        o.touch_seed_radius_mm = 9;
+        o.touch_change_s_per_m = 0;
+        o.max_touches = 1;
+        o.touch_sweeps = 60;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        const eits_disc disc = {-25, 2, 12, R(0.05), 1};
+        (void)eits_disc_atom(ctx, &ctx->scratch, &disc, ctx->frame.y, NULL);
+        for (int i = 0; i < RANK; ++i)
+            ctx->frame.y[i] *= disc.change;
+        memset(ctx->frame.sides, EITS_SIDE_FIRST, ctx->model->n_folded);
+        ctx->reference.gain = 1;
+        ctx->reference.noise_v = (eits_real)noises[k];
+        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+        CHECK_EQUAL(eits_find_touches(ctx, found, 2, &count), EITS_OK);
+        CHECK_EQUAL(count, 1);
+        CHECK_NEAR(found[0].radius_mm, radii[k], 0.4);
+        small_context_close(&c);
+        small_model_free(&made);
+    }
+}
+
 int main(void)
 {
     confidence_is_what_leaving_out_costs();
     each_touch_must_exceed_the_detection_threshold();
     work_is_counted();
     units_do_not_matter();
+    radius_by_the_data_or_by_the_noise();
     return checks_report("touch_fit");
 }

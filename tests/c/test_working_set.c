@@ -8,6 +8,7 @@
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
+#include "solve/violations.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -276,6 +277,41 @@ static void refused_options(void)
     tear_down(&b);
 }
 
+/* The same peaks in the same order, of the columns around the active ones alone. */
+static void violations_nearby(void)
+{
+    static const uint32_t active[] = {0, 30, 31, N - 1};
+    for (uint32_t count = 0; count <= 4; ++count) {
+        bench b;
+        eits_context *ctx = set_up(&b, RANDOM, 0);
+        eits_nearby near = eits_nearby_none(ctx);
+        uint32_t expected[N], wanted = 0, most = 0;
+        uint64_t state = 5;
+        for (uint32_t k = 0; k < count; ++k)
+            ctx->solver.working[k] = active[k];
+        ctx->solver.working_count = count;
+        eits_nearby_add(ctx, &near);
+        eits_nearby_add(ctx, &near); /* what is listed is not listed again */
+        eits_zero(ctx->solver.gradient, N);
+        for (uint32_t j = 0; j < N; ++j) {
+            int beside = 0;
+            for (uint32_t k = 0; k < count; ++k)
+                beside |= abs((int)(j % SIDE) - (int)(active[k] % SIDE)) <= 1 &&
+                          abs((int)(j / SIDE) - (int)(active[k] / SIDE)) <= 1;
+            most += (uint32_t)beside;
+            ctx->solver.gradient[j] = beside ? (eits_real)(0.6 + 0.5 * small_random(&state)) : 0;
+        }
+        CHECK_EQUAL(near.count, most);
+        wanted = eits_list_violations(ctx, &ctx->scratch, R(0.2), NULL);
+        memcpy(expected, ctx->scratch.index, wanted * sizeof *expected);
+        memset(ctx->scratch.index, 0xFF, N * sizeof *ctx->scratch.index);
+        CHECK_EQUAL(eits_list_violations(ctx, &ctx->scratch, R(0.2), &near), wanted);
+        CHECK(memcmp(expected, ctx->scratch.index, wanted * sizeof *expected) == 0);
+        CHECK(wanted >= (count < 3 ? count : count - 1)); /* each has a peak, two share theirs */
+        tear_down(&b);
+    }
+}
+
 int main(void)
 {
     looking_always_gives_the_bits_of_fista();
@@ -287,5 +323,6 @@ int main(void)
     warm_starts();
     work_is_counted();
     refused_options();
+    violations_nearby();
     return checks_report("working set");
 }

@@ -66,6 +66,30 @@ static void test_unknown(void)
     CHECK_EQUAL(b.host.packets, 0);
 }
 
+/* Names in INFO are cut to their room, the board's before a last zero, and have zeros behind them.
+ */
+static void test_names(void)
+{
+    static const char LONG[] = "abcdefghijklmnopqrstuvwxyzabcdefghijklmnopqrstuvwxyz";
+    static const char SHORT[64] = "two\0hidden";
+    const fw_board board = b.board.board;
+    b.board.board.name = b.board.board.serial = LONG;
+    eits_packet_info info = host_info(&b.host);
+    CHECK(memcmp(info.board, LONG, sizeof info.board - 1) == 0 &&
+          info.board[sizeof info.board - 1] == 0);
+    CHECK(memcmp(info.serial, LONG, sizeof info.serial) == 0);
+    b.board.board.name = b.board.board.serial = SHORT;
+    info = host_info(&b.host);
+    for (size_t k = 0; k < sizeof info.board; ++k)
+        CHECK_EQUAL(info.board[k], k < 3 ? SHORT[k] : 0);
+    for (size_t k = 0; k < sizeof info.serial; ++k)
+        CHECK_EQUAL(info.serial[k], k < 3 ? SHORT[k] : 0);
+    b.board.board.name = b.board.board.serial = NULL;
+    info = host_info(&b.host);
+    CHECK(info.board[0] == 0 && info.serial[0] == 0);
+    b.board.board = board;
+}
+
 static void test_stream_ranges(void)
 {
     REPLY(host_stream(&b.host, 8, 1, 0), EITS_REPLY_RANGE, 4, 7);
@@ -432,6 +456,7 @@ int main(void)
     bench_start(&b, &SKIN_ADJACENT);
     test_lengths();
     test_unknown();
+    test_names();
     test_stream_ranges();
     test_tare_ranges();
     test_scan_ranges();

@@ -151,6 +151,33 @@ static void test_wide_converter(void)
     CHECK_NEAR(z.q, 0, 1e-4);
 }
 
+/* Two pairs of the model, upside down and half a turn away from what it expects: the phase follows,
+ * whichever row of each pair can be used. */
+static void test_phase_from_either_row(void)
+{
+    static const eits_fold FOLD[2] = {{.first = 0, .second = 1, .sign = 1},
+                                      {.first = 2, .second = 3, .sign = -1}};
+    static const float V_REF[2] = {2, -1};
+    static const float volts[4] = {2, 2, -1, 1};
+    for (int lost = 0; lost < 3; ++lost) {
+        for (int turn = 0; turn < 16; ++turn) {
+            const double angle = TURN * (turn + 0.25) / 16;
+            fw_iq z[4];
+            uint8_t quality[4] = {0};
+            for (int i = 0; i < 4; ++i) {
+                z[i] = (fw_iq){(float)(volts[i] * cos(angle)), (float)(volts[i] * sin(angle))};
+                quality[i] = lost < 2 && i % 2 == lost;
+            }
+            fw_engine engine = {.model = {.n_rows = 4, .n_folded = 2, .fold = FOLD, .v_ref = V_REF},
+                                .cosine = 1};
+            const fw_frame frame = {.z = z, .quality = quality};
+            fw_phase_learn(&engine, &frame);
+            CHECK_NEAR(engine.cosine, cos(angle), 1e-5);
+            CHECK_NEAR(engine.sine, sin(angle), 1e-5);
+        }
+    }
+}
+
 int main(void)
 {
     test_turns();
@@ -160,5 +187,6 @@ int main(void)
     test_phase_followed();
     test_ends_of_range();
     test_wide_converter();
+    test_phase_from_either_row();
     return checks_report("demodulate");
 }

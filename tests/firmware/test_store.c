@@ -271,6 +271,11 @@ static void test_flash_fails(void)
     CHECK_EQUAL(reply.detail[0], 400);
     still_adjacent(1);
     b.board.program_status = FW_OK;
+    /* the upload is over: it does not go on, and is not committed */
+    const eits_packet_reply late = host_model_data(&b.host, 400, opposite.blob + 400, 400);
+    CHECK_EQUAL(late.status, EITS_REPLY_OFFSET);
+    CHECK_EQUAL(late.detail[0], -1);
+    still_adjacent(1);
     CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status,
                 EITS_REPLY_OK);
     CHECK_EQUAL(b.board.rewrites, 0);

@@ -1,11 +1,15 @@
 """Mutants of the core and of the firmware's application and drivers, tried by the C tests.
 
 The tests are built once (preset host): what is changed lies in shared libraries, and of a
-mutant one object and its library are made, in a folder that the loader searches first.
+mutant one object and its library are made, in a folder that the loader searches first. That one
+object is under the address and undefined-behaviour sanitizers, so that an index beyond an array is
+noticed where the numbers happen to stay right. A test may take so much of the processor's time, not
+so much time.
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import re
@@ -28,8 +32,9 @@ LIBRARIES = {
     "firmware/app": ("fw_app",),
     "firmware/drivers": ("fw_app",),
 }
-MIN_CPU_SECONDS = 4
-SLOWDOWN = 6
+MIN_CPU_SECONDS = 3
+SLOWDOWN = 8
+SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
 @dataclass
@@ -82,24 +87,33 @@ def read_libraries() -> dict[str, Library]:
     return libraries
 
 
-def list_tests(library: Library) -> None:
-    """Its test programs, and how long ctest found that each takes."""
+def read_costs() -> dict[str, float]:
+    """How long ctest found that each test takes."""
     costs = BUILD / "Testing" / "Temporary" / "CTestCostData.txt"
-    if not costs.is_file():
-        subprocess.run(["ctest", "--preset", "host", "--quiet"], cwd=ROOT, check=True)
-    seconds = {
-        words[0]: float(words[2])
-        for words in map(str.split, costs.read_text().splitlines())
-        if len(words) == 3
-    }
+    lines = map(str.split, costs.read_text().splitlines() if costs.is_file() else ())
+    return {words[0]: float(words[2]) for words in lines if len(words) == 3}
+
+
+def list_tests(library: Library) -> None:
+    """Its test programs, and how long each takes; ctest runs them where one was never run."""
     start, ending = "", library.name.removeprefix("eitskin")
     if library.name == "fw_app":
         start, ending = "fw_", ""
-    for source in sorted((ROOT / TESTS[library.name]).glob("test_*.c")):
-        name = f"{start}{source.stem[5:]}{ending}"
-        if name in seconds:
-            library.tests[f"test_{name}"] = seconds[name]
-            library.texts[f"test_{name}"] = source.read_text()
+    sources = sorted((ROOT / TESTS[library.name]).glob("test_*.c"))
+    names = {f"{start}{source.stem[5:]}{ending}": source for source in sources}
+    if not names.keys() <= read_costs().keys():
+        subprocess.run(["ctest", "--preset", "host", "--quiet"], cwd=ROOT, check=True)
+    seconds = read_costs()
+    for name, source in names.items():
+        library.tests[f"test_{name}"] = seconds[name]
+        library.texts[f"test_{name}"] = source.read_text()
+
+
+@functools.cache
+def sanitizer() -> str:
+    """What the loader must take first: the compiler's run-time library."""
+    asked = ["cc", "-print-file-name=libasan.so"]
+    return subprocess.run(asked, check=True, capture_output=True, text=True).stdout.strip()
 
 
 def run_test(library: Library, test: str, folder: Path, most_cpu_seconds: float) -> str:
@@ -108,11 +122,14 @@ def run_test(library: Library, test: str, folder: Path, most_cpu_seconds: float)
     program = BUILD / TESTS[library.name] / test
     paths = [folder, BUILD, BUILD / "firmware"]
     limited = f'ulimit -t {max(1, round(most_cpu_seconds))}; exec "$0"'
+    environment = {
+        **os.environ,
+        "LD_LIBRARY_PATH": ":".join(map(str, paths)),
+        "LD_PRELOAD": sanitizer(),
+        "ASAN_OPTIONS": "detect_leaks=0",
+    }
     done = subprocess.run(
-        ["sh", "-c", limited, str(program)],
-        capture_output=True,
-        check=False,
-        env={**os.environ, "LD_LIBRARY_PATH": ":".join(map(str, paths))},
+        ["sh", "-c", limited, str(program)], capture_output=True, check=False, env=environment
     )
     if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
         return "does not end"
@@ -130,7 +147,9 @@ class Workshop:
         self.libraries, self.folder = libraries, folder
         folder.mkdir(parents=True)
 
-    def compile(self, command: Sequence[str], file: str, text: str) -> bytes:
+    def compile(
+        self, command: Sequence[str], file: str, text: str, flags: Sequence[str] = ()
+    ) -> bytes:
         """The object of a source with this text; empty where the compiler refuses."""
         changed, made = self.folder / Path(file).name, self.folder / "mutant.o"
         changed.write_text(text)
@@ -138,7 +157,7 @@ class Workshop:
         words[words.index("-o") + 1] = str(made)
         words[words.index("-c") + 1] = str(changed)
         words[1:1] = ["-w", "-iquote", str((ROOT / file).parent)]
-        words = [word for word in words if not word.startswith("-W")]
+        words = [word for word in words if not word.startswith("-W")] + [*flags]
         done = subprocess.run(words, cwd=BUILD, capture_output=True, check=False)
         return b"" if done.returncode else made.read_bytes()
 
@@ -159,7 +178,7 @@ class Workshop:
                 if not library.tests:
                     list_tests(library)
             command = library.commands[mutant.file]
-            if not self.compile(command, mutant.file, mutant.applied(source)):
+            if not self.compile(command, mutant.file, mutant.applied(source), SANITIZED):
                 return "refused"
             self.link(library, mutant.file)
             for test in library.ordered_tests(mutant.file):
@@ -181,7 +200,7 @@ class Workshop:
         objects = {name: _after(words, "-o") for name, words in library.commands.items()}
         objects[file] = str(self.folder / "mutant.o")
         compiler = library.commands[file][0]
-        command = [compiler, "-shared", "-o", str(self.folder / library.file.name)]
+        command = [compiler, "-shared", *SANITIZED, "-o", str(self.folder / library.file.name)]
         subprocess.run([*command, *objects.values(), "-lm"], cwd=BUILD, check=True)
 
 
