@@ -50,7 +50,7 @@ def add_parser(subparsers: Any) -> None:
         build,
         "--samples",
         "random skins drawn for the model's errors, 0 for none (default: as [uncertainty] in"
-        " SKIN.toml says, else 300)",
+        " SKIN.toml says, else 500)",
         int,
     )
     option(build, "--json")

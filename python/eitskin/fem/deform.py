@@ -28,6 +28,7 @@ IntArray = npt.NDArray[np.int64]
 LEAST_PART = 0.5  # an electrode or a gap keeps at least this of its length
 LEAST_AREA = 0.2  # and each element this of its area
 HALVINGS = 12
+SMOOTHING = 0.1  # of the rim's direction: standard deviation over the radius of the equal disk
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +81,20 @@ class Deformation:
         below = whole[inside]
         return inside, factorise(below[:, inside].tocsc()), below[:, self.rim.nodes].tocsc()
 
-    def outward(self) -> FloatArray:
-        """The rim's outward normal at each of its nodes, (B, 2): of the line from the node before
-        to the node behind."""
-        places = self.mesh.nodes_mm[self.rim.nodes]
-        along = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
-        normal = np.column_stack([along[:, 1], -along[:, 0]])
-        return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
+    @cached_property
+    def _tangent(self) -> FloatArray:
+        """The direction along the rim at each of its nodes, (B, 2), smoothed along it; shorter than
+        1 where the rim bends sharply, so that what moves along or across it stays smooth."""
+        rim = self.rim
+        places = self.mesh.nodes_mm[rim.nodes]
+        steps = np.roll(places, -1, axis=0) - places
+        length = np.linalg.norm(steps, axis=1)
+        middles = rim.arc_mm + length / 2
+        apart = np.mod(rim.arc_mm[:, None] - middles + rim.length_mm / 2, rim.length_mm)
+        sd = SMOOTHING * np.sqrt(self.mesh.areas_mm2.sum() / np.pi)
+        weight = np.exp(-0.5 * ((apart - rim.length_mm / 2) / sd) ** 2)
+        # of the steps themselves, so that each counts by its length
+        return np.asarray(weight @ steps / (weight @ length)[:, None])
 
     def moved(self, shift_mm: FloatArray, widths: FloatArray, outwards_mm: FloatArray) -> Mesh:
         """The mesh with each electrode moved along the rim by ``shift_mm`` (L,), its width
@@ -96,12 +104,9 @@ class Deformation:
         """
         rim, mesh = self.rim, self.mesh
         along = self._along(shift_mm, widths)
-        places = mesh.nodes_mm[rim.nodes]
-        closed = np.vstack([places, places[:1]])
-        at = np.append(rim.arc_mm, rim.length_mm)
-        slid = np.mod(rim.arc_mm + along, rim.length_mm)
-        new = np.column_stack([np.interp(slid, at, closed[:, axis]) for axis in (0, 1)])
-        step = new - places + outwards_mm[:, None] * self.outward()
+        tangent = self._tangent
+        outward = np.column_stack([tangent[:, 1], -tangent[:, 0]])
+        step = along[:, None] * tangent + outwards_mm[:, None] * outward
         inside, factors, to_rim = self._inner
         movement = np.zeros_like(mesh.nodes_mm)
         movement[rim.nodes] = step

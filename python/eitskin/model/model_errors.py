@@ -85,10 +85,16 @@ def decode_model_errors(content: bytes, rank: int, where: str) -> ModelErrors:
 
 
 def as_covariance(matrix: FloatArray) -> Float32s:
-    """``matrix`` (r, r) made symmetric and positive semidefinite, in float32."""
+    """``matrix`` (r, r) made symmetric, and positive semidefinite in float32: eigenvalues are
+    raised to what rounding needs."""
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
-    clipped = (vectors * np.maximum(values, 0)) @ vectors.T
-    return np.asarray((clipped + clipped.T) / 2, dtype=np.float32)
+    least = 1e-6 * max(values[-1], 0.0)
+    while True:
+        raised = (vectors * np.maximum(values, least)) @ vectors.T
+        stored = ((raised + raised.T) / 2).astype(np.float32)
+        if least == 0 or np.linalg.eigvalsh(stored.astype(np.float64))[0] >= 0:
+            return np.asarray(stored)
+        least *= 4
 
 
 def _whole(lower: Float32s, rank: int) -> Float32s:

@@ -1,7 +1,8 @@
 """Random skins (model.random_skins) drawn on every core: the model errors of a model.
 
-Each process is this module run by itself, so that any script may build a model; they use one thread
-each, and sums are taken in the order of the samples. The number of processes changes no bit.
+Each process is this module run by itself, so that any script may build a model, guarded or not.
+They use one thread each, and samples are summed in their order: the number of processes changes no
+bit.
 """
 
 from __future__ import annotations
@@ -21,14 +22,13 @@ import numpy.typing as npt
 
 import eitskin
 from eitskin.errors import ModelError
-from eitskin.model.model_errors import ModelErrors, as_covariance
+from eitskin.model.model_errors import ModelErrors
 from eitskin.model.random_skins import RandomSkins, Request
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-DRIFT = -1
 
 
 def draw_model_errors(
@@ -45,48 +45,40 @@ def draw_model_errors(
     count = max(1, min(jobs or os.cpu_count() or 1, samples))
     idle: SimpleQueue[_Process] = SimpleQueue()
 
-    def ask(number: int) -> FloatArray:
+    def ask(*what: Any) -> Any:
         process = idle.get()
         try:
-            return process.ask(number)
+            return process.ask(*what)
         finally:
             idle.put(process)
 
     processes: list[_Process] = []
-    pool = ThreadPoolExecutor(count)
-    try:
-        for _ in range(count):
-            processes.append(_Process(request))
-            idle.put(processes[-1])
-        drift = pool.submit(ask, DRIFT)
-        drawn: Iterable[FloatArray] = pool.map(ask, range(samples))
-        rows = np.array(list(drawn if progress is None else progress(drawn, samples)))
-        return _gathered(request, rows, drift.result())
-    finally:
-        for process in processes:
-            process.stop()
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _gathered(request: Request, rows: FloatArray, drift: FloatArray) -> ModelErrors:
-    """From samples (s, 2 r + 2) and P D P'."""
-    rank, weight = len(request.projection), request.uncertainty.touch_shapes
-    all_, shape = (
-        np.einsum("si,sj->ij", part, part) / len(rows)
-        for part in (rows[:, :rank], rows[:, rank : 2 * rank])
-    )
-    rms = np.sqrt(np.mean(rows[:, -2:] ** 2, axis=0)).astype(np.float32)
-    return ModelErrors(
-        error=as_covariance(all_ + weight * shape),
-        drift=as_covariance(drift),
-        rms_error=float(rms[0]),
-        rms_shape_error=float(rms[1]),
-        row_gains=request.uncertainty.row_gains,
-    )
+    with ThreadPoolExecutor(count) as pool:
+        try:
+            for _ in range(count):
+                processes.append(_Process(request))
+                idle.put(processes[-1])
+            drift = pool.submit(ask, "drift")
+            drawn: Iterable[FloatArray] = pool.map(
+                lambda number: ask("sample", number), range(samples)
+            )
+            rows = np.array(list(drawn if progress is None else progress(drawn, samples)))
+            rms_error, rms_shape_error = np.sqrt(np.mean(rows[:, -2:] ** 2, axis=0))
+            return ModelErrors(
+                error=ask("error", rows),
+                drift=drift.result(),
+                rms_error=float(np.float32(rms_error)),
+                rms_shape_error=float(np.float32(rms_shape_error)),
+                row_gains=request.uncertainty.row_gains,
+            )
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
+                process.stop()
 
 
 class _Process:
-    """One process that draws samples by their numbers."""
+    """A process that calls the methods of a :class:`RandomSkins` of its own."""
 
     def __init__(self, request: Request) -> None:
         root = str(Path(eitskin.__file__).parents[1])
@@ -95,24 +87,27 @@ class _Process:
             [sys.executable, "-m", "eitskin.model.monte_carlo"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, "1")},
         )
         self._send(request)
 
-    def ask(self, number: int) -> FloatArray:
-        """The answer for one sample."""
-        self._send(number)
+    def ask(self, name: str, *arguments: Any) -> Any:
+        """What the method ``name`` says to ``arguments``."""
+        self._send((name, arguments))
         assert self._process.stdout is not None
         try:
-            answer: FloatArray = pickle.load(self._process.stdout)
-        except (EOFError, pickle.UnpicklingError):
-            raise _failed() from None
+            answer = pickle.load(self._process.stdout)
+        except (OSError, EOFError, pickle.UnpicklingError):
+            raise _failed("it ended before its time") from None
+        if isinstance(answer, str):
+            raise _failed(answer)
         return answer
 
     def stop(self) -> None:
         """End the process."""
         self._process.kill()
-        self._process.communicate()
+        self._process.wait()
 
     def _send(self, what: object) -> None:
         assert self._process.stdin is not None
@@ -120,25 +115,31 @@ class _Process:
             pickle.dump(what, self._process.stdin)
             self._process.stdin.flush()
         except OSError:
-            raise _failed() from None
+            raise _failed("it ended before its time") from None
 
 
-def _failed() -> ModelError:
+def _failed(why: str) -> ModelError:
     return ModelError(
-        "model: a process that draws random skins ended before its time; build again, or write"
-        ' uncertainty = "none" into the skin\'s file'
+        f"model: a process that draws random skins failed ({why}); build again, or without them by"
+        " --samples 0"
     )
 
 
 def main(asked: IO[bytes], answers: IO[bytes]) -> None:
-    """Answer sample numbers until ``asked`` ends."""
-    skins = RandomSkins(pickle.load(asked))
+    """Answer what is asked until it ends; a text is an error."""
+    request = pickle.load(asked)
+    skins: RandomSkins | None = None
     while True:
         try:
-            number = pickle.load(asked)
+            name, arguments = pickle.load(asked)
         except EOFError:
             return
-        pickle.dump(skins.drift() if number == DRIFT else skins.sample(number), answers)
+        try:
+            skins = skins or RandomSkins(request)
+            answer = getattr(skins, name)(*arguments)
+        except Exception as error:
+            answer = f"{type(error).__name__}: {error}"
+        pickle.dump(answer, answers)
         answers.flush()
 
 

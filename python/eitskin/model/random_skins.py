@@ -20,6 +20,7 @@ from eitskin.fem.deform import Deformation
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.sensitivity import element_fields
 from eitskin.fem.shaped_touch import ShapedTouch, TouchCover
+from eitskin.model.model_errors import Float32s, as_covariance
 from eitskin.model.reduction import fold_rows
 from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin
@@ -27,7 +28,7 @@ from eitskin.skin.uncertainty import Range, Uncertainty
 
 FloatArray = npt.NDArray[np.float64]
 
-COSINES = 128
+COSINES = 64
 HARMONICS = (2, 3, 4)
 MAX_TOUCHES = 3
 MARGIN, GAP = 0.04, 0.12  # R: least distance of a disc to the rim, and of two discs' edges
@@ -37,7 +38,7 @@ MAX_ROW_GAIN = 3.0  # csrc/src/frame: the same
 MAX_RATIO = 16.0  # csrc/src/frame/fold.c: of log-ratio data
 MIN_RATIO = 1e-6  # rows whose reference is below this part of the rms say nothing as a ratio
 FIELD_LENGTHS = 8
-ELEMENTS_AT_ONCE = 512
+NUMBERS_AT_ONCE = 2**21
 CELL = 0.15  # of a field's least length
 
 
@@ -92,16 +93,25 @@ class RandomSkins:
         reduced = request.projection @ errors
         return np.concatenate([reduced.T.ravel(), np.linalg.norm(errors, axis=0)])
 
-    def drift(self) -> FloatArray:
+    def error(self, rows: FloatArray) -> Float32s:
+        """P E P' (r, r) from samples (s, 2 r + 2): the second moment of e_all, and by its weight
+        that of e_shape."""
+        rank = len(self.request.projection)
+        all_, shape = (
+            np.einsum("si,sj->ij", part, part) / len(rows)
+            for part in (rows[:, :rank], rows[:, rank : 2 * rank])
+        )
+        return as_covariance(all_ + self.request.uncertainty.touch_shapes * shape)
+
+    def drift(self) -> Float32s:
         """P D P' (r, r): D the covariance, to first order, of the data that a smooth change of the
         skin's conductivity makes."""
         asked, mesh, r = self.request.uncertainty, self.request.mesh, len(self.request.projection)
+        blocks = -(-mesh.n_elements * self.request.projection.shape[1] // NUMBERS_AT_ONCE)
         reduced = np.concatenate(
             [
                 self.request.projection @ self._sensitivity(block)
-                for block in np.array_split(
-                    np.arange(mesh.n_elements), -(-mesh.n_elements // ELEMENTS_AT_ONCE)
-                )
+                for block in np.array_split(np.arange(mesh.n_elements), blocks)
             ],
             axis=1,
         ) * (asked.drift_log_sd * self.request.skin.conductivity_s_per_m)
@@ -112,7 +122,7 @@ class RandomSkins:
         covariance = np.zeros((r, r))
         for length in lengths:
             covariance += reduced @ np.exp(square / (-2 * length**2)) @ reduced.T / FIELD_LENGTHS
-        return covariance
+        return as_covariance(covariance)
 
     def _gathered(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """``columns`` (r, E) of elements summed over square cells much smaller than any field's

@@ -47,7 +47,7 @@ class Uncertainty:
     touch_shapes: float = 0.25
     touch_aspect_max: float = 2.2
     row_gains: bool = True
-    samples: int = 300
+    samples: int = 500
     seed: int = 1
 
     def __post_init__(self) -> None:

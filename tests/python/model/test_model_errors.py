@@ -1,0 +1,206 @@
+"""The section UNCE: drawn from random skins, by any number of processes the same, stored, read."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from eitskin.core.engine import CoreEngine
+from eitskin.errors import ModelError
+from eitskin.fem.mesh import mesh_for_elements
+from eitskin.model import monte_carlo
+from eitskin.model.build import BuildSettings, build_model
+from eitskin.model.eitm import HEADER, decode_model, encode_model
+from eitskin.model.model import DATA_KINDS, Model
+from eitskin.model.model_errors import HEAD, ModelErrors, as_covariance, decode_model_errors
+from eitskin.model.monte_carlo import draw_model_errors
+from eitskin.model.random_skins import RandomSkins, Request
+from eitskin.skin.electrodes import Electrodes
+from eitskin.skin.outline import disk, polygon
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import Skin
+from eitskin.skin.uncertainty import Uncertainty
+from small_models import prebuilt, tiny_blob
+
+FEW = Uncertainty(samples=8)
+CALM = replace(
+    FEW,
+    electrode_position_sd=0.0,
+    electrode_width_log_sd=0.0,
+    contact_log_sd=0.0,
+    out_of_round=0.0,
+    background_log_sd=0.0,
+)
+SKIN = Skin("tiny", disk(100.0), Electrodes(8, 3.0), conductivity_s_per_m=0.02, thickness_mm=5.0)
+
+
+@cache
+def request(data_kind: str = "difference", uncertainty: Uncertainty = FEW) -> Request:
+    protocol = adjacent(8)
+    fold = protocol.reciprocal_pairs()
+    projection = np.random.default_rng(1).normal(size=(5, len(fold.first)))
+    return Request(
+        SKIN, protocol, mesh_for_elements(SKIN, 600), fold, data_kind, projection, uncertainty
+    )
+
+
+@cache
+def errors() -> ModelErrors:
+    return draw_model_errors(request(), jobs=1)
+
+
+def is_covariance(matrix: np.ndarray) -> bool:
+    low, high = np.linalg.eigvalsh(matrix.astype(np.float64))[[0, -1]]
+    return bool(matrix.dtype == np.float32 and (matrix == matrix.T).all() and low >= 0 < high)
+
+
+def test_any_number_of_processes_draws_the_same() -> None:
+    seen: list[tuple[int, int]] = []
+
+    def progress(drawn, total):  # type: ignore[no-untyped-def]
+        for row in drawn:
+            seen.append((len(seen) + 1, total))
+            yield row
+
+    again = draw_model_errors(request(), jobs=3, progress=progress)
+    assert again.encode() == errors().encode()
+    assert seen == [(k, 8) for k in range(1, 9)]
+    other = RandomSkins(request(uncertainty=replace(FEW, seed=2))).sample(0)
+    assert not np.array_equal(other, RandomSkins(request()).sample(0))
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+def test_every_kind_of_data(data_kind: str) -> None:
+    skins = RandomSkins(request(data_kind))
+    rows = np.array([skins.sample(k) for k in range(4)])
+    assert is_covariance(skins.error(rows)) and is_covariance(skins.drift())
+    assert (rows[:, -2:] > 1e-4).all() and (rows[:, -2:] < 1).all()
+
+
+def test_a_skin_as_described_errs_by_shapes_alone() -> None:
+    rows = np.array([RandomSkins(request(uncertainty=CALM)).sample(k) for k in range(3)])
+    assert (rows[:, -2] < 1e-10).all() and (rows[:, -1] > 1e-3).all()
+    assert np.abs(rows[:, :5]).max() < 1e-9
+
+
+def test_row_gains_help_where_the_sheet_is_uneven() -> None:
+    uneven = replace(CALM, background_log_sd=0.3)
+    with_gains, without = (
+        np.mean([RandomSkins(request(uncertainty=u)).sample(k)[-2] for k in range(6)])
+        for u in (uneven, replace(uneven, row_gains=False))
+    )
+    assert with_gains < 0.7 * without
+
+
+def test_drift_is_that_of_drawn_fields() -> None:
+    """The covariance, taken to first order, against nonlinear solves."""
+    skins, draw = RandomSkins(request()), np.random.default_rng(5)
+    drawn = []
+    for _ in range(200):
+        field = skins._random_field(draw, draw.uniform(0.35, 1.0))
+        v = skins._fold(skins.forward.voltages(skins.conductivity * np.exp(0.02 * field)))
+        drawn.append(skins.request.projection @ skins._datum(v, skins.v_ref))
+    moment = np.transpose(drawn) @ np.array(drawn) / len(drawn)
+    assert np.trace(moment) == pytest.approx(np.trace(skins.drift()), rel=0.2)
+
+
+def test_a_thin_skin_takes_what_fits() -> None:
+    strip = Skin("strip", polygon([(0, 0), (300, 0), (300, 4), (0, 4)]), Electrodes(8, 2.0))
+    fold = adjacent(8).reciprocal_pairs()
+    mesh = mesh_for_elements(strip, 600)
+    projection = np.eye(len(fold.first))[:3]
+    skins = RandomSkins(Request(strip, adjacent(8), mesh, fold, "difference", projection, FEW))
+    assert np.isfinite([skins.sample(k) for k in range(4)]).all()
+
+
+def test_build_model_draws_as_told() -> None:
+    settings = BuildSettings(rank=5, pixels_across=8, elements=300)
+    counted = []
+
+    def built(skin: Skin, samples: int | None) -> Model:
+        def progress(drawn, total):  # type: ignore[no-untyped-def]
+            counted.append(total)
+            return drawn
+
+        return build_model(skin, adjacent(8), replace(settings, samples=samples), progress=progress)
+
+    model = built(replace(SKIN, uncertainty=replace(FEW, samples=2)), None)
+    assert model.model_errors is not None and counted == [2]
+    assert built(replace(SKIN, uncertainty=None), None).model_errors is None
+    assert built(SKIN, 0).model_errors is None and counted == [2]
+    few = built(SKIN, 3)
+    assert counted == [2, 3]
+    bare = replace(few, model_errors=None)
+    assert encode_model(bare) == encode_model(built(SKIN, 0))  # nothing else differs
+
+
+def test_it_is_read_as_written() -> None:
+    model = decode_model(tiny_blob(), "tiny")
+    assert model.model_errors is None and HEADER.unpack_from(tiny_blob())[2] == 3
+    for row_gains in (True, False):
+        written = replace(errors(), row_gains=row_gains)
+        blob = encode_model(replace(model, model_errors=written))
+        assert HEADER.unpack_from(blob)[1:3] == (1, 4)
+        assert len(blob) == len(tiny_blob()) + 16 + (16 + 2 * 4 * 15 + 15) // 16 * 16
+        read = decode_model(blob, "made").model_errors
+        assert read is not None and read.encode() == written.encode()
+        assert (read.error == errors().error).all() and (read.drift == errors().drift).all()
+        assert read.row_gains == row_gains
+        assert encode_model(decode_model(blob, "made")) == blob
+
+
+def test_the_core_takes_a_model_with_it() -> None:
+    model = prebuilt()[0]
+    unit = np.eye(model.rank, dtype=np.float32)
+    blob = encode_model(replace(model, model_errors=ModelErrors(unit, unit, 0.04, 0.1)))
+    assert CoreEngine(blob, "float32").self_test() == 0
+
+
+WHOLE = HEAD.pack(1, 0.04, 0.1, 0.0) + np.array([1, 0.5, 1, 2, 0, 2], "<f4").tobytes()
+
+
+def changed(at: int, value: float) -> bytes:
+    return WHOLE[:at] + struct.pack("<f", value) + WHOLE[at + 4 :]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (WHOLE[:-4], "section 'UNCE' of 36 bytes instead of 40"),
+        (WHOLE + bytes(4), "section 'UNCE' of 44 bytes instead of 40"),
+        (changed(4, float("nan")), "a number in section 'UNCE' that is out of range"),
+        (changed(8, -0.1), "a number in section 'UNCE' that is out of range"),
+        (changed(20, float("inf")), "a number in section 'UNCE' that is out of range"),
+        (changed(20, 1.5), "a matrix in section 'UNCE' that is no covariance"),
+        (changed(28, -2.0), "a matrix in section 'UNCE' that is no covariance"),
+    ],
+)
+def test_refused(content: bytes, said: str) -> None:
+    assert decode_model_errors(WHOLE, 2, "x").error.tolist() == [[1, 0.5], [0.5, 1]]
+    with pytest.raises(ModelError, match=f"x: holds {said}") as refused:
+        decode_model_errors(content, 2, "x")
+    assert "\n" not in str(refused.value)
+
+
+def test_rounding_leaves_a_covariance() -> None:
+    vectors = np.linalg.qr(np.random.default_rng(2).normal(size=(40, 40)))[0]
+    for least in (1e-12, 0.0, -1e-3):
+        spectrum = np.geomspace(1, 1e-14, 40)
+        spectrum[-1] = least
+        assert is_covariance(as_covariance((vectors * spectrum) @ vectors.T))
+    assert (as_covariance(np.zeros((3, 3))) == 0).all()
+
+
+def test_a_process_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(
+        ModelError, match=r"random skins failed \(ValueError: matmul.*\);"
+    ) as refused:
+        draw_model_errors(replace(request(), projection=None), jobs=2)  # type: ignore[arg-type]
+    assert "\n" not in str(refused.value)
+    monkeypatch.setattr(monte_carlo.sys, "executable", "/bin/false")
+    with pytest.raises(ModelError, match="ended before its time"):
+        draw_model_errors(request(), jobs=2)
