@@ -73,6 +73,7 @@ def test_another_regularisation_is_the_model_built_with_it() -> None:
         )
         np.testing.assert_allclose(product, wanted, atol=1e-4 * np.abs(wanted).max())
         assert moved.lipschitz == pytest.approx(built.lipschitz, rel=1e-4)
+        assert moved.row_form is not None and moved.row_form.fits(moved.projection)
         assert moved.noise_gain == pytest.approx(built.noise_gain, rel=1e-3)
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from eitskin.model.build import LIPSCHITZ_MARGIN
 from eitskin.model.model import Model
 from eitskin.model.reduction import DEFAULT_REGULARISATION, noise_gain, spectral_norm_squared
+from eitskin.model.row_form import row_form
 from eitskin.model.storage import store
 from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
@@ -57,6 +58,7 @@ def with_regularisation(model: Model, regularisation: float) -> Model:
         model,
         projection=projection,
         stored=stored,
+        row_form=row_form(projection, stored),
         lipschitz=float(np.float32(spectral_norm_squared(decoded) * (1 + LIPSCHITZ_MARGIN))),
         noise_gain=float(np.float32(noise_gain(projection, decoded))),
     )

@@ -1,4 +1,4 @@
-"""The doubt's tables: the present signal, the linear score, and the confidence of each touch."""
+"""Tables of the ambiguity: the present signal, the linear score, the confidence of each touch."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def ambiguity_table(ambiguities: Ambiguities) -> Table:
                         *_cells(calibration(mine, ambiguities.rule.says(mine))),
                     )
                 )
-    return Table("doubt", ("method", "set", "SNR, dB", "frames", "signal", *HEAD), tuple(rows))
+    return Table("ambiguity", ("method", "set", "SNR, dB", "frames", "signal", *HEAD), tuple(rows))
 
 
 def _cells(one: ConfidenceCalibration) -> tuple[str, ...]:
