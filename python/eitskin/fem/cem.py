@@ -52,11 +52,12 @@ class Solution:
     """Potentials in V per A of each solved pattern (``ForwardModel.patterns``), zero mean over the
     electrodes.
 
-    ``nodes`` is (N, P), ``electrodes`` (L, P).
+    ``nodes`` is (N, P), ``electrodes`` (L, P); ``factors`` those of the matrix (``factorise``).
     """
 
     nodes: FloatArray
     electrodes: FloatArray
+    factors: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +149,7 @@ class ForwardModel:
         self.counters.solves += loads.shape[1]
         electrodes = potentials[system.unknown[n_nodes:]]
         shift = electrodes.mean(axis=0)
-        return Solution(potentials[system.unknown[:n_nodes]] - shift, electrodes - shift)
+        return Solution(potentials[system.unknown[:n_nodes]] - shift, electrodes - shift, factors)
 
     def system_for(self, shunted: BoolArray) -> System:
         """The system in which the electrodes ``shunted`` (L,) are ideal; made again only when they

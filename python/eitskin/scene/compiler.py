@@ -68,6 +68,7 @@ class Compiled:
         parameters: of each effect.
         states: solved once each; ``state_of_frame`` (n,) says which one a frame has.
         known: potentials of states that were solved already, for V0.
+        base_factors: those of the untouched skin, made for V0 and used again by the update.
         functions: from a state's true voltages to the recorded ones, for each frame.
         bridge_pairs: electrodes that some state bridges.
         method: "factorise" or "update"; ``counted`` says why, where it was a choice.
@@ -83,6 +84,7 @@ class Compiled:
     states: tuple[State, ...]
     state_of_frame: IntArray
     known: dict[int, FloatArray]
+    base_factors: Any
     functions: tuple[VoltageFunction, ...]
     needs_whole_reader: bool
     bridge_pairs: tuple[tuple[int, int], ...]
@@ -127,12 +129,12 @@ def compile_scene(
     model.patterns = with_bridges(model.patterns, pairs)
     method, reach, counted = _choose_method(scene, model, states, steps)
     known = {}
-    if method == "factorise" and all(
-        step.stage >= Stage.FRONT_END or _is_voltage(step) for step in steps
-    ):
-        if mesh_cache is not None:
-            mesh_cache.v0_v(scene, work)
-        electrodes = mesh_cache.known(scene)
+    as_described = all(step.stage >= Stage.FRONT_END or _is_voltage(step) for step in steps)
+    base_factors = work.v0_factors if method == "update" and as_described else None
+    work.v0_factors = None
+    if method == "factorise" and as_described:
+        mesh_cache.v0_v(scene, work)
+        electrodes, work.v0_factors = mesh_cache.known(scene), None
         known = {
             k: electrodes for k, s in enumerate(states) if electrodes is not None and not s.touches
         }
@@ -148,6 +150,7 @@ def compile_scene(
         states=states,
         state_of_frame=state_of_frame,
         known=known,
+        base_factors=base_factors,
         functions=functions,
         needs_whole_reader=bool(pairs)
         or gone
@@ -156,7 +159,17 @@ def compile_scene(
         method=method,
         reach=reach,
         counted=counted,
-        plan=make_plan(scene, model, steps, len(states), len(known), method, len(reach), work),
+        plan=make_plan(
+            scene,
+            model,
+            steps,
+            len(states),
+            len(known),
+            method,
+            len(reach),
+            work,
+            base_factors is not None,
+        ),
         work=work,
     )
 

@@ -119,14 +119,20 @@ class Update:
     contacts stay.
 
     ``reach`` (u,) are all unknowns that any state touches (``touched_unknowns``), so that storage
-    is known beforehand.
+    is known beforehand; ``base_factors`` are those of the untouched skin's matrix, where they are
+    known.
     """
 
     def __init__(
-        self, model: ForwardModel, phase: PhaseStep | None, reach: IntArray, work: Work
+        self,
+        model: ForwardModel,
+        phase: PhaseStep | None,
+        reach: IntArray,
+        work: Work,
+        base_factors: Any = None,
     ) -> None:
         self.model, self.phase, self.work = model, phase, work
-        self.reach = reach
+        self.reach, self._factors = reach, base_factors
         self._ready = False
 
     def electrodes(
@@ -164,7 +170,10 @@ class Update:
         )
         self._system = system = model.system_for(np.asarray(impedance == 0))
         self._base_values = self._admittivity(background)
-        self._factors = factorise(_matrix(system, self._base_values, impedance))
+        if self._factors is None:
+            self._factors = factorise(_matrix(system, self._base_values, impedance))
+            self.work.factorisations += 1
+            self.work.complex_factorisations += int(self.phase is not None)
         self._dtype = np.result_type(self._base_values, impedance)
         self._stiffness = element_stiffness(model)
         electrodes = system.unknown[model.mesh.n_nodes :]
@@ -175,8 +184,6 @@ class Update:
         self._base_touched, self._base_electrodes = base[: len(self.reach)], base[len(self.reach) :]
         self._columns = np.zeros((len(self.reach), len(self._kept)), self._dtype)
         self._known = np.zeros(len(self.reach), np.bool_)
-        self.work.factorisations += 1
-        self.work.complex_factorisations += int(self.phase is not None)
         self._ready = True
 
     def _column(self, load: AnyArray) -> AnyArray:

@@ -118,14 +118,15 @@ def make_plan(
     method: str,
     reach: int,
     work: SessionWork,
+    factorised: bool = False,
 ) -> Plan:
     """The plan of a compiled scene: the steps that every scene has, with those of the named effects
-    in their places."""
+    in their places. ``factorised``: the untouched skin is already, for V0."""
     own = [PlanStep(step.name, step.stage, step.note, step.cost, True) for step in steps]
     kinds = dict(zip(own, steps, strict=True))
     patterns, total = len(model.patterns.solved), scene.n_frames
     if method == "update":
-        factorisations, solves = 1, patterns + reach
+        factorisations, solves = int(not factorised), patterns + reach
         note = (
             f"the untouched skin once, then low-rank updates on {reach} unknowns that touches reach"
         )

@@ -41,7 +41,7 @@ class SceneRun:
 def forward_of(compiled: Compiled, work: Work) -> Forward:
     """The forward step that was chosen when compiling."""
     if compiled.method == "update":
-        return Update(compiled.model, compiled.phase, compiled.reach, work)
+        return Update(compiled.model, compiled.phase, compiled.reach, work, compiled.base_factors)
     if compiled.phase is not None:
         return FactoriseComplex(compiled.model, compiled.phase, work)
     return Factorise(compiled.model, work)

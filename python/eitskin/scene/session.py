@@ -71,7 +71,8 @@ class MeshCache:
         )
         electrodes = self.known(scene)
         if electrodes is None:
-            electrodes = model.solve(scene.skin.conductivity_s_per_m, 0.0).electrodes
+            solution = model.solve(scene.skin.conductivity_s_per_m, 0.0)
+            electrodes, work.v0_factors = solution.electrodes, solution.factors
             self._untouched[scene.skin, scene.elements, scene.protocol] = electrodes
             work.v0_factorisations += 1
             work.v0_solves += electrodes.shape[1]
@@ -81,10 +82,11 @@ class MeshCache:
 @dataclass
 class SessionWork:
     """What making a session costs beside its forward solves: the reference V0, and random
-    generators."""
+    generators. ``v0_factors`` are those of the untouched skin's matrix, where they were made."""
 
     v0_factorisations: int = 0
     v0_solves: int = 0
+    v0_factors: Any = None
     generators: int = 0
 
 

@@ -469,6 +469,16 @@ def test_without_scipy_frames_are_reconstructed_and_scored(
     assert output.exists()
 
 
+def test_frames_with_truth_import_no_scipy_where_it_is_installed(frames_file: Path) -> None:
+    code = (
+        "import sys\nfrom eitskin.cli.main import main\nmain(sys.argv[1:])\n"
+        "print([name for name in sys.modules if name.split('.')[0] == 'scipy'], file=sys.stderr)"
+    )
+    done = run_python(code, "reconstruct", frames_file)
+    assert "against the truth of 20 frames" in done.stdout
+    assert done.stderr == "[]\n"
+
+
 # ---- ends ----
 
 

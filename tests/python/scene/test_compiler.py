@@ -16,8 +16,10 @@ pytest.importorskip("netgen")
 from scene_helpers import ELEMENTS, effect_module, moving_scene, still_scene
 
 from eitskin.errors import ConfigError
-from eitskin.fem.cem import ForwardModel
+from eitskin.fem import cem
+from eitskin.fem.cem import ForwardModel, factorise
 from eitskin.fem.mesh import mesh_for_elements
+from eitskin.scene import forward_steps
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.effect import Contacts, ContactStep, EffectCost, Stage, VoltageStep
 from eitskin.scene.forward_steps import count_costs
@@ -167,7 +169,7 @@ def test_a_plan_cannot_be_changed_and_prints_every_step() -> None:
         plan.steps = ()  # type: ignore[misc]
     text = plan.text()
     assert [name in text for name in ("mesh", "touches", "solve", "*mains", "*noise")] == [True] * 5
-    assert "in all: 2 factorisations (real" in text and "208 random/frame" in text
+    assert "in all: 1 factorisations (real" in text and "208 random/frame" in text
     assert text.index("*mains") < text.index("*noise")
     assert [step["name"] for step in plan.as_dict()["steps"]][-2:] == ["mains", "noise"]
 
@@ -256,3 +258,41 @@ def test_bad_steps_are_said_to_be_the_effects(mesh_cache: MeshCache) -> None:
                 still_scene(effects={"endless": {}}), registry=registry, mesh_cache=mesh_cache
             )
         )
+
+
+@pytest.mark.parametrize(
+    ("effects", "expected"),
+    [
+        ({}, 1),
+        ({"noise": {"snr_db": 60.0}}, 1),
+        ({"adc": {}, "noise": {"snr_db": 60.0}}, 1),
+        ({"noise": {"snr_db": 60.0}, "contact_impedance": {}}, 2),
+    ],
+)
+def test_a_moving_touch_factorises_the_untouched_skin_once(
+    effects: dict[str, Any], expected: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Counted where the matrix is factorised. With contacts the skin is another than V0's."""
+    made = []
+
+    def counted(matrix: Any) -> Any:
+        made.append(matrix.shape)
+        return factorise(matrix)
+
+    for module in (cem, forward_steps):
+        monkeypatch.setattr(module, "factorise", counted)
+    compiled = compile_scene(moving_scene(30, effects=effects, solver="update"))
+    first, second = simulate_frames(compiled), simulate_frames(compiled)
+    assert len(made) == expected + (compiled.base_factors is None)  # run twice
+    assert compiled.plan.factorisations == expected
+    assert np.array_equal(first.voltage_v, second.voltage_v)
+
+
+def test_factors_that_v0_left_give_the_updates_bits() -> None:
+    """A noise of nothing asks for V0, and changes no bit."""
+    plain = simulate_frames(compile_scene(moving_scene(12, solver="update")))
+    with_v0 = compile_scene(
+        moving_scene(12, solver="update", effects={"noise": {"noise_v": 0.0}, "adc": {}})
+    )
+    assert with_v0.base_factors is not None
+    assert np.array_equal(simulate_frames(with_v0).true_v, plain.true_v)
