@@ -46,6 +46,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Choose, say why, and write the model."""
+    from eitskin.cli.progress import bar
     from eitskin.fileio import refuse_unwritable
     from eitskin.skin.protocol import adjacent
     from eitskin.skin.skin import load_skin, paper_skin
@@ -69,7 +70,9 @@ def run(options: argparse.Namespace) -> int:
         [one for one in front.points if options.warm or not one.configuration.warm_start], target
     )
     chosen = Recommendation(point, target)
-    size = None if options.output is None else write_model(options.output, point, skin, protocol)
+    size = None
+    if options.output is not None:
+        size = write_model(options.output, point, skin, protocol, bar("random skins"))
     if options.json:
         model = None if options.output is None else str(options.output)
         facts = chosen.as_dict() | {"front": front.where_from, "model": model}

@@ -67,7 +67,7 @@ class TouchCover:
         self._corners = mesh.nodes_mm[mesh.triangles]
         self._middles = mesh.centroids_mm()
         self._reach = np.linalg.norm(self._corners - self._middles[:, None], axis=2).max(axis=1)
-        self._weights = _centres_of_parts(SUBDIVISION)
+        self._weights = centres_of_parts(SUBDIVISION)
 
     def near(self, x_mm: float, y_mm: float, reach_mm: float) -> npt.NDArray[np.int64]:
         """The elements (e,) that may lie within ``reach_mm`` of a place."""
@@ -88,7 +88,7 @@ class TouchCover:
         return np.maximum(1 + change, MIN_FACTOR)
 
 
-def _centres_of_parts(parts: int) -> FloatArray:
+def centres_of_parts(parts: int) -> FloatArray:
     """Barycentric weights (p^2, 3) of the centres of the p^2 triangles into which lines parallel to
     its sides cut a triangle."""
     upright = [(3 * i + 1, 3 * j + 1) for i in range(parts) for j in range(parts - i)]

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.fem.mesh import Mesh
+from eitskin.fem.shaped_touch import centres_of_parts
 from eitskin.scene.random_touches import TrueTouch
 
 FloatArray = npt.NDArray[np.float64]
@@ -28,7 +29,7 @@ class Cover:
         self._corners = mesh.nodes_mm[mesh.triangles]
         self._middles = mesh.centroids_mm()
         self._reach = np.linalg.norm(self._corners - self._middles[:, None], axis=2).max(axis=1)
-        self._weights = _sub_triangle_weights(subdivision)
+        self._weights = centres_of_parts(subdivision)
 
     def of(self, touch: TrueTouch) -> tuple[IntArray, FloatArray]:
         """The elements that ``touch`` meets (e,), ascending, and what part of each it covers (e,),
@@ -59,13 +60,3 @@ class Cover:
             change[elements] += part * (touch.contrast - 1.0)
         elements = np.flatnonzero(change)
         return elements, np.maximum(1.0 + change[elements], MIN_FACTOR)
-
-
-def _sub_triangle_weights(subdivision: int) -> FloatArray:
-    """Barycentric weights (s^2, 3) of the centres of the s^2 triangles that halve, third, ... a
-    triangle's sides."""
-    s = subdivision
-    upright = [(3 * i + 1, 3 * j + 1) for i in range(s) for j in range(s - i)]
-    turned = [(3 * i + 2, 3 * j + 2) for i in range(s - 1) for j in range(s - 1 - i)]
-    first = np.array(upright + turned, dtype=np.float64) / (3 * s)
-    return np.column_stack([first, 1.0 - first.sum(axis=1)])

@@ -5,12 +5,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import build_settings
 from eitskin.tuning.front import Point, Target
+
+if TYPE_CHECKING:
+    from eitskin.model.build import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +129,11 @@ def _time_line(board: str, solve_us: float, most_us: float, point: Point) -> str
     )
 
 
-def write_model(path: Path, point: Point, skin: Skin, protocol: Protocol) -> int:
+def write_model(
+    path: Path, point: Point, skin: Skin, protocol: Protocol, progress: Progress | None = None
+) -> int:
     """Build and write the model of a point for ``skin``, the solver's settings and t as its
-    defaults; returns its bytes.
+    defaults; returns its bytes. ``progress`` as ``build_model``.
 
     Raises:
         GeometryError, ProtocolError, MissingExtraError, UsageError, FileError: from building and
@@ -137,7 +142,5 @@ def write_model(path: Path, point: Point, skin: Skin, protocol: Protocol) -> int
     from eitskin.model.build import build_model
     from eitskin.model.eitm import save_model
 
-    return save_model(
-        path,
-        build_model(skin, protocol, build_settings(point.configuration, skin, point.threshold)),
-    )
+    settings = build_settings(point.configuration, skin, point.threshold)
+    return save_model(path, build_model(skin, protocol, settings, progress=progress))

@@ -47,7 +47,7 @@ def test_blocks_run(page: str, tmp_path: Path) -> None:
                     f"{page} names {command}, which cannot be run"
                 )
             continue
-        # a model's errors from 300 random skins take half a minute
+        # a model's errors from 500 random skins take half a minute
         text = text.replace("eitskin model build ", "eitskin model build --samples 4 ")
         command = ["sh", "-e", "-c", text] if language == "sh" else [sys.executable, "-c", text]
         done = subprocess.run(
