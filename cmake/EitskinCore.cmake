@@ -5,7 +5,7 @@
 set(EITSKIN_CORE_SOURCES
     base/status.c base/texts.c
     kernels/kernels.c kernels/portable.c
-    model/model.c model/options.c model/force.c model/row_form.c
+    model/model.c model/options.c model/force.c model/row_form.c model/uncertainty.c
     context/column_cache.c context/products.c
     frame/projection.c frame/reference.c frame/fold.c frame/regularisation.c frame/whitening.c
     frame/whitening_products.c
@@ -15,6 +15,7 @@ set(EITSKIN_CORE_SOURCES
     solve/active_set.c solve/violations.c solve/active_columns.c
     touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c
     touch/touch.c touch/tracker.c
+    evidence/covariance.c evidence/shape.c evidence/likelihood.c evidence/elimination.c
     api/setup.c api/access.c api/save.c api/frame_stage.c api/reference.c api/reconstruct.c
     api/touches.c api/batch.c api/self_test.c
     link/link.c)

@@ -364,7 +364,7 @@ static void row_without_reference(void)
             for (int k = 0; k < 6; ++k)
                 CHECK_EQUAL(eits_reference_add(ctx, b.reference, SMALL_ROWS), EITS_OK);
             CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
-            CHECK(ctx->reference.noise_v <= 10 * EPS);
+            CHECK(ctx->reference.noise_v <= R(1e-6) * ctx->reference.v0_rms);
         } else {
             CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         }

@@ -86,14 +86,14 @@ typedef struct eits_context eits_context;
 
 /* Bytes of the context itself, at the workspace's start; what is not arrays. Pointers and numbers
  * of whatever width; a little is left over. */
-#define EITS_CONTEXT_SIZE EITS_ALIGN16(624u + 58u * sizeof(void *) + 252u * sizeof(eits_real))
+#define EITS_CONTEXT_SIZE EITS_ALIGN16(648u + 63u * sizeof(void *) + 256u * sizeof(eits_real))
 
 /* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise
  * copies of S and of the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                   \
-    (EITS_CONTEXT_SIZE + 2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) +                       \
+    (EITS_CONTEXT_SIZE + 3 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) +                       \
      2 * EITS_ALIGN16(n_folded) + 4 * EITS_REALS(n_folded) +                                       \
-     (24 + EITS_STRIDE(rank) + (size_t)(rank) + EITS_MAX_TOUCHES) *                                \
+     (91 + EITS_STRIDE(rank) + 2 * (size_t)(rank) + EITS_MAX_TOUCHES) *                            \
          EITS_REALS(EITS_STRIDE(rank)) +                                                           \
      5 * EITS_REALS(n_pixels) + EITS_REALS(EITS_LIST(n_pixels, n_folded)) +                        \
      EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 4u) +    \

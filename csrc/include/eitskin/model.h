@@ -25,7 +25,7 @@ extern "C" {
 
 /* A file of another major version is rejected; of a later minor one, what is new is skipped. */
 #define EITS_MODEL_MAJOR          1
-#define EITS_MODEL_MINOR          2
+#define EITS_MODEL_MINOR          4
 #define EITS_MODEL_ALIGNMENT      16
 #define EITS_MAX_RANK             1024
 #define EITS_MAX_PIXELS           65535
@@ -151,6 +151,20 @@ typedef struct eits_row_form {
     float s1_square; /* |S_1|^2 */
 } eits_row_form;
 
+/* What the model itself may be wrong by (section UNCE), in reduced data: second moments found
+ * offline from skins that differ from the modelled one as real skins do
+ * (docs/reference/eitm-format.md). Each is the lower triangle of a symmetric rank x rank matrix,
+ * row after row. */
+typedef struct eits_uncertainty {
+    /* P E P', E that of (d_true - d_model) / |d_model| over touched skins, d the folded data;
+     * NULL: the model does not say what it may be wrong by, and touches are not tested */
+    const float *errors;
+    const float *drift; /* P D P', D that of the data of a sheet that drifts untouched; V^2 */
+    uint32_t row_gains; /* 1: errors are of data multiplied by row gains from the reference */
+    float errors_rms;   /* |d_true - d_model| / |d_model|, rms: skins that differ */
+    float shapes_rms;   /* the same: touches that are no discs */
+} eits_uncertainty;
+
 /* An open model. All pointers go into the blob; a caller reads it and never writes it. */
 typedef struct eits_model {
     uint32_t n_electrodes; /* electrodes that the protocol's table counts from 0 */
@@ -181,6 +195,7 @@ typedef struct eits_model {
     eits_golden golden;
     eits_force force;
     eits_row_form row_form;
+    eits_uncertainty uncertainty;
     const char *meta; /* JSON, not terminated by 0; NULL if absent */
     uint32_t meta_size;
 } eits_model;

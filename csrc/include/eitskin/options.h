@@ -128,6 +128,15 @@ typedef struct eits_options {
      * 0: as the model has it. 5 was chosen on training scenes of one to three touches, six, light
      * ones and drift, at 30 to 55 dB */
     eits_real regularisation_noise_factor;
+    /* 1: where the model says what it may be wrong by, each row's data are multiplied by what makes
+     * its reference the model's, unless the reference says that the instrument and not the sheet
+     * differs */
+    uint32_t row_gains;
+    /* 1: where the model says what it may be wrong by, a touch that such errors could have made is
+     * not reported, and near ones that could be one touch become one */
+    uint32_t touch_test;
+    /* the noise of a row is at least this, V: of a converter its step over the root of 12 */
+    eits_real noise_floor_v;
 } eits_options;
 
 /* One option: where it lies in eits_options, and its range. */

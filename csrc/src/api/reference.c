@@ -149,7 +149,10 @@ eits_status eits_reference_finish(eits_context *ctx)
     const eits_status status = fit(ctx);
     if (status != EITS_OK)
         return status;
-    b->noise_v = eits_reference_noise(ctx);
+    const eits_real noise_v = eits_reference_noise(ctx), floor_v = eits_noise_floor_v(ctx),
+                    lambda_floor = eits_lambda_noise_floor(ctx);
+    b->noise_v = noise_v > floor_v ? noise_v : floor_v;
+    b->lambda_noise = b->lambda_noise > lambda_floor ? b->lambda_noise : lambda_floor;
     b->ready = 1;
     return EITS_OK;
 }

@@ -7,6 +7,7 @@
 #include "context/context.h"
 
 #include "base/vec.h"
+#include "frame/reference.h"
 
 /* Followed by v0 and by the masked rows. The reference's pointers are of no use in it.
  *
@@ -68,6 +69,7 @@ eits_status eits_restore(eits_context *ctx, const void *memory, size_t size)
     ctx->tracker.next_id = head.next_id;
     *r = (eits_reference){.v0 = r->v0,
                           .m2 = r->m2,
+                          .row_gain = r->row_gain,
                           .count = head.count,
                           .ready = head.ready,
                           .outliers = head.outliers,
@@ -78,7 +80,7 @@ eits_status eits_restore(eits_context *ctx, const void *memory, size_t size)
                           .lambda_noise = head.lambda_noise};
     memcpy(r->v0, from, rows * sizeof r->v0[0]);
     memcpy(ctx->rows.masked, from + EITS_REALS(rows), rows);
-    ctx->projection.stale = 1;
+    eits_learn_row_gains(ctx);
     eits_forget(ctx);
     return EITS_OK;
 }

@@ -3,6 +3,7 @@
 
 #include "base/vec.h"
 #include "diagnostics/diagnostics.h"
+#include "frame/reference.h"
 #include "frame/whitening.h"
 #include "model/options.h"
 
@@ -59,6 +60,7 @@ static void lay_out_frame(eits_context *ctx, arena *a)
                  triangle = EITS_PADDED_TRIANGLE(ctx->model->rank);
     ctx->reference.v0 = take_reals(a, rows);
     ctx->reference.m2 = take_reals(a, rows);
+    ctx->reference.row_gain = take_reals(a, rows);
     ctx->rows.masked = take(a, rows);
     ctx->rows.unusable = take(a, rows);
     ctx->frame.sides = take(a, folded);
@@ -105,6 +107,11 @@ static void lay_out_touches(eits_context *ctx, arena *a)
     const size_t stride = EITS_STRIDE(ctx->model->rank);
     ctx->touch.y_separate = take_reals(a, stride);
     ctx->touch.atoms = take_reals(a, EITS_MAX_TOUCHES * stride);
+    ctx->evidence.factor = take_reals(a, ctx->model->rank * stride);
+    ctx->evidence.column = take_reals(a, EITS_EVIDENCE_COLUMNS * stride);
+    ctx->evidence.data = take_reals(a, stride);
+    ctx->evidence.left = take_reals(a, stride);
+    ctx->evidence.gain_drift = take_reals(a, stride);
 }
 
 static void lay_out_columns(eits_context *ctx, arena *a)
@@ -181,7 +188,10 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
     if (o->project_reference != ctx->options.project_reference ||
         o->regularisation_noise_factor != ctx->options.regularisation_noise_factor)
         ctx->projection.stale = 1;
+    const int row_gains = o->row_gains != ctx->options.row_gains;
     ctx->options = *o;
+    if (row_gains && ctx->reference.ready)
+        eits_learn_row_gains(ctx);
     return EITS_OK;
 }
 

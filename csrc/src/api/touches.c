@@ -10,6 +10,7 @@
 #include "api/stages.h"
 #include "context/context.h"
 #include "diagnostics/diagnostics.h"
+#include "evidence/evidence.h"
 #include "touch/disc_fit.h"
 #include "touch/tracker.h"
 
@@ -34,6 +35,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     ctx->info.unexplained = 0;
     if (may_have_touches(ctx)) {
         eits_fit_touches(ctx, scratch, &f);
+        eits_test_touches(ctx, scratch, &f);
         ctx->info.unexplained = f.total > 0 ? eits_fit_left(ctx, &f) / f.total : 0;
     }
     const uint32_t finite = eits_report_touches(ctx, &f, found);

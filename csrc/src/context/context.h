@@ -18,10 +18,17 @@ enum { EITS_SCRATCH_ROWS = 8, EITS_SCRATCH_PIXELS = 3 };
 typedef struct eits_reference {
     /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them */
     eits_real *v0;
+    /* n_rows: what a row's data are multiplied by beside the gain; 1 where row gains are not in
+     * force */
+    eits_real *row_gain;
     uint32_t count; /* reference frames that are in v0 */
     uint32_t ready; /* 1: frames can be measured against it */
     eits_real v0_rms;
     eits_real gain;
+    /* how far v0 is from the model: rms over folds of log(gain v0 / v_ref); and, over its own rms,
+     * what rows differ by from their reciprocals */
+    eits_real distance, reciprocity;
+    uint32_t row_gains; /* 1: in force */
     eits_real correlation;
     eits_real noise_v;
     eits_real lambda_noise;
@@ -142,6 +149,21 @@ typedef struct eits_touch_memory {
     eits_real *y_separate; /* stride: y less the touches' interaction */
 } eits_touch_memory;
 
+/* Columns that the test of touches has room for: eight parameters each of eight touches, four each
+ * of sixteen. */
+enum { EITS_EVIDENCE_COLUMNS = 64 };
+
+/* Memory of the test of touches. Written by evidence. */
+typedef struct eits_evidence {
+    eits_real *factor; /* rank x stride: L, Sigma = L L' */
+    /* EITS_EVIDENCE_COLUMNS x stride: L^-1 times what each parameter moves the data by */
+    eits_real *column;
+    eits_real *data;       /* stride: L^-1 y */
+    eits_real *left;       /* stride: L^-1 of what the touches leave of y */
+    eits_real *gain_drift; /* stride: L^-1 of the projection's direction, of length 1 */
+    uint32_t drifts;       /* 1: it is in force */
+} eits_evidence;
+
 /* A touch that is followed (touch/tracker.h). */
 typedef struct eits_followed {
     eits_touch touch;       /* as reported; id 0: not yet */
@@ -187,6 +209,7 @@ struct eits_context {
     eits_range range;
     eits_solve_state solver;
     eits_touch_memory touch;
+    eits_evidence evidence;
     eits_tracker tracker;
     eits_scratch scratch;
 };

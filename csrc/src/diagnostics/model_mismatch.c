@@ -52,17 +52,16 @@ static uint64_t learn_off_range(eits_context *ctx, const eits_scratch *scratch)
 eits_real eits_noise_energy(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
-    const eits_real one = b->gain * b->noise_v * (b->gain * b->noise_v);
     eits_real sum = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         if (ctx->frame.sides[k] == EITS_SIDE_NONE) /* it may have no reference at all */
             continue;
-        const eits_real v0 =
-            b->v0[ctx->frame.sides[k] == EITS_SIDE_SECOND ? ctx->model->fold[k].second
-                                                          : ctx->model->fold[k].first];
-        const eits_real each = ctx->model->data_kind == EITS_DATA_NORMALISED
-                                   ? b->noise_v / v0 * (b->noise_v / v0)
-                                   : one;
+        const uint32_t i = ctx->frame.sides[k] == EITS_SIDE_SECOND ? ctx->model->fold[k].second
+                                                                   : ctx->model->fold[k].first;
+        const eits_real noise = ctx->model->data_kind == EITS_DATA_NORMALISED
+                                    ? b->noise_v / b->v0[i]
+                                    : b->gain * b->noise_v * b->row_gain[i];
+        const eits_real each = noise * noise;
         sum += ctx->frame.sides[k] == EITS_SIDE_BOTH && ctx->frame.reciprocity_error[k] != 0
                    ? R(0.5) * each
                    : each;

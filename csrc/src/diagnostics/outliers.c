@@ -70,7 +70,8 @@ static eits_real max_by_noise(const eits_context *ctx, uint32_t k)
 {
     const eits_reference *b = &ctx->reference;
     if (ctx->model->data_kind != EITS_DATA_NORMALISED)
-        return EITS_OUTLIER_NOISE * eits_sqrt(R(2.0)) * eits_fabs(b->gain) * b->noise_v;
+        return EITS_OUTLIER_NOISE * eits_sqrt(R(2.0)) * eits_fabs(b->gain) * b->noise_v *
+               b->row_gain[ctx->model->fold[k].first];
     const eits_real first = b->noise_v / b->v0[ctx->model->fold[k].first],
                     second = b->noise_v / b->v0[ctx->model->fold[k].second];
     return EITS_OUTLIER_NOISE * eits_sqrt(eits_fma(first, first, second * second));

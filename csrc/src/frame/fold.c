@@ -36,19 +36,19 @@ static eits_real log_datum(const eits_context *ctx, eits_real v, eits_real v0)
     return ctx->reference.gain * v0 * eits_log(q < low ? low : (q > high ? high : q));
 }
 
-/* The datum of one row from its voltage and its reference, in model volts (or without unit where
- * normalised). */
-static eits_real datum(const eits_context *ctx, eits_real v, eits_real v0)
+/* The datum of row i from its voltage, in model volts (or without unit where normalised). */
+static eits_real datum(const eits_context *ctx, uint32_t i, eits_real v)
 {
+    const eits_real v0 = ctx->reference.v0[i], own = ctx->reference.row_gain[i];
     switch (ctx->model->data_kind) {
     case EITS_DATA_DIFFERENCE:
         break;
     case EITS_DATA_NORMALISED:
         return (v - v0) / v0;
     case EITS_DATA_LOG_RATIO:
-        return log_datum(ctx, v, v0);
+        return own * log_datum(ctx, v, v0);
     }
-    return ctx->reference.gain * (v - v0);
+    return own * (ctx->reference.gain * (v - v0));
 }
 
 /* Rows whose reference is all but zero say nothing as a ratio. */
@@ -60,12 +60,13 @@ static int ratio_undefined(const eits_context *ctx, eits_real v0)
 
 /* A row and its reciprocal that differ by less than rounding of their references agree: quantised
  * voltages often do. */
-static int exceeds_rounding(const eits_context *ctx, eits_real difference, eits_real v0)
+static int exceeds_rounding(const eits_context *ctx, eits_real difference, uint32_t i)
 {
+    const eits_real in_model_volts =
+        ctx->reference.gain * ctx->reference.v0[i] * ctx->reference.row_gain[i];
     return eits_fabs(difference) >
-           EITS_FOLD_ROUNDING * (ctx->model->data_kind == EITS_DATA_NORMALISED
-                                     ? 1
-                                     : eits_fabs(ctx->reference.gain * v0));
+           EITS_FOLD_ROUNDING *
+               (ctx->model->data_kind == EITS_DATA_NORMALISED ? 1 : eits_fabs(in_model_volts));
 }
 
 /* d_k: the mean of a row and its reciprocal, or whichever is usable; reciprocity_error_k: their
@@ -86,16 +87,15 @@ void eits_fold_data(eits_context *ctx, const eits_real *frame)
              * way round do */
             const int turn =
                 side == 1 && fold.sign < 0 && ctx->model->data_kind != EITS_DATA_NORMALISED;
-            const eits_real measured = datum(ctx, frame[i], v0[i]),
-                            value = turn ? -measured : measured;
+            const eits_real measured = datum(ctx, i, frame[i]), value = turn ? -measured : measured;
             difference = sum - value;
             sum += value;
             used |= (uint8_t)(side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND);
         }
         ctx->frame.d[k] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
         ctx->frame.reciprocity_error[k] =
-            used == EITS_SIDE_BOTH && exceeds_rounding(ctx, difference, v0[fold.first]) ? difference
-                                                                                        : 0;
+            used == EITS_SIDE_BOTH && exceeds_rounding(ctx, difference, fold.first) ? difference
+                                                                                    : 0;
         ctx->projection.stale |= used != ctx->frame.sides[k];
         ctx->frame.sides[k] = used;
     }
@@ -135,6 +135,12 @@ static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)
     return macs + 2u * rank;
 }
 
+/* Row i's reference times its own gain. */
+static eits_real scaled_reference(const eits_context *ctx, uint32_t i)
+{
+    return ctx->reference.row_gain[i] * ctx->reference.v0[i];
+}
+
 /* The reduced direction along which drift of the gain moves the data: the reference, folded as the
  * data are. */
 static uint64_t drift_direction(eits_context *ctx, const eits_scratch *scratch, eits_real *out)
@@ -143,9 +149,9 @@ static uint64_t drift_direction(eits_context *ctx, const eits_scratch *scratch, 
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
         const uint8_t used = ctx->frame.sides[k];
-        const eits_real first = used & EITS_SIDE_FIRST ? ctx->reference.v0[fold.first] : 0;
+        const eits_real first = used & EITS_SIDE_FIRST ? scaled_reference(ctx, fold.first) : 0;
         const eits_real second =
-            used & EITS_SIDE_SECOND ? (eits_real)fold.sign * ctx->reference.v0[fold.second] : 0;
+            used & EITS_SIDE_SECOND ? (eits_real)fold.sign * scaled_reference(ctx, fold.second) : 0;
         const eits_real along =
             ctx->reference.gain *
             (used == EITS_SIDE_BOTH ? R(0.5) * (first + second) : first + second);
@@ -219,8 +225,9 @@ uint64_t eits_reduce_log(eits_context *ctx, const eits_scratch *scratch, const e
             const uint32_t i = side == 0 ? fold.first : fold.second;
             if (!(used & (side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND)))
                 continue;
-            const eits_real value = eits_fabs(v0[i]) < min ? datum(ctx, frame[i], v0[i])
-                                                           : log_datum(ctx, frame[i], v0[i]);
+            const eits_real value = eits_fabs(v0[i]) < min ? datum(ctx, i, frame[i])
+                                                           : ctx->reference.row_gain[i] *
+                                                                 log_datum(ctx, frame[i], v0[i]);
             sum += side == 1 && fold.sign < 0 ? -value : value;
         }
         scratch->index[count] = k;

@@ -16,7 +16,19 @@
  * vanishes. NaN in v0 marks a row without a reference. */
 #include "frame/reference.h"
 
+#include "base/log.h"
 #include "base/vec.h"
+
+/* of v0_rms: what rounding of the frames' own numbers leaves, in float32 and so in any width */
+static const eits_real ROUNDING = R(0x1p-22);
+/* max(S'y) of white noise over noise_gain, the deviation of the pixel that hears it most */
+static const eits_real MAX_OF_NOISE = R(3.5);
+/* Row gains: no row's data are made more than this larger or smaller. */
+static const eits_real MAX_ROW_GAIN = R(3.0);
+/* Beyond this distance of the reference from the model (rms of the logarithm of their ratio), or
+ * this difference of reciprocal rows over the reference's rms, it is not the sheet that is uneven
+ * but the instrument that disagrees, and row gains would do harm. */
+static const eits_real MAX_DISTANCE = R(0.28), MAX_RECIPROCITY = R(0.1);
 
 /* A reference frame must be whole: rows that cannot be used are to be masked first. */
 eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real *frame,
@@ -50,6 +62,73 @@ static eits_real folded_reference(const eits_context *ctx, eits_fold fold)
     const int first = has_reference(ctx, fold.first), second = has_reference(ctx, fold.second);
     const eits_real turned = second ? (eits_real)fold.sign * v0[fold.second] : 0;
     return first && second ? R(0.5) * (v0[fold.first] + turned) : (first ? v0[fold.first] : turned);
+}
+
+/* The gain that makes row i's reference the model's `expected`; 1 where their signs differ. */
+static eits_real own_gain(const eits_context *ctx, uint32_t i, eits_real expected)
+{
+    const eits_real measured = ctx->reference.gain * ctx->reference.v0[i],
+                    ratio = expected / measured;
+    if (!(ratio > 0) || !eits_is_finite(ratio))
+        return 1;
+    return ratio > MAX_ROW_GAIN ? MAX_ROW_GAIN
+                                : (ratio < 1 / MAX_ROW_GAIN ? 1 / MAX_ROW_GAIN : ratio);
+}
+
+/* How far the reference is from the model, and its rows from their reciprocals. */
+static void measure_distance(eits_context *ctx)
+{
+    const eits_model *model = ctx->model;
+    eits_reference *b = &ctx->reference;
+    eits_real logs = 0, apart = 0;
+    uint32_t count = 0, pairs = 0;
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        const eits_fold fold = model->fold[k];
+        const int first = has_reference(ctx, fold.first), second = has_reference(ctx, fold.second);
+        if (!first && !second)
+            continue;
+        const eits_real expected = (eits_real)model->v_ref[k],
+                        gain = first ? own_gain(ctx, fold.first, expected)
+                                     : own_gain(ctx, fold.second, (eits_real)fold.sign * expected),
+                        log_gain = eits_log(gain);
+        logs = eits_fma(log_gain, log_gain, logs);
+        ++count;
+        if (!first || !second)
+            continue;
+        const eits_real difference =
+            (b->v0[fold.first] - (eits_real)fold.sign * b->v0[fold.second]) / b->v0_rms;
+        apart = eits_fma(difference, difference, apart);
+        ++pairs;
+    }
+    b->distance = count > 0 ? eits_sqrt(logs / (eits_real)count) : 0;
+    b->reciprocity = pairs > 0 ? eits_sqrt(apart / (eits_real)pairs) : 0;
+}
+
+/* Row gains: what makes the reference the model's own, row by row.
+ *
+ * A sheet that is uneven changes the field of each drive and measuring pair alike for the reference
+ * and for what a touch adds; so the ratio that the reference shows is, to first order, the ratio
+ * that the data have, and dividing it out leaves data of the modelled sheet. Where the instrument
+ * differs from the model (another order, channels of their own gain, contacts), it is not. */
+void eits_learn_row_gains(eits_context *ctx)
+{
+    const eits_model *model = ctx->model;
+    eits_reference *b = &ctx->reference;
+    measure_distance(ctx);
+    b->row_gains = ctx->options.row_gains != 0 && model->uncertainty.row_gains != 0 &&
+                   model->data_kind != EITS_DATA_NORMALISED && b->distance <= MAX_DISTANCE &&
+                   b->reciprocity <= MAX_RECIPROCITY;
+    for (uint32_t i = 0; i < model->n_rows; ++i)
+        b->row_gain[i] = 1;
+    for (uint32_t k = 0; b->row_gains && k < model->n_folded; ++k) {
+        const eits_fold fold = model->fold[k];
+        const eits_real expected = (eits_real)model->v_ref[k];
+        if (has_reference(ctx, fold.first))
+            b->row_gain[fold.first] = own_gain(ctx, fold.first, expected);
+        if (has_reference(ctx, fold.second))
+            b->row_gain[fold.second] = own_gain(ctx, fold.second, (eits_real)fold.sign * expected);
+    }
+    ctx->projection.stale = 1;
 }
 
 /* Set gain, correlation and v0_rms from v0; a scale is taken out first so that squares neither
@@ -90,7 +169,10 @@ eits_status eits_fit_reference(eits_context *ctx)
     if (b->correlation < 0)
         b->gain = -b->gain;
     ctx->projection.stale = 1;
-    return eits_is_finite(b->gain) && b->gain != 0 ? EITS_OK : EITS_E_FRAME_ZERO;
+    if (!eits_is_finite(b->gain) || b->gain == 0)
+        return EITS_E_FRAME_ZERO;
+    eits_learn_row_gains(ctx);
+    return EITS_OK;
 }
 
 /* The greatest power of two up to the greatest voltage in use, within what has an inverse.
@@ -127,6 +209,22 @@ eits_real eits_reference_noise(const eits_context *ctx)
     const eits_real noise_v =
         used > 0 ? b->m2_unit * eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
     return eits_is_finite(noise_v) ? noise_v : 0;
+}
+
+/* Frames that were rounded, or measured in steps without noise, may repeat to the last bit: that is
+ * no sign of a noiseless front end. */
+eits_real eits_noise_floor_v(const eits_context *ctx)
+{
+    const eits_real rounding = ROUNDING * ctx->reference.v0_rms;
+    return ctx->options.noise_floor_v > rounding ? ctx->options.noise_floor_v : rounding;
+}
+
+eits_real eits_lambda_noise_floor(const eits_context *ctx)
+{
+    const eits_real noise = ctx->model->data_kind == EITS_DATA_NORMALISED
+                                ? eits_noise_floor_v(ctx) / ctx->reference.v0_rms
+                                : eits_noise_floor_v(ctx) * eits_fabs(ctx->reference.gain);
+    return MAX_OF_NOISE * (eits_real)ctx->model->noise_gain * noise;
 }
 
 /* Take one more frame into the mean and the squares; rows that were masked lose their reference. */

@@ -13,11 +13,21 @@ eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real 
 /* Set gain, correlation and v0_rms from v0; the basis is stale then. Errors: EITS_E_FRAME_ZERO. */
 eits_status eits_fit_reference(eits_context *ctx);
 
+/* reference.row_gain, distance and reciprocity from v0 and the gain, as the options ask; the basis
+ * is stale then. */
+void eits_learn_row_gains(eits_context *ctx);
+
 /* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
 eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame);
 
 /* The rms over rows of the frames' deviation, so far; 0 where it is out of range. */
 eits_real eits_reference_noise(const eits_context *ctx);
+
+/* The least noise of a row, V: the option's, or what rounding leaves. */
+eits_real eits_noise_floor_v(const eits_context *ctx);
+
+/* max(S'y) of that, with all rows in use. */
+eits_real eits_lambda_noise_floor(const eits_context *ctx);
 
 /* Take one more frame into the mean and the squares; rows that were masked lose their reference. */
 void eits_take_reference_frame(eits_context *ctx, const eits_real *frame);

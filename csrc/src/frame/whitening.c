@@ -3,6 +3,8 @@
 #include "base/vec.h"
 #include "frame/constants.h"
 #include "frame/projection.h"
+#include "frame/reference.h"
+#include "frame/regularisation.h"
 #include "frame/triangle.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"
@@ -186,6 +188,14 @@ static uint64_t measure_noise(eits_context *ctx, const eits_scratch *scratch)
 eits_real eits_lambda_noise(const eits_context *ctx)
 {
     return ctx->whitening.noise_ratio * ctx->reference.lambda_noise;
+}
+
+/* One reference frame tells no noise, but its rounding is known. */
+eits_real eits_detection_threshold(const eits_context *ctx)
+{
+    const eits_real least = eits_lambda_noise_floor(ctx), learned = ctx->reference.lambda_noise;
+    return ctx->options.detection_factor * ctx->whitening.noise_ratio *
+           (learned > least ? learned : least);
 }
 
 /* No row is left out: the regularisation alone may differ.

@@ -23,6 +23,10 @@ uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch);
 /* lambda_noise for the rows in use. */
 eits_real eits_lambda_noise(const eits_context *ctx);
 
+/* max(S'y) of a frame, or of a touch, below which there is none: options.detection_factor times
+ * lambda_noise, or the floor of noise where that is more. */
+eits_real eits_detection_threshold(const eits_context *ctx);
+
 /* While whitening.form: P d of the rows in use (stride numbers) becomes the data that F S x
  * is to meet. */
 uint64_t eits_whiten_data(eits_context *ctx, eits_real *v);

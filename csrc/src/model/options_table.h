@@ -36,6 +36,9 @@ static const eits_option OPTIONS[] = {
     OPTION(track_hold, 1, 0, EITS_MAX_TRACK_FRAMES),
     OPTION(track_smooth, 0, 0, 1e30f),
     OPTION(regularisation_noise_factor, 0, 0, 1e30f),
+    OPTION(row_gains, 1, 0, 1),
+    OPTION(touch_test, 1, 0, 1),
+    OPTION(noise_floor_v, 0, 0, 1e30f),
 };
 #undef OPTION
 
@@ -74,6 +77,9 @@ static eits_options usual_options(const eits_defaults *d)
         .track_hold = (uint32_t)0,
         .track_smooth = (eits_real)0,
         .regularisation_noise_factor = (eits_real)5,
+        .row_gains = (uint32_t)1,
+        .touch_test = (uint32_t)1,
+        .noise_floor_v = (eits_real)0,
     };
 }
 /* clang-format on */

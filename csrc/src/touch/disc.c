@@ -125,12 +125,19 @@ static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *va
 /* The cover changes where the rim of the disc lies within a pixel: there its derivative by the
  * distance of the centre is -1 a pixel, and by the radius 1; elsewhere 0. So the slopes need no
  * second look at the cells. */
-uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
-                        eits_real *atom, eits_real *const *slope)
+uint64_t eits_disc_shape(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
+                         eits_real *atom, eits_real *const *slope, eits_real *const *edge)
 {
     covered c = cover(ctx, scratch, disc);
     weigh(ctx, &c);
     uint64_t macs = respond(ctx, &c, c.cover, atom);
+    for (uint32_t part = 0; edge != NULL && part < 2; ++part) {
+        for (uint32_t k = 0; k < c.count; ++k) {
+            const eits_real x = c.toward_x[k], y = c.toward_y[k];
+            c.cover[k] = c.ramp[k] * (part == 0 ? eits_fma(x, x, -(y * y)) : 2 * x * y);
+        }
+        macs += respond(ctx, &c, c.cover, edge[part]);
+    }
     if (slope == NULL)
         return macs;
     for (uint32_t k = 0; k < c.count; ++k) {
@@ -141,6 +148,12 @@ uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const ei
     macs += respond(ctx, &c, c.toward_y, slope[1]);
     macs += respond(ctx, &c, c.ramp, slope[2]);
     return macs;
+}
+
+uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
+                        eits_real *atom, eits_real *const *slope)
+{
+    return eits_disc_shape(ctx, scratch, disc, atom, slope, NULL);
 }
 
 /* A weighted mean, so the column weights of S do not enter. A disc that covers nothing has sum 0

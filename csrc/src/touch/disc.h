@@ -19,6 +19,12 @@ typedef struct eits_disc {
 uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
                         eits_real *atom, eits_real *const *slope);
 
+/* The same, and with `edge` not NULL in its two arrays the derivatives by how much further out the
+ * rim lies, in mm, times cos and sin of twice the angle: an ellipse of the same area, to first
+ * order. */
+uint64_t eits_disc_shape(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
+                         eits_real *atom, eits_real *const *slope, eits_real *const *edge);
+
 /* The model's fields (eits_fields), averaged over the disc's covers: `field` has fields.at.stride
  * numbers, zeros where no pixel is covered.
  * Returns the multiply-accumulates. */

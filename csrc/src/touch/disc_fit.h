@@ -9,6 +9,13 @@ typedef struct eits_fit {
     eits_disc disc[EITS_MAX_TOUCHES];
     /* what leaving it out would add to |residual|^2, relative to |y|^2 */
     eits_real explained[EITS_MAX_TOUCHES];
+    /* the test of touches (evidence/elimination.c): 1 where it was made */
+    uint32_t tested;
+    /* minus twice the logarithm of the ratio of likelihoods without and with the disc, over the
+     * data's own misfit where that is more than noise */
+    eits_real rise[EITS_MAX_TOUCHES];
+    /* covariance of x and y: xx, xy, yy, mm^2 */
+    eits_real place_mm2[EITS_MAX_TOUCHES][3];
     const eits_real *data; /* stride: what the discs are to explain */
     eits_real *residual;   /* stride, row 0 of the scratch: what they leave of it */
     eits_real total;       /* |y|^2 */
@@ -59,11 +66,19 @@ void eits_fit_move(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, 
 void eits_fit_move_all(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
                        uint32_t sweeps);
 
-/* prune.c: drop the weakest while it explains too little or does not stand out of the noise; the
+/* prune.c */
+
+/* f->explained from the atoms and strengths as they are. */
+void eits_fit_explain(eits_context *ctx, eits_fit *f);
+
+/* Drop the weakest while it explains too little or does not stand out of the noise; the
  * others take up what it leaves. */
 void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* split_merge.c */
+
+/* One disc in the place of two, of their area. Its strength is not set. */
+eits_disc eits_merged_disc(const eits_options *o, const eits_disc *a, const eits_disc *b);
 
 /* Overlapping or nearly touching discs become one where that explains as much. Returns 1 where any
  * did. */

@@ -56,7 +56,7 @@ int eits_has_interaction(const eits_context *ctx)
  *
  * The covers fall from 1 to 0 over one pixel across the rim; their integral over the plane is
  * pi (r^2 + pixel^2 / 12): eits_disc_area away from the edge of the skin, without its walk. */
-static eits_real moment(const eits_context *ctx, const eits_disc *disc)
+eits_real eits_disc_moment(const eits_context *ctx, const eits_disc *disc)
 {
     const eits_real pixel = (eits_real)ctx->model->pixel_mm;
     return disc->change * PI * eits_fma(disc->radius_mm, disc->radius_mm, pixel * pixel / 12);
@@ -74,7 +74,7 @@ static void add_induced(const eits_context *ctx, const eits_disc *i, const eits_
 {
     const uint32_t electrodes = ctx->model->n_electrodes;
     /* The dipole of disc j, per unit of the field that it lies in. */
-    const eits_real s = moment(ctx, j) * (eits_real)ctx->model->fields.per_sheet;
+    const eits_real s = eits_disc_moment(ctx, j) * (eits_real)ctx->model->fields.per_sheet;
     const eits_real *mirror = source + 2 * (size_t)electrodes;
     const complex_number z = {i->x_mm, i->y_mm}, apart = {i->x_mm - j->x_mm, i->y_mm - j->y_mm};
     const complex_number b_z = product((complex_number){mirror[2], mirror[3]}, z);
@@ -105,7 +105,7 @@ static void answer(const eits_context *ctx, const eits_disc *i, const eits_real 
     const uint32_t electrodes = ctx->model->n_electrodes;
     /* By reciprocity: what the pair measures of a change is the field of the drive times that of
      * the measuring pair, if that carried the current. */
-    const eits_real factor = -((eits_real)ctx->model->fields.volts * moment(ctx, i));
+    const eits_real factor = -((eits_real)ctx->model->fields.volts * eits_disc_moment(ctx, i));
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
         const eits_real x = induced[row[0]] - induced[row[1]],

@@ -18,6 +18,9 @@
  * are differences, the option asks for it. */
 int eits_has_interaction(const eits_context *ctx);
 
+/* S/m mm^2: what the disc adds to a dipole's strength, its change integrated over its soft edge. */
+eits_real eits_disc_moment(const eits_context *ctx, const eits_disc *disc);
+
 /* `data` (stride numbers) = frame.y less what the interaction of the discs adds to it, so that
  * the discs' own answers are left. Returns the
  * multiply-accumulates.

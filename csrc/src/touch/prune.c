@@ -19,7 +19,7 @@
 
 /* What each disc alone explains: change^2 / (G^-1)_kk of the atoms' Gram matrix G, by Cholesky and
  * its inverse. */
-static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
+void eits_fit_explain(eits_context *ctx, eits_fit *f)
 {
     const uint32_t rank = ctx->model->rank, n = f->count;
     eits_real l[EITS_MAX_TOUCHES][EITS_MAX_TOUCHES] = {{0}}, norm[EITS_MAX_TOUCHES];
@@ -70,7 +70,7 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
  * noise beside it over the threshold. */
 static int stands_out(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
-    const eits_real min = ctx->options.detection_factor * eits_lambda_noise(ctx);
+    const eits_real min = eits_detection_threshold(ctx);
     const uint32_t rank = ctx->model->rank;
     if (!(min > 0))
         return 1;
@@ -120,7 +120,7 @@ void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     /* One at a time: when the weakest is gone the others may explain more. */
     while (f->count > 0) {
-        leave_one_out_gains(ctx, f);
+        eits_fit_explain(ctx, f);
         uint32_t weakest = 0;
         for (uint32_t k = 1; k < f->count; ++k)
             weakest = f->explained[k] < f->explained[weakest] ? k : weakest;

@@ -91,7 +91,7 @@ static int next_pair(const eits_fit *f, const pair *last, pair *next)
 }
 
 /* One disc in the middle of both, weighted by strength, of their area. */
-static eits_disc merged(const eits_options *o, const eits_disc *a, const eits_disc *b)
+eits_disc eits_merged_disc(const eits_options *o, const eits_disc *a, const eits_disc *b)
 {
     const eits_real of_a = eits_fabs(a->change) * a->radius_mm * a->radius_mm,
                     of_b = eits_fabs(b->change) * b->radius_mm * b->radius_mm;
@@ -114,7 +114,7 @@ static int try_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
 {
     const uint32_t rank = ctx->model->rank;
     const saved before = save(ctx, f);
-    f->disc[p->i] = merged(&ctx->options, &f->disc[p->i], &f->disc[p->j]);
+    f->disc[p->i] = eits_merged_disc(&ctx->options, &f->disc[p->i], &f->disc[p->j]);
     --f->count;
     for (uint32_t k = p->j; k < f->count; ++k)
         f->disc[k] = f->disc[k + 1u];

@@ -103,6 +103,15 @@ class OptionFields:
     # 0: as the model has it. 5 was chosen on training scenes of one to three touches, six, light
     # ones and drift, at 30 to 55 dB
     regularisation_noise_factor: float = 5.0
+    # 1: where the model says what it may be wrong by, each row's data are multiplied by what makes
+    # its reference the model's, unless the reference says that the instrument and not the sheet
+    # differs
+    row_gains: bool = True
+    # 1: where the model says what it may be wrong by, a touch that such errors could have made is
+    # not reported, and near ones that could be one touch become one
+    touch_test: bool = True
+    # the noise of a row is at least this, V: of a converter its step over the root of 12
+    noise_floor_v: float = 0.0
 
 
 # Least and greatest value of each option that is a number.
@@ -133,6 +142,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "track_hold": (0, MAX_TRACK_FRAMES),
     "track_smooth": (0, 1e30),
     "regularisation_noise_factor": (0, 1e30),
+    "noise_floor_v": (0, 1e30),
 }
 # The names that an option may have, in the order of their numbers.
 CHOICES = {

@@ -19,6 +19,7 @@ ROOMS = (
     "diagnostics",
     "solve",
     "touch",
+    "evidence",
     "api",
 )
 APART = {"link": ("base", "link")}  # knows nothing of contexts
@@ -32,6 +33,7 @@ OWNERS = {
     "range": {"diagnostics"},
     "solver": {"solve"},
     "touch": {"touch"},
+    "evidence": {"evidence"},
     "tracker": {"touch"},
     "columns": {"context"},
     "options": set(),

@@ -378,6 +378,9 @@ BAD_OPTIONS = [
     ({"track_hold": 1001}, "track_hold"),
     ({"track_smooth": float("nan")}, "track_smooth"),
     ({"regularisation_noise_factor": -0.5}, "regularisation_noise_factor"),
+    ({"row_gains": 2}, "row_gains"),
+    ({"touch_test": -1}, "touch_test"),
+    ({"noise_floor_v": float("nan")}, "noise_floor_v"),
     ({"iteration": 5}, "'iteration' is unknown; did you mean 'iterations'"),
 ]
 

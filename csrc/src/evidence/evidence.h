@@ -1,0 +1,86 @@
+/* Which of the fitted discs are touches, given what the model itself may be wrong by.
+ *
+ * Data y of n discs are y = sum of their answers + e, e normal with covariance
+ *
+ *     Sigma = N + SHARE |d|^2 E (+ D)
+ *
+ * N the noise, E and D the model's own errors (eits_uncertainty), |d| the folded data's size: an
+ * uneven sheet or a finger that is no disc errs in proportion to what it answers. With
+ *
+ *     F = min |L^-1 (y - answers)|^2 + priors of radii and shapes,    Sigma = L L'
+ *
+ * minus twice the log-likelihood of the best n discs, a disc is kept where F rises by more than a
+ * threshold without it: a likelihood-ratio test. */
+#ifndef EITSKIN_EVIDENCE_H
+#define EITSKIN_EVIDENCE_H
+
+#include "touch/disc_fit.h"
+
+/* What a disc's parameters are, in this order: strength (relative), x, y (pixels), radius (over
+ * the fitted one), two of an ellipse's edge and two of its dipole. */
+enum { EITS_PLACE_PARAMETERS = 4, EITS_EDGE_PARAMETERS = 6, EITS_SHAPE_PARAMETERS = 8 };
+
+/* One answer to how many touches there are. */
+typedef struct eits_answer {
+    eits_disc disc[EITS_MAX_TOUCHES];
+    eits_real radius_mm[EITS_MAX_TOUCHES]; /* about which the prior holds the radius */
+    /* how much of each edge and dipole term there is */
+    eits_real shape[EITS_MAX_TOUCHES][EITS_SHAPE_PARAMETERS - EITS_PLACE_PARAMETERS];
+    uint32_t count;
+    uint32_t parameters; /* of each disc */
+    eits_real misfit;    /* F */
+} eits_answer;
+
+/* covariance.c */
+
+/* L for this frame; 0 where there is none: the model does not say what it may be wrong by, or rows
+ * are left out of the frame. *log_determinant is that of Sigma, *drift says whether D is in it. */
+int eits_factor_covariance(eits_context *ctx, int drift, eits_real *log_determinant,
+                           uint64_t *macs);
+
+/* v = L^-1 v (stride numbers), the gain's drift taken out. */
+uint64_t eits_whiten_errors(const eits_context *ctx, eits_real *v);
+
+/* shape.c */
+
+/* How many parameters each of `count` discs gets. */
+uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count);
+
+/* evidence.column of disc k of the answer, L^-1 applied, each times the disc's change; and
+ * evidence.left less what the disc answers. */
+uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
+                            const eits_answer *answer, uint32_t k);
+
+/* likelihood.c */
+
+/* What one linearisation of F tells: scratch->square has the inverse of its matrix. */
+typedef struct eits_likelihood {
+    eits_real here;  /* F of the discs as they are */
+    eits_real least; /* at the linearisation's minimum */
+    uint32_t count;  /* parameters of all discs */
+    eits_real step[EITS_EVIDENCE_COLUMNS];
+} eits_likelihood;
+
+/* Linearise F about the answer: evidence.column, evidence.left and scratch->square. */
+uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
+                        eits_likelihood *out);
+
+/* What F rises by without disc k, by the linearisation. */
+eits_real eits_linear_rise(const eits_scratch *scratch, const eits_answer *answer,
+                           const eits_likelihood *likelihood, uint32_t k);
+
+/* Leave disc k out of the linearisation: least, step and the inverse of the others become what they
+ * are without it; its own are of no use any more, nor are its columns. */
+uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
+                          eits_likelihood *likelihood, uint32_t k);
+
+/* Gauss and Newton's steps until F no longer falls, three at most; sets answer->misfit. */
+uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer);
+
+/* elimination.c */
+
+/* Drop and merge discs of `f` that the model's errors could have made; sets what is known of each
+ * that stays. */
+void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
+
+#endif

@@ -1,0 +1,242 @@
+/* F, its linearisation about discs, and the discs that make it least.
+ *
+ * With columns C = L^-1 dy/dparameter, what is left b = L^-1 (y - answers) and prior precisions H,
+ * F about the discs is |b - C s|^2 + (t + s)'H (t + s) for a step s from parameters that are t off
+ * their prior's middle: A = C'C + H, s = A^-1 (C'b - H t). One inverse of A (at most 64 x 64) tells
+ * the step, what F would be without each disc (a Schur complement), and how well each place is
+ * known. */
+#include "evidence/evidence.h"
+
+#include "base/vec.h"
+#include "kernels/kernels.h"
+
+/* Precision of strength and place: none, but for what rounding needs. */
+static const eits_real FREE = R(1e-4);
+/* of a diagonal element: what rounding may leave of a pivot */
+static const eits_real MIN_PIVOT = R(1e-5);
+/* Farthest steps: of the strength, down and up; of the place and the radius, in pixels. */
+static const eits_real LEAST_CHANGE = R(-0.5), MOST_CHANGE = R(1.0), MAX_MOVE = R(1.0),
+                       MAX_RADIUS_MOVE = R(0.5);
+enum { STEPS = 3 };
+
+typedef eits_real block[EITS_SHAPE_PARAMETERS][EITS_SHAPE_PARAMETERS];
+
+/* 1 / deviation^2 of a parameter's prior: radius and edge terms .3, dipole terms .2, relatively. */
+static eits_real precision(uint32_t parameter)
+{
+    static const eits_real of[EITS_SHAPE_PARAMETERS] = {
+        0, 0, 0, R(11.111111), R(11.111111), R(11.111111), R(25.0), R(25.0)};
+    return parameter < EITS_PLACE_PARAMETERS - 1 ? FREE : of[parameter];
+}
+
+/* How far a parameter is from its prior's middle. */
+static eits_real offset(const eits_answer *answer, uint32_t k, uint32_t parameter)
+{
+    if (parameter < EITS_PLACE_PARAMETERS - 1)
+        return 0;
+    if (parameter == EITS_PLACE_PARAMETERS - 1)
+        return answer->disc[k].radius_mm / answer->radius_mm[k] - 1;
+    return answer->shape[k][parameter - EITS_PLACE_PARAMETERS];
+}
+
+static eits_real *row_of_square(const eits_scratch *scratch, uint32_t count, uint32_t i)
+{
+    return scratch->square + EITS_STRIDE(count) * i;
+}
+
+/* A in the square's lower triangle becomes L, A = L L'. */
+static void factor(const eits_context *ctx, const eits_scratch *scratch, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; ++i) {
+        eits_real *row = row_of_square(scratch, n, i);
+        const eits_real diagonal = row[i];
+        for (uint32_t j = 0; j < i; ++j) {
+            const eits_real *above = row_of_square(scratch, n, j);
+            row[j] = (row[j] - eits_dot(ctx->kernels, row, above, j)) / above[j];
+        }
+        const eits_real left = diagonal - eits_dot(ctx->kernels, row, row, i),
+                        min = MIN_PIVOT * diagonal;
+        row[i] = eits_sqrt(left > min ? left : min);
+    }
+}
+
+/* L in the lower triangle becomes A^-1, whole. First L^-1 in its place, then L^-T L^-1. */
+static void invert(const eits_context *ctx, const eits_scratch *scratch, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; ++i) {
+        eits_real *row = row_of_square(scratch, n, i);
+        const eits_real pivot = 1 / row[i];
+        /* row i of L^-1 = -(row i of L) L^-1 / L_ii, from the rows above, which are done */
+        eits_real out[EITS_EVIDENCE_COLUMNS] = {0};
+        for (uint32_t j = 0; j < i; ++j)
+            eits_axpy(ctx->kernels, out, -row[j], row_of_square(scratch, n, j), j + 1u);
+        for (uint32_t j = 0; j < i; ++j)
+            row[j] = out[j] * pivot;
+        row[i] = pivot;
+        eits_zero(row + i + 1, EITS_STRIDE(n) - i - 1u);
+    }
+    /* A^-1_ij = sum over k >= i of M_ki M_kj, M = L^-1, j <= i: from the top, each needs rows that
+     * are still M's. */
+    for (uint32_t i = 0; i < n; ++i) {
+        eits_real *row = row_of_square(scratch, n, i), out[EITS_EVIDENCE_COLUMNS] = {0};
+        for (uint32_t k = i; k < n; ++k) {
+            const eits_real *below = row_of_square(scratch, n, k);
+            eits_axpy(ctx->kernels, out, below[i], below, i + 1u);
+        }
+        eits_copy(row, out, i + 1u);
+    }
+    for (uint32_t i = 0; i < n; ++i) {
+        for (uint32_t j = i + 1; j < n; ++j)
+            row_of_square(scratch, n, i)[j] = row_of_square(scratch, n, j)[i];
+    }
+}
+
+uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
+                        eits_likelihood *out)
+{
+    const uint32_t rank = ctx->model->rank, n = answer->count * answer->parameters;
+    const size_t stride = EITS_STRIDE(rank);
+    eits_real gradient[EITS_EVIDENCE_COLUMNS];
+    uint64_t macs = 0;
+    out->count = n;
+    eits_copy(ctx->evidence.left, ctx->evidence.data, stride);
+    for (uint32_t k = 0; k < answer->count; ++k)
+        macs += eits_shape_columns(ctx, scratch, answer, k);
+    out->here = eits_dot(ctx->kernels, ctx->evidence.left, ctx->evidence.left, rank);
+    for (uint32_t i = 0; i < n; ++i) {
+        const uint32_t k = i / answer->parameters, p = i % answer->parameters;
+        const eits_real *column = ctx->evidence.column + stride * i, off = offset(answer, k, p);
+        eits_real *row = row_of_square(scratch, n, i);
+        ctx->kernels->rows_dot(ctx->evidence.column, stride, i + 1u, stride, column, row);
+        row[i] += precision(p);
+        gradient[i] =
+            eits_fma(-precision(p), off, eits_dot(ctx->kernels, column, ctx->evidence.left, rank));
+        out->here = eits_fma(precision(p) * off, off, out->here);
+    }
+    factor(ctx, scratch, n);
+    invert(ctx, scratch, n);
+    out->least = out->here;
+    for (uint32_t i = 0; i < n; ++i) {
+        out->step[i] = eits_dot(ctx->kernels, row_of_square(scratch, n, i), gradient, n);
+        out->least = eits_fma(-gradient[i], out->step[i], out->least);
+    }
+    return macs + (uint64_t)n * (n + 1u) / 2u * rank + (uint64_t)n * n * n / 2u;
+}
+
+/* The block of A^-1 of disc k's parameters, as L L', and w = L^-1 q, q how far these are from where
+ * there is no such disc: no strength, and radius and shape as their priors like them best. Returns
+ * |w|^2 = q'B^-1 q: what the least F rises by with the parameters held there. */
+static eits_real hold(const eits_scratch *scratch, const eits_answer *answer,
+                      const eits_likelihood *likelihood, uint32_t k, block l, eits_real *w)
+{
+    const uint32_t p = answer->parameters, n = likelihood->count, first = k * p;
+    eits_real rise = 0;
+    for (uint32_t i = 0; i < p; ++i) {
+        const eits_real *row = row_of_square(scratch, n, first + i) + first;
+        const eits_real held = i == 0 ? -1 : -offset(answer, k, i);
+        for (uint32_t j = 0; j <= i; ++j) {
+            eits_real sum = row[j];
+            for (uint32_t m = 0; m < j; ++m)
+                sum = eits_fma(-l[i][m], l[j][m], sum);
+            if (i == j)
+                l[i][i] = eits_sqrt(sum > MIN_PIVOT * row[i] ? sum : MIN_PIVOT * row[i]);
+            else
+                l[i][j] = sum / l[j][j];
+        }
+        eits_real sum = likelihood->step[first + i] - held;
+        for (uint32_t m = 0; m < i; ++m)
+            sum = eits_fma(-l[i][m], w[m], sum);
+        w[i] = sum / l[i][i];
+        rise = eits_fma(w[i], w[i], rise);
+    }
+    return rise;
+}
+
+eits_real eits_linear_rise(const eits_scratch *scratch, const eits_answer *answer,
+                           const eits_likelihood *likelihood, uint32_t k)
+{
+    block l;
+    eits_real w[EITS_SHAPE_PARAMETERS];
+    return hold(scratch, answer, likelihood, k, l, w);
+}
+
+/* With W = L^-1 times the block's rows of A^-1, the others' inverse is A^-1 - W'W and their step
+ * s - W'w (Schur's complement). W takes the place of the disc's columns. */
+uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
+                          eits_likelihood *likelihood, uint32_t k)
+{
+    const uint32_t p = answer->parameters, n = likelihood->count, first = k * p;
+    const size_t stride = EITS_STRIDE(ctx->model->rank);
+    eits_real w[EITS_SHAPE_PARAMETERS], *of_block = ctx->evidence.column + stride * first;
+    block l;
+    likelihood->least += hold(scratch, answer, likelihood, k, l, w);
+    for (uint32_t i = 0; i < p; ++i) {
+        eits_real *row = of_block + stride * i;
+        eits_copy(row, row_of_square(scratch, n, first + i), n);
+        for (uint32_t m = 0; m < i; ++m)
+            eits_axpy(ctx->kernels, row, -l[i][m], of_block + stride * m, n);
+        for (uint32_t j = 0; j < n; ++j)
+            row[j] /= l[i][i];
+    }
+    for (uint32_t i = 0; i < p; ++i) {
+        const eits_real *row = of_block + stride * i;
+        eits_axpy(ctx->kernels, likelihood->step, -w[i], row, n);
+        for (uint32_t j = 0; j < n; ++j)
+            eits_axpy(ctx->kernels, row_of_square(scratch, n, j), -row[j], row, n);
+    }
+    return (uint64_t)p * n * (n + p);
+}
+
+static eits_real bounded(eits_real v, eits_real low, eits_real high)
+{
+    return eits_clamp(v, low, high);
+}
+
+static eits_answer moved(const eits_context *ctx, const eits_answer *from, const eits_real *step,
+                         eits_real fraction)
+{
+    const eits_options *o = &ctx->options;
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+    eits_answer to = *from;
+    for (uint32_t k = 0; k < to.count; ++k) {
+        const eits_real *s = step + k * to.parameters;
+        eits_disc *disc = &to.disc[k];
+        disc->change *= eits_fma(fraction, bounded(s[0], LEAST_CHANGE, MOST_CHANGE), 1);
+        eits_disc there = *disc;
+        there.x_mm += fraction * pixel * bounded(s[1], -MAX_MOVE, MAX_MOVE);
+        there.y_mm += fraction * pixel * bounded(s[2], -MAX_MOVE, MAX_MOVE);
+        const eits_real grow = to.radius_mm[k] * s[3], most = MAX_RADIUS_MOVE * pixel;
+        there.radius_mm = bounded(disc->radius_mm + fraction * bounded(grow, -most, most),
+                                  o->touch_min_radius_mm, o->touch_max_radius_mm);
+        if (eits_disc_on_skin(ctx, &there))
+            *disc = there;
+        for (uint32_t p = EITS_PLACE_PARAMETERS; p < to.parameters; ++p)
+            to.shape[k][p - EITS_PLACE_PARAMETERS] += fraction * bounded(s[p], -1, 1);
+    }
+    return to;
+}
+
+uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer)
+{
+    eits_likelihood now, next;
+    if (answer->count == 0) {
+        answer->misfit =
+            eits_dot(ctx->kernels, ctx->evidence.data, ctx->evidence.data, ctx->model->rank);
+        return ctx->model->rank;
+    }
+    uint64_t macs = eits_linearise(ctx, scratch, answer, &now);
+    eits_real fraction = 1;
+    for (int step = 0; step < STEPS; ++step) {
+        const eits_answer trial = moved(ctx, answer, now.step, fraction);
+        macs += eits_linearise(ctx, scratch, &trial, &next);
+        if (next.here < now.here) {
+            *answer = trial;
+            now = next;
+            fraction = 1;
+        } else {
+            fraction *= R(0.4);
+        }
+    }
+    answer->misfit = now.here;
+    return macs;
+}
