@@ -61,6 +61,8 @@ static void lay_out_frame(eits_context *ctx, arena *a)
     ctx->reference.v0 = take_reals(a, rows);
     ctx->reference.m2 = take_reals(a, rows);
     ctx->reference.row_gain = take_reals(a, rows);
+    for (size_t i = 0; i < rows; ++i)
+        ctx->reference.row_gain[i] = 1;
     ctx->rows.masked = take(a, rows);
     ctx->rows.unusable = take(a, rows);
     ctx->frame.sides = take(a, folded);

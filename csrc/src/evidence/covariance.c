@@ -1,6 +1,6 @@
 /* The covariance of what the model cannot explain, and its Cholesky factor.
  *
- *     Sigma_ij = sigma^2 |P_i|^2 [i = j] + SHARE |d|^2 (P E P')_ij (+ (P D P')_ij)
+ *     Sigma_ij = sigma^2 |P_i|^2 [i = j] + share |d|^2 (P E P')_ij (+ (P D P')_ij)
  *
  * P's rows are orthogonal (eits_row_form), so that white noise stays uncorrelated. Where the
  * regularisation is raised for this frame, the reduced data are F y with F diagonal, and so is
@@ -15,20 +15,14 @@
 #include "base/log.h"
 #include "base/vec.h"
 #include "diagnostics/diagnostics.h"
+#include "evidence/constants.h"
 #include "kernels/kernels.h"
-
-/* Of |d|^2 times the errors' second moment: what remains of them after places and radii have
- * adapted. */
-static const eits_real SHARE = R(0.25);
-/* of the reference's rms: no row is known better than that */
-static const eits_real MIN_NOISE = R(1e-4);
-/* of a diagonal element: what rounding may leave of a pivot */
-static const eits_real MIN_PIVOT = R(1e-5);
 
 /* The mean variance of a fold in use, in model volts^2. */
 static eits_real noise_variance(const eits_context *ctx)
 {
-    const eits_real least = MIN_NOISE * eits_fabs(ctx->reference.gain) * ctx->reference.v0_rms,
+    const eits_real least = EITS_ERROR_MIN_NOISE * eits_fabs(ctx->reference.gain) *
+                            ctx->reference.v0_rms,
                     learned = eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded;
     return learned > least * least ? learned : least * least;
 }
@@ -79,7 +73,7 @@ static eits_real factor(const eits_context *ctx)
             row[j] = (row[j] - eits_dot(ctx->kernels, row, above, j)) / above[j];
         }
         const eits_real left = diagonal - eits_dot(ctx->kernels, row, row, i),
-                        min = MIN_PIVOT * diagonal, pivot = left > min ? left : min;
+                        min = EITS_MIN_PIVOT * diagonal, pivot = left > min ? left : min;
         row[i] = eits_sqrt(pivot);
         log_determinant += eits_log(pivot);
     }
@@ -92,7 +86,7 @@ int eits_factor_covariance(eits_context *ctx, int drift, eits_real *log_determin
     if (ctx->model->uncertainty.errors == NULL || ctx->whitening.form == EITS_WHITENING_TRIANGLE ||
         ctx->projection.count > 1 || !ctx->options.touch_test)
         return 0;
-    const eits_real errors = SHARE * data_energy(ctx), noise = noise_variance(ctx);
+    const eits_real errors = EITS_ERROR_SHARE * data_energy(ctx), noise = noise_variance(ctx);
     for (uint32_t i = 0; i < rank; ++i)
         covariance_row(ctx, i, errors, drift ? 1 : 0, noise);
     *log_determinant = factor(ctx);

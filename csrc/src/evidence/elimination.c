@@ -4,30 +4,22 @@
  * each. Where every rise is far above the threshold and no two discs are near each other, nothing
  * else is done. Else the discs are fitted to the data in Sigma's metric, and so are the likeliest
  * of the simpler answers: the weakest disc left out, near pairs as one. The simpler one is taken
- * while F rises by less than THRESHOLD, times what the data fit worse than they should: where the
- * model is wrong by more than it says, more is asked of a touch.
+ * while F rises by less than the threshold, times what the data fit worse than they should: where
+ * the model is wrong by more than it says, more is asked of a touch.
  *
  * The whole is done a second time for a sheet that has drifted since its reference (+ D), and the
- * likelier of the two stands, by F + THRESHOLD n + log det Sigma: allowing for a drift that is not
+ * likelier of the two stands, by F + threshold n + log det Sigma: allowing for a drift that is not
  * there would cost light touches. */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
+#include "evidence/constants.h"
 #include "kernels/kernels.h"
-
-static const eits_real THRESHOLD = R(20.0);
-/* The linearisation is trusted where it says so many thresholds; that without shapes, which is
- * cheaper, where it says this many and the data fit to within so much of noise and model errors. */
-static const eits_real CLEAR = R(3.0), CLEAR_AS_DISCS = R(10.0), FITS = R(2.0);
-/* over the sum of the radii: pairs that may be one touch */
-static const eits_real NEAR = R(1.2);
-/* Data that are left when each disc has taken four of them, at least. */
-static const eits_real MIN_FREEDOM = R(8.0);
 
 /* One hypothesis's answer, and what is known of each disc of it. */
 typedef struct verdict {
     eits_answer answer;
-    eits_real evidence; /* F + THRESHOLD n + log det Sigma */
+    eits_real evidence; /* F + threshold n + log det Sigma */
     eits_real rise[EITS_MAX_TOUCHES];
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
     int changed;            /* 1: discs were dropped or merged */
@@ -40,14 +32,14 @@ static eits_real excess(const eits_context *ctx, eits_real misfit, uint32_t coun
 {
     const eits_real data = (eits_real)(ctx->model->rank - ctx->evidence.drifts),
                     free = data - R(4.0) * (eits_real)count,
-                    of = misfit / (free > MIN_FREEDOM ? free : MIN_FREEDOM);
+                    of = misfit / (free > EITS_MIN_FREEDOM ? free : EITS_MIN_FREEDOM);
     return of > 1 ? of : 1;
 }
 
 static int is_near(const eits_disc *a, const eits_disc *b)
 {
     const eits_real dx = a->x_mm - b->x_mm, dy = a->y_mm - b->y_mm,
-                    reach = NEAR * (a->radius_mm + b->radius_mm);
+                    reach = EITS_MERGE_REACH * (a->radius_mm + b->radius_mm);
     return a->polarity == b->polarity && eits_fma(dx, dx, dy * dy) < reach * reach;
 }
 
@@ -136,7 +128,7 @@ static uint32_t look(eits_context *ctx, const eits_scratch *scratch, verdict *v,
 
 static eits_real needed(const eits_context *ctx, const verdict *v)
 {
-    return THRESHOLD * excess(ctx, v->answer.misfit, v->answer.count);
+    return EITS_TOUCH_EVIDENCE * excess(ctx, v->answer.misfit, v->answer.count);
 }
 
 /* Leave out, one after another, whatever the linearisation can do without. Returns how many stay;
@@ -148,7 +140,7 @@ static uint32_t drop_linearly(eits_context *ctx, const eits_scratch *scratch, ve
     memset(out, 0, EITS_MAX_TOUCHES);
     while (left > 0) {
         const uint32_t k = weakest_of(scratch, likelihood, out, v);
-        if (!(v->rise[k] < THRESHOLD * excess(ctx, likelihood->least, left)))
+        if (!(v->rise[k] < EITS_TOUCH_EVIDENCE * excess(ctx, likelihood->least, left)))
             break;
         *macs += eits_linear_drop(ctx, scratch, &v->answer, likelihood, k);
         out[k] = 1;
@@ -169,7 +161,7 @@ static int take_linear(eits_context *ctx, const eits_scratch *scratch, verdict *
             rest = without(ctx, &rest, k);
     }
     *macs += eits_refit(ctx, scratch, &rest);
-    const eits_real allowed = THRESHOLD * excess(ctx, rest.misfit, left);
+    const eits_real allowed = EITS_TOUCH_EVIDENCE * excess(ctx, rest.misfit, left);
     if (!(rest.misfit - before < allowed * (eits_real)(v->answer.count - left)))
         return 0;
     v->answer = rest;
@@ -209,7 +201,7 @@ static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v
     int fitted = 0, linear = 1;
     while (v->answer.count > 0) {
         uint32_t weakest = look(ctx, scratch, v, fitted, &likelihood, macs);
-        if (v->rise[weakest] > CLEAR * needed(ctx, v) && !any_near(&v->answer))
+        if (v->rise[weakest] > EITS_CLEAR * needed(ctx, v) && !any_near(&v->answer))
             return;
         if (linear) {
             const uint32_t left = drop_linearly(ctx, scratch, v, &likelihood, out, macs);
@@ -238,8 +230,8 @@ static int is_clear(eits_context *ctx, const eits_scratch *scratch, verdict *v, 
     v->answer.parameters = EITS_PLACE_PARAMETERS;
     const uint32_t weakest = look(ctx, scratch, v, 0, &likelihood, macs);
     v->first_excess = excess(ctx, v->answer.misfit, v->answer.count);
-    v->clear = v->rise[weakest] > CLEAR_AS_DISCS * needed(ctx, v) && !any_near(&v->answer) &&
-               v->first_excess < FITS;
+    v->clear = v->rise[weakest] > EITS_CLEAR_AS_DISCS * needed(ctx, v) && !any_near(&v->answer) &&
+               v->first_excess < EITS_FITS;
     v->answer.parameters = all;
     return v->clear;
 }
@@ -263,7 +255,8 @@ static verdict judge(eits_context *ctx, const eits_scratch *scratch, const eits_
     *macs += eits_whiten_errors(ctx, ctx->evidence.data);
     if (drift || !is_clear(ctx, scratch, &v, macs))
         eliminate(ctx, scratch, &v, macs);
-    v.evidence = eits_fma(THRESHOLD, (eits_real)v.answer.count, v.answer.misfit) + log_determinant;
+    v.evidence =
+        eits_fma(EITS_TOUCH_EVIDENCE, (eits_real)v.answer.count, v.answer.misfit) + log_determinant;
     return v;
 }
 
@@ -274,7 +267,7 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
     verdict v = judge(ctx, scratch, f, 0, &f->macs);
     if (v.answer.parameters == 0)
         return;
-    if (!v.clear && v.first_excess > FITS) {
+    if (!v.clear && v.first_excess > EITS_FITS) {
         const verdict drifted = judge(ctx, scratch, f, 1, &f->macs);
         if (drifted.evidence < v.evidence)
             v = drifted;

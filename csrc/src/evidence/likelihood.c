@@ -8,25 +8,17 @@
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
+#include "evidence/constants.h"
 #include "kernels/kernels.h"
-
-/* Precision of strength and place: none, but for what rounding needs. */
-static const eits_real FREE = R(1e-4);
-/* of a diagonal element: what rounding may leave of a pivot */
-static const eits_real MIN_PIVOT = R(1e-5);
-/* Farthest steps: of the strength, down and up; of the place and the radius, in pixels. */
-static const eits_real LEAST_CHANGE = R(-0.5), MOST_CHANGE = R(1.0), MAX_MOVE = R(1.0),
-                       MAX_RADIUS_MOVE = R(0.5);
-enum { STEPS = 3 };
 
 typedef eits_real block[EITS_SHAPE_PARAMETERS][EITS_SHAPE_PARAMETERS];
 
-/* 1 / deviation^2 of a parameter's prior: radius and edge terms .3, dipole terms .2, relatively. */
+/* 1 / deviation^2 of a parameter's prior: none for strength and place. */
 static eits_real precision(uint32_t parameter)
 {
-    static const eits_real of[EITS_SHAPE_PARAMETERS] = {
-        0, 0, 0, R(11.111111), R(11.111111), R(11.111111), R(25.0), R(25.0)};
-    return parameter < EITS_PLACE_PARAMETERS - 1 ? FREE : of[parameter];
+    if (parameter < EITS_PLACE_PARAMETERS - 1)
+        return EITS_FREE_PRECISION;
+    return parameter < EITS_EDGE_PARAMETERS ? EITS_SHAPE_PRECISION : EITS_DIPOLE_PRECISION;
 }
 
 /* How far a parameter is from its prior's middle. */
@@ -55,7 +47,7 @@ static void factor(const eits_context *ctx, const eits_scratch *scratch, uint32_
             row[j] = (row[j] - eits_dot(ctx->kernels, row, above, j)) / above[j];
         }
         const eits_real left = diagonal - eits_dot(ctx->kernels, row, row, i),
-                        min = MIN_PIVOT * diagonal;
+                        min = EITS_MIN_PIVOT * diagonal;
         row[i] = eits_sqrt(left > min ? left : min);
     }
 }
@@ -139,7 +131,7 @@ static eits_real hold(const eits_scratch *scratch, const eits_answer *answer,
             for (uint32_t m = 0; m < j; ++m)
                 sum = eits_fma(-l[i][m], l[j][m], sum);
             if (i == j)
-                l[i][i] = eits_sqrt(sum > MIN_PIVOT * row[i] ? sum : MIN_PIVOT * row[i]);
+                l[i][i] = eits_sqrt(sum > EITS_MIN_PIVOT * row[i] ? sum : EITS_MIN_PIVOT * row[i]);
             else
                 l[i][j] = sum / l[j][j];
         }
@@ -201,11 +193,11 @@ static eits_answer moved(const eits_context *ctx, const eits_answer *from, const
     for (uint32_t k = 0; k < to.count; ++k) {
         const eits_real *s = step + k * to.parameters;
         eits_disc *disc = &to.disc[k];
-        disc->change *= eits_fma(fraction, bounded(s[0], LEAST_CHANGE, MOST_CHANGE), 1);
+        disc->change *= eits_fma(fraction, bounded(s[0], EITS_LEAST_CHANGE, EITS_MOST_CHANGE), 1);
         eits_disc there = *disc;
-        there.x_mm += fraction * pixel * bounded(s[1], -MAX_MOVE, MAX_MOVE);
-        there.y_mm += fraction * pixel * bounded(s[2], -MAX_MOVE, MAX_MOVE);
-        const eits_real grow = to.radius_mm[k] * s[3], most = MAX_RADIUS_MOVE * pixel;
+        there.x_mm += fraction * pixel * bounded(s[1], -EITS_MAX_MOVE, EITS_MAX_MOVE);
+        there.y_mm += fraction * pixel * bounded(s[2], -EITS_MAX_MOVE, EITS_MAX_MOVE);
+        const eits_real grow = to.radius_mm[k] * s[3], most = EITS_MAX_RADIUS_MOVE * pixel;
         there.radius_mm = bounded(disc->radius_mm + fraction * bounded(grow, -most, most),
                                   o->touch_min_radius_mm, o->touch_max_radius_mm);
         if (eits_disc_on_skin(ctx, &there))
@@ -226,7 +218,7 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
     }
     uint64_t macs = eits_linearise(ctx, scratch, answer, &now);
     eits_real fraction = 1;
-    for (int step = 0; step < STEPS; ++step) {
+    for (int step = 0; step < EITS_REFIT_STEPS; ++step) {
         const eits_answer trial = moved(ctx, answer, now.step, fraction);
         macs += eits_linearise(ctx, scratch, &trial, &next);
         if (next.here < now.here) {
@@ -234,7 +226,7 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
             now = next;
             fraction = 1;
         } else {
-            fraction *= R(0.4);
+            fraction *= EITS_SHORTER;
         }
     }
     answer->misfit = now.here;

@@ -7,6 +7,34 @@
 
 /* clang-format off */
 
+/* ---- Chosen: row gains: the distance was found after looking at a measured tank and at uneven
+ * sheets; the other numbers are by hand. Check: eitskin bench worlds */
+
+/* no row's data are made more than this larger or smaller. larger: a row of little voltage counts
+ * too much; smaller: uneven sheets stay uneven */
+#define EITS_MAX_ROW_GAIN R(3.0)
+
+/* beyond this distance of the reference from the model, row gains are off: it is the instrument
+ * that disagrees [rms log ratio]. larger: harm on instruments that differ; smaller: off on very
+ * uneven sheets */
+#define EITS_MAX_DISTANCE R(0.28)
+
+/* beyond this difference of rows and their reciprocals, row gains are off [of the reference's rms].
+ * as MAX_DISTANCE */
+#define EITS_MAX_RECIPROCITY R(0.1)
+
+/* ---- Chosen: by the arithmetic: half a unit in the last place of two float32 voltages, and some.
+ * Check: ctest --preset host -R frame_f */
+
+/* what rounding leaves of frames without noise; float32's in any width, so that both count alike
+ * [of v0_rms]. larger: light touches of very quiet front ends are missed; smaller: touches of
+ * rounding */
+#define EITS_NOISE_ROUNDING R(2.384185791015625e-07)
+
+/* max(S'y) of white noise, over the deviation of the pixel that hears it most [deviations]. as
+ * NOISE_ROUNDING */
+#define EITS_MAX_OF_NOISE R(3.5)
+
 /* ---- Chosen: by hand; not measured. A touch changes a row by less. Check: ctest --preset host -R
  * frame_f */
 

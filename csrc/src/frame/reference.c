@@ -18,17 +18,7 @@
 
 #include "base/log.h"
 #include "base/vec.h"
-
-/* of v0_rms: what rounding of the frames' own numbers leaves, in float32 and so in any width */
-static const eits_real ROUNDING = R(0x1p-22);
-/* max(S'y) of white noise over noise_gain, the deviation of the pixel that hears it most */
-static const eits_real MAX_OF_NOISE = R(3.5);
-/* Row gains: no row's data are made more than this larger or smaller. */
-static const eits_real MAX_ROW_GAIN = R(3.0);
-/* Beyond this distance of the reference from the model (rms of the logarithm of their ratio), or
- * this difference of reciprocal rows over the reference's rms, it is not the sheet that is uneven
- * but the instrument that disagrees, and row gains would do harm. */
-static const eits_real MAX_DISTANCE = R(0.28), MAX_RECIPROCITY = R(0.1);
+#include "frame/constants.h"
 
 /* A reference frame must be whole: rows that cannot be used are to be masked first. */
 eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real *frame,
@@ -71,8 +61,9 @@ static eits_real own_gain(const eits_context *ctx, uint32_t i, eits_real expecte
                     ratio = expected / measured;
     if (!(ratio > 0) || !eits_is_finite(ratio))
         return 1;
-    return ratio > MAX_ROW_GAIN ? MAX_ROW_GAIN
-                                : (ratio < 1 / MAX_ROW_GAIN ? 1 / MAX_ROW_GAIN : ratio);
+    return ratio > EITS_MAX_ROW_GAIN
+               ? EITS_MAX_ROW_GAIN
+               : (ratio < 1 / EITS_MAX_ROW_GAIN ? 1 / EITS_MAX_ROW_GAIN : ratio);
 }
 
 /* How far the reference is from the model, and its rows from their reciprocals. */
@@ -116,8 +107,8 @@ void eits_learn_row_gains(eits_context *ctx)
     eits_reference *b = &ctx->reference;
     measure_distance(ctx);
     b->row_gains = ctx->options.row_gains != 0 && model->uncertainty.row_gains != 0 &&
-                   model->data_kind != EITS_DATA_NORMALISED && b->distance <= MAX_DISTANCE &&
-                   b->reciprocity <= MAX_RECIPROCITY;
+                   model->data_kind != EITS_DATA_NORMALISED && b->distance <= EITS_MAX_DISTANCE &&
+                   b->reciprocity <= EITS_MAX_RECIPROCITY;
     for (uint32_t i = 0; i < model->n_rows; ++i)
         b->row_gain[i] = 1;
     for (uint32_t k = 0; b->row_gains && k < model->n_folded; ++k) {
@@ -215,7 +206,7 @@ eits_real eits_reference_noise(const eits_context *ctx)
  * no sign of a noiseless front end. */
 eits_real eits_noise_floor_v(const eits_context *ctx)
 {
-    const eits_real rounding = ROUNDING * ctx->reference.v0_rms;
+    const eits_real rounding = EITS_NOISE_ROUNDING * ctx->reference.v0_rms;
     return ctx->options.noise_floor_v > rounding ? ctx->options.noise_floor_v : rounding;
 }
 
@@ -224,7 +215,7 @@ eits_real eits_lambda_noise_floor(const eits_context *ctx)
     const eits_real noise = ctx->model->data_kind == EITS_DATA_NORMALISED
                                 ? eits_noise_floor_v(ctx) / ctx->reference.v0_rms
                                 : eits_noise_floor_v(ctx) * eits_fabs(ctx->reference.gain);
-    return MAX_OF_NOISE * (eits_real)ctx->model->noise_gain * noise;
+    return EITS_MAX_OF_NOISE * (eits_real)ctx->model->noise_gain * noise;
 }
 
 /* Take one more frame into the mean and the squares; rows that were masked lose their reference. */

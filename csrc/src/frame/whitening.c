@@ -4,7 +4,6 @@
 #include "frame/constants.h"
 #include "frame/projection.h"
 #include "frame/reference.h"
-#include "frame/regularisation.h"
 #include "frame/triangle.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"

@@ -4,7 +4,6 @@
 
 #include "model/options.h"
 #include "model/sections.h"
-#include "model/uncertainty.h"
 
 #include <string.h>
 
@@ -384,7 +383,7 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
     if (status == EITS_OK)
         status = eits_read_row_form(&opened, &found.whit);
     if (status == EITS_OK)
-        status = eits_read_uncertainty(&opened, found.unce.data, found.unce.size);
+        status = eits_read_uncertainty(&opened, &found.unce);
     if (status == EITS_OK)
         *model = opened;
     return status;

@@ -36,4 +36,9 @@ static inline int eits_between(float value, float low, float high)
  * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (does not fit P). */
 eits_status eits_read_row_form(eits_model *model, const eits_section *found);
 
+/* Section UNCE, where there is one, into model->uncertainty; model->rank and row_form are known.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are not finite, a
+ * variance below 0, or a model that does not say how it was whitened). */
+eits_status eits_read_uncertainty(eits_model *model, const eits_section *found);
+
 #endif
