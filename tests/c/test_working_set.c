@@ -8,6 +8,7 @@
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
+#include "solve/solve.h"
 #include "solve/violations.h"
 
 #include <math.h>
@@ -312,6 +313,47 @@ static void violations_nearby(void)
     }
 }
 
+/* Zeros that stay zero leave the set; what is not zero, is on the way, or would move stays, in its
+ * order. */
+static void zeros_at_rest_are_pruned(void)
+{
+    static const struct {
+        double x, z, gradient;
+        int stays[3]; /* of both signs; x >= 0; x <= 0 */
+    } CASES[] = {{0, 0, 0.9, {0, 0, 0}},  {0, 0, 1, {0, 0, 0}},    {0, 0, 1.1, {1, 1, 0}},
+                 {0, 0, -1.1, {1, 0, 1}}, {0, 0, -1, {0, 0, 0}},   {2, 0, 0.5, {1, 1, 1}},
+                 {0, 3, 0.5, {1, 1, 1}},  {-2, 1, 0.5, {1, 1, 1}}, {0, 0, 0, {0, 0, 0}}};
+    enum { COUNT = sizeof CASES / sizeof *CASES };
+    static const eits_sign signs[3] = {EITS_SIGN_BOTH, EITS_SIGN_INCREASE, EITS_SIGN_DECREASE};
+    for (int s = 0; s < 3; ++s) {
+        for (int prepared = 0; prepared < 2; ++prepared) {
+            bench b;
+            eits_context *ctx = set_up(&b, RANDOM, prepared);
+            ctx->options.sign = signs[s];
+            ctx->solver.working_count = COUNT;
+            for (uint32_t k = 0; k < COUNT; ++k) {
+                ctx->solver.working[k] = 3 * k;
+                ctx->solver.x[k] = (eits_real)CASES[k].x;
+                ctx->solver.z[k] = (eits_real)CASES[k].z;
+                ctx->solver.gradient[k] = (eits_real)CASES[k].gradient;
+            }
+            eits_working_set_prune(ctx, 1);
+            uint32_t left = 0;
+            for (uint32_t k = 0; k < COUNT; ++k) {
+                if (!CASES[k].stays[s])
+                    continue;
+                CHECK_EQUAL(ctx->solver.working[left], 3 * k);
+                CHECK(ctx->solver.x[left] == (eits_real)CASES[k].x &&
+                      ctx->solver.z[left] == (eits_real)CASES[k].z &&
+                      ctx->solver.gradient[left] == (eits_real)CASES[k].gradient);
+                ++left;
+            }
+            CHECK_EQUAL(ctx->solver.working_count, left);
+            tear_down(&b);
+        }
+    }
+}
+
 int main(void)
 {
     looking_always_gives_the_bits_of_fista();
@@ -324,5 +366,6 @@ int main(void)
     work_is_counted();
     refused_options();
     violations_nearby();
+    zeros_at_rest_are_pruned();
     return checks_report("working set");
 }

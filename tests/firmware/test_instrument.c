@@ -331,6 +331,21 @@ static void test_self_test_keeps_the_tare(void)
     bench_stop(&b);
 }
 
+/* A tare takes frames whose scan began with the command or later, also where the clock wraps. */
+static void test_tare_begins_with_the_command(void)
+{
+    static const uint32_t commands[] = {1000, 0, 0xFFFFFFFFu, 0x80000000u};
+    for (int k = 0; k < 4; ++k) {
+        const fw_tare tare = {.active = true, .since_us = commands[k]},
+                      over = {.since_us = commands[k]};
+        for (int late = -2; late <= 2; ++late) {
+            const fw_frame frame = {.time_us = commands[k] + (uint32_t)late};
+            CHECK_EQUAL(fw_tare_wants(&tare, &frame), late >= 0);
+            CHECK(!fw_tare_wants(&over, &frame));
+        }
+    }
+}
+
 int main(void)
 {
     test_same_bits(&SKIN_ADJACENT, 8, 1, 1, 0);
@@ -343,5 +358,6 @@ int main(void)
     test_failed_tare();
     test_reference_frames();
     test_self_test_keeps_the_tare();
+    test_tare_begins_with_the_command();
     return checks_report("instrument");
 }

@@ -61,6 +61,9 @@ static void test_model_change(void)
     CHECK_EQUAL(eits_model_open(&b.open, other.blob, other.size), EITS_OK);
     const eits_packet_info info = host_info(&b.host);
     CHECK_EQUAL(info.n_rows, 192);
+    CHECK(info.n_electrodes == b.open.n_electrodes && info.n_folded == b.open.n_folded &&
+          info.rank == b.open.rank && info.n_pixels == b.open.n_pixels && info.nx == b.open.nx &&
+          info.ny == b.open.ny && info.storage == (uint32_t)b.open.sensitivity.storage);
     CHECK(info.protocol_hash == b.open.protocol_hash);
     CHECK_EQUAL(info.bank, 1);
     CHECK_EQUAL(info.tared, 0);
