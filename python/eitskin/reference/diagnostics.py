@@ -137,11 +137,12 @@ class Folded:
 @dataclass(frozen=True, eq=False)
 class Reference:
     """The reference that a frame is judged by: v0 (m,) with NaN where there is none, its rms, the
-    gain, and the noise (0: unknown)."""
+    gain, the rows' own gains (m,), and the noise (0: unknown)."""
 
     v0: FloatArray
     rms_v: float
     gain: float
+    row_gain: FloatArray
     noise_v: float
 
 
@@ -253,7 +254,8 @@ class Examiner:
                     * np.hypot(1 / ref.v0[fold.first], 1 / ref.v0[fold.second])
                 )
         elif ref.noise_v > 0:
-            most = np.full(len(off), OUTLIER_NOISE * np.sqrt(2) * abs(ref.gain) * ref.noise_v)
+            own = abs(ref.gain) * ref.row_gain[fold.first]
+            most = OUTLIER_NOISE * np.sqrt(2) * own * ref.noise_v
         else:
             spread = robust(off[folded.both])
             most = np.full(len(off), OUTLIER_ROBUST * spread if spread > 0 else np.inf)
@@ -331,9 +333,11 @@ class Examiner:
         """The variance of a fold's datum, summed over the folds in use; copied reciprocals are one
         measurement."""
         fold = self.model.fold
-        v0 = ref.v0[np.where(folded.first, fold.first, fold.second)]
+        row = np.where(folded.first, fold.first, fold.second)
         ratio = self.model.data_kind == "normalised"
-        each = (ref.noise_v / v0) ** 2 if ratio else np.full(len(v0), (ref.gain * ref.noise_v) ** 2)
+        each = (
+            ref.noise_v / ref.v0[row] if ratio else ref.gain * ref.noise_v * ref.row_gain[row]
+        ) ** 2
         used = folded.first | folded.second
         return float(np.where(folded.both & (folded.apart != 0), each / 2, each)[used].sum())
 

@@ -30,13 +30,13 @@ FloatArray = npt.NDArray[np.float64]
 class Reduced:
     """A frame as the fit sees it: data ``y`` (r,), which ``seen`` (r, n) explains; ``straight``
     (r,), the same of v0 log(v / v0), None where that is not asked for; ``basis`` (k, r) of what is
-    ignored; ``lambda_noise``; and ``noise``, what of |y|^2 noise gives."""
+    ignored; ``threshold``, what S'y of a touch exceeds; ``noise``, what of |y|^2 noise gives."""
 
     y: FloatArray
     straight: FloatArray | None
     seen: FloatArray
     basis: FloatArray
-    lambda_noise: float
+    threshold: float
     noise: float
 
 
@@ -61,7 +61,7 @@ class Fit:
             float(frame.y @ frame.y),
             frame.noise / model.rank,
         )
-        self.threshold = options.detection_factor * frame.lambda_noise
+        self.threshold = frame.threshold
         self.radius_weight = options.touch_radius_weight
         self.centres = model.grid.centres_mm()
         weight = model.column_weight.astype(np.float64)
@@ -70,6 +70,12 @@ class Fit:
 
     def answers(self, disc: Disc) -> tuple[FloatArray, FloatArray]:
         """The atom (r,) and its derivatives by x, y and radius (3, r)."""
+        reduced = self.shaped(disc, edges=False)
+        return reduced[0], reduced[1:]
+
+    def shaped(self, disc: Disc, *, edges: bool = True) -> FloatArray:
+        """The atom, its derivatives by x, y and radius, and with ``edges`` those by how far out the
+        rim is moved, times cos and sin of twice the angle: an ellipse (4 or 6, r)."""
         pixel = self.model.grid.pixel_mm
         offset = self.centres - (disc.x_mm, disc.y_mm)
         distance = np.hypot(offset[:, 0], offset[:, 1])
@@ -81,10 +87,10 @@ class Fit:
             offset / np.maximum(distance, 1e-300)[:, None],
             0.0,
         )
-        columns = np.column_stack([cover, ramp * toward[:, 0], ramp * toward[:, 1], ramp])
-        reduced = self.per_change @ columns
-        reduced = reduced - self.basis.T @ (self.basis @ reduced)
-        return reduced[:, 0], reduced[:, 1:].T
+        x, y = toward.T
+        shapes = [ramp * (x**2 - y**2), ramp * 2 * x * y] if edges else []
+        reduced = self.per_change @ np.column_stack([cover, ramp * x, ramp * y, ramp, *shapes])
+        return np.asarray((reduced - self.basis.T @ (self.basis @ reduced)).T)
 
     def area_mm2(self, disc: Disc) -> float:
         """What the disc's covers add up to on the pixels that count."""
@@ -226,6 +232,8 @@ class Fit:
 
     def explained(self) -> FloatArray:
         """What leaving each disc alone out would add to |residual|^2, relative to |y|^2."""
+        if not self.discs:
+            return np.zeros(0)
         atoms = np.array([self.answers(disc)[0] for disc in self.discs])
         norm = np.linalg.norm(atoms, axis=1)
         unit = atoms / np.maximum(norm, 1e-300)[:, None]

@@ -17,10 +17,14 @@ import numpy.typing as npt
 
 from eitskin.core.constants_table import (
     BASIS_TOLERANCE,
+    ERROR_MIN_NOISE,
+    ERROR_SHARE,
     FOLD_ROUNDING,
+    MAX_OF_NOISE,
     MAX_RATIO,
     MIN_REFERENCE_FRAMES,
     MIN_SQUARE,
+    NOISE_ROUNDING,
     RATIO_DEFINED,
 )
 from eitskin.core.diagnostics import with_diagnostics
@@ -35,11 +39,13 @@ from eitskin.core.results import (
 )
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
+from eitskin.model.storage import stride_for
 from eitskin.reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
 from eitskin.reference.disc_fit import Disc, Reduced
+from eitskin.reference.evidence import DataErrors
 from eitskin.reference.exact import ActiveSet, coordinate
 from eitskin.reference.fista import fista
-from eitskin.reference.interaction import interplay
+from eitskin.reference.interaction import interplay, turned_dipoles
 from eitskin.reference.problem import (
     Certificate,
     FloatArray,
@@ -49,6 +55,7 @@ from eitskin.reference.problem import (
     project,
 )
 from eitskin.reference.reference_outliers import clean
+from eitskin.reference.row_gains import row_gains
 from eitskin.reference.touches import find_touches
 from eitskin.reference.tracker import Tracker
 from eitskin.reference.whitening import Whitening, form_of, whiten
@@ -87,7 +94,7 @@ class ReferenceEngine:
         self._without_reference = self._bad
         self._v0: FloatArray | None = None
         self._drift_v0: FloatArray | None = None
-        self._gain = 1.0
+        self._gain, self._row_gain = 1.0, np.ones(model.protocol.n_rows)
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._warm: FloatArray | None = None
@@ -96,7 +103,8 @@ class ReferenceEngine:
         self._noise_v = self._noise_energy = 0.0
         self._ready = False
         self._straight: FloatArray | None = None
-        self._known = np.ones(len(model.fold.first), dtype=np.bool_)
+        all_ = np.ones(len(model.fold.first), dtype=np.bool_)
+        self._folded = Folded(np.zeros(len(all_)), np.zeros(len(all_)), all_, all_)
 
     def set_options(self, options: Options) -> None:
         """Replace the options.
@@ -111,7 +119,10 @@ class ReferenceEngine:
             )
         if options.sign != self.options.sign:
             self._warm = None
+        learns = self._ready and options.row_gains != self.options.row_gains
         self.options = options
+        if learns:
+            self._learn_row_gains()
         self._examiner.wanted = {
             name for bit, name in enumerate(DIAGNOSTICS) if options.diagnostics >> bit & 1
         }
@@ -145,7 +156,31 @@ class ReferenceEngine:
         self._gain = float(np.sqrt((r @ r) / (v @ v))) * (-1 if correlation < 0 else 1)
         self._v0, self._v0_rms = v0, float(np.sqrt(np.mean(v**2)))
         self._drift_v0, self._warm = v0, None
+        self._learn_row_gains()
         return correlation
+
+    def _learn_row_gains(self) -> None:
+        errors, self._row_gain = self.model.model_errors, np.ones(self.model.protocol.n_rows)
+        if (
+            errors is not None
+            and errors.row_gains
+            and self.options.row_gains
+            and self.model.data_kind != "normalised"
+        ):
+            usable = ~(self._bad | self._without_reference)
+            assert self._drift_v0 is not None
+            self._row_gain = row_gains(self.model, usable, self._gain * self._drift_v0)
+
+    @property
+    def _noise_floor_v(self) -> float:
+        """The least noise of a row: frames that were rounded may repeat to the last bit."""
+        return max(self.options.noise_floor_v, NOISE_ROUNDING * self._v0_rms)
+
+    @property
+    def _lambda_noise_floor(self) -> float:
+        """max |S'y| of that."""
+        per_volt = 1 / self._v0_rms if self.model.data_kind == "normalised" else abs(self._gain)
+        return MAX_OF_NOISE * self.model.noise_gain * self._noise_floor_v * per_volt
 
     def set_reference(self, frames: FloatArray) -> LearnedReference:
         """Take the reference from quiet ``frames`` (k, m) volts, as CoreEngine.set_reference does.
@@ -171,6 +206,9 @@ class ReferenceEngine:
                 was_ready and self._v0 is not None,
             )
             raise
+        if len(frames) >= MIN_REFERENCE_FRAMES:
+            lambda_noise = max(lambda_noise, self._lambda_noise_floor)
+            self._noise_v = max(self._noise_v, self._noise_floor_v)
         self._lambda_noise, self._ready = lambda_noise, True
         return LearnedReference(
             len(frames),
@@ -209,8 +247,9 @@ class ReferenceEngine:
             if kind == "normalised":
                 return (frame - v0) / v0
             if kind == "log-ratio":
-                return self._gain * v0 * np.log(np.clip(frame / v0, 1 / MAX_RATIO, MAX_RATIO))
-        return self._gain * (frame - v0)
+                ratio = np.clip(frame / v0, 1 / MAX_RATIO, MAX_RATIO)
+                return self._row_gain * self._gain * v0 * np.log(ratio)
+        return self._row_gain * self._gain * (frame - v0)
 
     def frame_stage(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, int]:
         """Reduced projected data y (r,), the basis (k, r) of what is ignored, and how many rows
@@ -231,7 +270,13 @@ class ReferenceEngine:
         look.found.saturated = int((saturated & ~masked).sum())
         look.found.names |= {"saturated"} & look.wanted if look.found.saturated else set()
         judged = (
-            Reference(np.where(masked, np.nan, self._v0), self._v0_rms, self._gain, self._noise_v)
+            Reference(
+                np.where(masked, np.nan, self._v0),
+                self._v0_rms,
+                self._gain,
+                self._row_gain,
+                self._noise_v,
+            )
             if self._ready
             else None
         )
@@ -256,7 +301,7 @@ class ReferenceEngine:
         self._leave_out(known)
         basis = orthonormal(self._directions(folded), self.model.rank)
         y = project(self._reduce(folded.d), basis)
-        self._known, self._straight = known, self._straight_data(frame, unusable, basis)
+        self._folded, self._straight = folded, self._straight_data(frame, unusable, basis)
         directions = len(y) if self._whitening is None else min(len(y), int(known.sum()))
         # where the basis leaves no direction, what is there is rounding
         return y if len(basis) < directions else np.zeros_like(y), basis, int(unusable.sum())
@@ -305,7 +350,9 @@ class ReferenceEngine:
         one, other = value[fold.first], np.where(second, sign * value[fold.second], 0.0)
         d = (np.where(first, one, 0.0) + other) / np.maximum(first.astype(int) + second, 1)
         size = (
-            np.ones(len(one)) if kind == "normalised" else np.abs(self._gain * self._v0[fold.first])
+            np.ones(len(one))
+            if kind == "normalised"
+            else np.abs(self._gain * (self._row_gain * self._v0)[fold.first])
         )
         apart = first & second & (np.abs(one - other) > FOLD_ROUNDING * size)
         return Folded(d, np.where(apart, one - other, 0.0), first, second)
@@ -314,7 +361,8 @@ class ReferenceEngine:
         """What drift of the gain makes of the folded data, (k,); None where it is not ignored."""
         if not self.options.project_reference or self._drift_v0 is None:
             return None
-        fold, v0, count = self.model.fold, self._drift_v0, folded.first.astype(int) + folded.second
+        fold, count = self.model.fold, folded.first.astype(int) + folded.second
+        v0 = self._row_gain * self._drift_v0
         if self.model.data_kind == "normalised":
             return np.where(count > 0, 1.0, 0.0)
         total = np.where(folded.first, v0[fold.first], 0.0) + np.where(
@@ -325,6 +373,13 @@ class ReferenceEngine:
     @property
     def _noise_ratio(self) -> float:
         return 1.0 if self._whitening is None else self._whitening.noise_ratio
+
+    @property
+    def _detection_threshold(self) -> float:
+        """max(S'y) of a frame, or of a touch, below which there is none: one reference frame tells
+        no noise, but its rounding is known."""
+        learned = max(self._lambda_noise, self._lambda_noise_floor)
+        return self.options.detection_factor * self._noise_ratio * learned
 
     @property
     def _regularisation(self) -> float:
@@ -383,10 +438,11 @@ class ReferenceEngine:
                 1.0 if self._whitening is None else self._whitening.energy_ratio
             )
             noise = self._noise_energy / len(self.model.fold.first) * whole
-            reduced = Reduced(y, self._straight, self.seen, basis, lambda_noise, noise)
-            added = partial(self._interplay, basis, self._known) if self._couples else None
+            threshold = self._detection_threshold
+            reduced = Reduced(y, self._straight, self.seen, basis, threshold, noise)
+            added = partial(self._interplay, basis) if self._couples else None
             found, self._examiner.found.unexplained, coupled = find_touches(
-                self.model, reduced, image, o, added
+                self.model, reduced, image, o, added, self._data_errors(basis)
             )
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
             self._examiner.crowd(found, o, clearness)
@@ -437,10 +493,42 @@ class ReferenceEngine:
             and bool(self.options.touch_fit & INTERACTION)
         )
 
-    def _interplay(self, basis: FloatArray, known: BoolArray, discs: Sequence[Disc]) -> FloatArray:
-        """What discs add to y (r,) by what they do to each other, by the folds that are
-        ``known``."""
-        return project(self._reduce(np.where(known, interplay(self.model, discs), 0.0)), basis)
+    def _of_known(self, basis: FloatArray, d: FloatArray) -> FloatArray:
+        """Folded data ``d`` (k,) of the folds in use, reduced as the frame was (r,)."""
+        known = self._folded.first | self._folded.second
+        return project(self._reduce(np.where(known, d, 0.0)), basis)
+
+    def _interplay(self, basis: FloatArray, discs: Sequence[Disc]) -> FloatArray:
+        """What discs add to y (r,) by what they do to each other."""
+        return self._of_known(basis, interplay(self.model, discs))
+
+    def _dipoles(self, basis: FloatArray, disc: Disc) -> FloatArray:
+        """What a disc adds to y as a dipole that turns (2, r)."""
+        return np.array([self._of_known(basis, d) for d in turned_dipoles(self.model, disc)])
+
+    def _data_errors(self, basis: FloatArray) -> DataErrors | None:
+        """What the frame's data may be wrong by; None where touches are not to be tested, or rows
+        are left out."""
+        model, folded = self.model, self._folded
+        errors, rows = model.model_errors, model.row_form
+        if errors is None or rows is None or not self.options.touch_test:
+            return None
+        if len(basis) > 1 or not (self._whitening is None or folded.whole):
+            return None
+        along, square = self._along(folded), float(folded.d @ folded.d)
+        if along is not None and along @ along > 0:
+            square = max(0.0, square - float(folded.d @ along) ** 2 / float(along @ along))
+        least = (ERROR_MIN_NOISE * self._gain * self._v0_rms) ** 2
+        noise = max(self._noise_energy / len(model.fold.first), least)
+        weight = 1.0 if self._whitening is None else np.diag(self._whitening.data)
+        scale = np.outer(weight, weight)
+        error = ERROR_SHARE * square * errors.error + noise * np.diag(rows.energy.astype(float))
+        fields, room = model.fields, model.rank * stride_for(model.rank)
+        tells = fields is not None and stride_for(fields.columns.shape[1]) <= room
+        dipoles = (
+            partial(self._dipoles, basis) if tells and model.data_kind == "difference" else None
+        )
+        return DataErrors(scale * error, scale * errors.drift, dipoles)
 
     def _solve(
         self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None
@@ -450,7 +538,7 @@ class ReferenceEngine:
         lambda_max = greatest(self.seen.T @ y, o.sign)
         lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
         nothing, zero = Certificate(0.0, 0.5 * norm**2, norm), np.zeros(self.model.grid.n_pixels)
-        if o.detection_factor > 0 and lambda_max < o.detection_factor * lambda_noise:
+        if norm > 0 and lambda_max < self._detection_threshold:
             return SolveResult(zero, 0, "below-threshold", nothing, 0), lam, lambda_max
         if not lambda_max > lam or norm**2 < MIN_SQUARE:
             return SolveResult(zero, 0, "zero", nothing, 0), lam, lambda_max

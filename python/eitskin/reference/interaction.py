@@ -26,9 +26,7 @@ def interplay(model: Model, discs: Sequence[Disc]) -> FloatArray:
     seen = np.array([_over_disc(model, disc) for disc in discs])
     field = seen[:, :electrodes] + 1j * seen[:, electrodes : 2 * electrodes]
     mirror_a, mirror_b = (seen[:, -4 + 2 * k] + 1j * seen[:, -3 + 2 * k] for k in (0, 1))
-    moment = np.array(
-        [d.change * np.pi * (d.radius_mm**2 + model.grid.pixel_mm**2 / 12) for d in discs]
-    )
+    moment = np.array([_moment(model, disc) for disc in discs])
     rows = model.protocol.drive_measure.astype(np.int64)[model.fold.first]
     added = np.zeros(len(rows))
     for i, here in enumerate(discs):
@@ -49,6 +47,23 @@ def interplay(model: Model, discs: Sequence[Disc]) -> FloatArray:
         )
         added -= fields.volts * moment[i] * (drive * np.conj(measure)).real
     return added
+
+
+def turned_dipoles(model: Model, disc: Disc) -> FloatArray:
+    """What ``disc`` adds to the folded data as a dipole that turns (2, k), in the model's volts: Re
+    and Im of E_drive E_measure, as an ellipse adds to its disc's Re E_drive conj(E_measure)."""
+    assert model.fields is not None
+    electrodes, seen = model.protocol.n_electrodes, _over_disc(model, disc)
+    field = seen[:electrodes] + 1j * seen[electrodes : 2 * electrodes]
+    rows = model.protocol.drive_measure.astype(np.int64)[model.fold.first]
+    turned = (field[rows[:, 0]] - field[rows[:, 1]]) * (field[rows[:, 2]] - field[rows[:, 3]])
+    answer = -model.fields.volts * _moment(model, disc) * turned
+    return np.array([answer.real, answer.imag])
+
+
+def _moment(model: Model, disc: Disc) -> float:
+    """S/m mm^2: what ``disc`` adds to a dipole's strength."""
+    return float(disc.change * np.pi * (disc.radius_mm**2 + model.grid.pixel_mm**2 / 12))
 
 
 def _over_disc(model: Model, disc: Disc) -> FloatArray:

@@ -24,6 +24,7 @@ from eitskin.core.constants_table import (
     SPLIT_SWEEPS,
     SPLIT_TOTAL,
 )
+from eitskin.core.results import Options
 from eitskin.reference.disc_fit import Disc, Fit
 
 
@@ -56,14 +57,19 @@ def _near_pairs(discs: list[Disc]) -> list[tuple[float, int, int]]:
     )
 
 
-def _try_join(fit: Fit, i: int, j: int) -> bool:
-    before, left, a, b = list(fit.discs), fit.left(), fit.discs[i], fit.discs[j]
+def merged(options: Options, a: Disc, b: Disc) -> Disc:
+    """One disc in the place of two, of their area; without strength."""
     of_a, of_b = abs(a.change) * a.radius_mm**2, abs(b.change) * b.radius_mm**2
     w = of_a / (of_a + of_b) if of_a + of_b > 0 else 0.5
-    radius = min(float(np.hypot(a.radius_mm, b.radius_mm)), fit.options.touch_max_radius_mm)
-    one = Disc(
+    radius = min(float(np.hypot(a.radius_mm, b.radius_mm)), options.touch_max_radius_mm)
+    return Disc(
         w * a.x_mm + (1 - w) * b.x_mm, w * a.y_mm + (1 - w) * b.y_mm, radius, 0.0, a.polarity
     )
+
+
+def _try_join(fit: Fit, i: int, j: int) -> bool:
+    before, left, a, b = list(fit.discs), fit.left(), fit.discs[i], fit.discs[j]
+    one = merged(fit.options, a, b)
     fit.discs[i] = one
     del fit.discs[j]
     fit.discs[i] = replace(one, change=fit.best_change(one, fit.answers(one)[0], fit.residual()))

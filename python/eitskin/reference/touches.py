@@ -21,6 +21,7 @@ from eitskin.core.options_table import SPLIT_MERGE
 from eitskin.core.results import Options
 from eitskin.model.model import Model
 from eitskin.reference.disc_fit import Disc, Fit, Reduced
+from eitskin.reference.evidence import DataErrors, keep_likely
 from eitskin.reference.split_merge import join, part
 
 FloatArray = npt.NDArray[np.float64]
@@ -77,15 +78,23 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
 
 
 def find_touches(
-    model: Model, frame: Reduced, image: FloatArray, options: Options, interplay: Interplay | None
+    model: Model,
+    frame: Reduced,
+    image: FloatArray,
+    options: Options,
+    interplay: Interplay | None,
+    errors: DataErrors | None = None,
 ) -> tuple[tuple[Touch, ...], float, FloatArray]:
     """The touches of an ``image`` (n,) of ``frame``, strongest first and without ids or loads, the
     share of |y|^2 that they leave (0 where the image is zero), and the data (r,) that they were
-    fitted to in the end."""
+    fitted to in the end. With ``errors`` those are left out that such errors could have made."""
     fit = Fit(model, frame, options)
     explained = np.zeros(0)
     if np.abs(image).max() > 0:
         explained = search(fit, frame, image, interplay)
+        if errors is not None:
+            keep_likely(fit, errors)
+            explained = fit.explained()
     found = [
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)

@@ -1,0 +1,36 @@
+"""The numpy reference of the row gains in csrc/src/frame/reference.c: what makes the reference the
+model's own, row by row."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.constants_table import MAX_DISTANCE, MAX_RECIPROCITY, MAX_ROW_GAIN
+from eitskin.model.model import Model
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def row_gains(model: Model, usable: npt.NDArray[np.bool_], v0: FloatArray) -> FloatArray:
+    """What each row's data are multiplied by (m,), from a reference ``v0`` (m,) in the model's
+    volts and where it is ``usable`` (m,); all 1 where the instrument and not the skin differs from
+    the model: too far from it, or from reciprocity."""
+    fold, expected = model.fold, np.full(len(v0), np.nan)
+    paired = fold.second >= 0
+    expected[fold.first] = model.v_ref_v
+    expected[fold.second[paired]] = (fold.sign * model.v_ref_v)[paired]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = expected / v0
+    told = usable & (ratio > 0) & np.isfinite(ratio)
+    gains = np.where(told, np.clip(np.where(told, ratio, 1), 1 / MAX_ROW_GAIN, MAX_ROW_GAIN), 1.0)
+    first, second = usable[fold.first], paired & usable[fold.second]
+    logs = np.log(np.where(first, gains[fold.first], gains[fold.second]))[first | second]
+    both = first & second
+    apart = (v0[fold.first] - fold.sign * v0[fold.second])[both]
+    folded = np.where(first, v0[fold.first], 0) + np.where(second, fold.sign * v0[fold.second], 0)
+    mean = (folded / np.maximum(first.astype(int) + second, 1))[first | second]
+    distance, size = np.sqrt(np.mean(logs**2)), np.sqrt(np.mean(mean**2))
+    reciprocity = np.sqrt(np.mean(apart**2)) / size if both.any() else 0.0
+    fits = distance <= MAX_DISTANCE and reciprocity <= MAX_RECIPROCITY
+    return gains if fits else np.ones_like(gains)
