@@ -35,7 +35,8 @@ static eits_real data_energy(const eits_context *ctx)
     const eits_real total = eits_dot(ctx->kernels, d, d, folds),
                     drift = eits_dot(ctx->kernels, gain, gain, folds),
                     along = eits_dot(ctx->kernels, d, gain, folds);
-    return drift > 0 ? total - along * along / drift : total;
+    const eits_real left = drift > 0 ? total - along * along / drift : total;
+    return left < 0 ? 0 : left; /* of a frame that only drifts, rounding is left, of either sign */
 }
 
 static eits_real *row_of_factor(const eits_context *ctx, uint32_t i)
@@ -61,7 +62,8 @@ static void covariance_row(const eits_context *ctx, uint32_t i, eits_real errors
         row[j] *= weight[i] * weight[j];
 }
 
-/* Cholesky's factor of the rows, each from those above it. Returns log det Sigma. */
+/* Cholesky's factor of the rows, each from those above it. Returns log det Sigma; NaN where that is
+ * out of range (volts or errors at the ends of it). */
 static eits_real factor(const eits_context *ctx)
 {
     eits_real log_determinant = 0;
@@ -74,6 +76,8 @@ static eits_real factor(const eits_context *ctx)
         }
         const eits_real left = diagonal - eits_dot(ctx->kernels, row, row, i),
                         min = EITS_MIN_PIVOT * diagonal, pivot = left > min ? left : min;
+        if (!(pivot > 0) || !eits_is_finite(pivot))
+            return R(NAN);
         row[i] = eits_sqrt(pivot);
         log_determinant += eits_log(pivot);
     }
@@ -91,6 +95,8 @@ int eits_factor_covariance(eits_context *ctx, int drift, eits_real *log_determin
         covariance_row(ctx, i, errors, drift ? 1 : 0, noise);
     *log_determinant = factor(ctx);
     *macs += (uint64_t)rank * rank * rank / 6u;
+    if (!eits_is_finite(*log_determinant))
+        return 0;
     eits_copy(ctx->evidence.gain_drift, ctx->projection.basis, EITS_STRIDE(rank));
     ctx->evidence.drifts = 0;
     if (ctx->projection.count == 1) {
@@ -101,7 +107,7 @@ int eits_factor_covariance(eits_context *ctx, int drift, eits_real *log_determin
             ctx->evidence.gain_drift[i] /= size;
         ctx->evidence.drifts = 1;
     }
-    return eits_is_finite(*log_determinant);
+    return 1;
 }
 
 uint64_t eits_whiten_errors(const eits_context *ctx, eits_real *v)

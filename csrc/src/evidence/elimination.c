@@ -269,7 +269,7 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
         return;
     if (!v.clear && v.first_excess > EITS_FITS) {
         const verdict drifted = judge(ctx, scratch, f, 1, &f->macs);
-        if (drifted.evidence < v.evidence)
+        if (drifted.answer.parameters > 0 && drifted.evidence < v.evidence)
             v = drifted;
     }
     const eits_real unit = excess(ctx, v.answer.misfit, v.answer.count);

@@ -19,8 +19,10 @@ uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count)
 {
     const uint32_t room =
         ctx->model->rank < EITS_EVIDENCE_COLUMNS ? ctx->model->rank : EITS_EVIDENCE_COLUMNS;
-    const int dipoles =
-        ctx->model->fields.at.data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE;
+    const eits_matrix *fields = &ctx->model->fields.at;
+    /* a disc's fields are kept in scratch->square */
+    const int dipoles = fields->data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE &&
+                        fields->stride <= ctx->model->rank * EITS_STRIDE(ctx->model->rank);
     const uint32_t all = dipoles ? EITS_SHAPE_PARAMETERS : EITS_EDGE_PARAMETERS;
     if (count * all <= room)
         return all;

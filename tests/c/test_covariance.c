@@ -1,0 +1,256 @@
+/* What the test of touches weighs by, written out in double: the covariance of the data's errors
+ * and its factor; what the parameters of a disc, and of shapes that are none, move the data by. */
+#include "evidence_bench.h"
+
+#include <complex.h>
+
+/* ---- the covariance ---- */
+
+/* Sigma as documented, from the frame and the matrices; `w`: the whitening's weights, or NULL. */
+static void covariance(const bench *b, int drift, double noise_v, const double *w,
+                       double sigma[RANK][RANK])
+{
+    const eits_context *ctx = b->b.c.ctx;
+    double square = 0, along = 0, reference = 0;
+    for (int k = 0; k < SMALL_FOLDED; ++k) {
+        const double v = (double)ctx->model->v_ref[k];
+        square += b->d[k] * b->d[k];
+        along += b->d[k] * v;
+        reference += v * v;
+    }
+    if (ctx->options.project_reference)
+        square -= along * along / reference;
+    const double least = (double)EITS_ERROR_MIN_NOISE * sqrt(reference / SMALL_FOLDED),
+                 variance = pow(fmax(noise_v, least), 2);
+    for (int i = 0, at = 0; i < RANK; ++i) {
+        for (int j = 0; j <= i; ++j, ++at) {
+            sigma[i][j] = (double)EITS_ERROR_SHARE * square * (double)b->errors[at] +
+                          (drift ? (double)b->drift[at] : 0) +
+                          (i == j ? variance * energy(b, i) : 0);
+            sigma[i][j] *= w == NULL ? 1 : w[i] * w[j];
+            sigma[j][i] = sigma[i][j];
+        }
+    }
+}
+
+/* In place: the lower triangle becomes L. Returns log det. */
+static double dense_cholesky(double a[RANK][RANK])
+{
+    double sum = 0;
+    for (int i = 0; i < RANK; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            const double left = a[i][j] - dense_dot(a[i], a[j], (size_t)j);
+            a[i][j] = i == j ? sqrt(left) : left / a[j][j];
+        }
+        sum += 2 * log(a[i][i]);
+    }
+    return sum;
+}
+
+static void solve_lower(double l[RANK][RANK], double *v)
+{
+    for (int i = 0; i < RANK; ++i)
+        v[i] = (v[i] - dense_dot(l[i], v, (size_t)i)) / l[i][i];
+}
+
+/* With and without drift, with and without a direction that is ignored, with the model's
+ * regularisation and a raised one. */
+static void the_covariance_is_noise_and_model_errors(void)
+{
+    for (int way = 0; way < 8; ++way) {
+        bench b;
+        const int drift = way & 1, project = way >> 1 & 1, noisy = way >> 2;
+        eits_context *ctx = set_up(&b, project);
+        const double noise_v = noisy ? 0.02 * (double)ctx->reference.v0_rms : 0;
+        ctx->reference.noise_v = (eits_real)noise_v;
+        ctx->projection.stale = 1;
+        stage_discs(&b, &ONE, 1);
+        CHECK_EQUAL(ctx->whitening.form, noisy ? EITS_WHITENING_DIAGONAL : EITS_WHITENING_STORED);
+        double sigma[RANK][RANK], *w = noisy ? dense_copy(ctx->whitening.map, RANK) : NULL;
+        covariance(&b, drift, noise_v, w, sigma);
+        eits_real log_determinant, v[STRIDE];
+        uint64_t macs = 0, state = 3;
+        CHECK(eits_factor_covariance(ctx, drift, &log_determinant, &macs) && macs > 0);
+        for (int i = 0; i < RANK; ++i) {
+            double *row = dense_copy(ctx->evidence.factor + STRIDE * i, RANK);
+            for (int j = 0; j <= i; ++j) {
+                double *above = dense_copy(ctx->evidence.factor + STRIDE * j, RANK);
+                CHECK_NEAR(dense_dot(row, above, (size_t)j + 1), sigma[i][j],
+                           BOTH_WIDTHS(2e-4, 2e-7) * sqrt(sigma[i][i] * sigma[j][j]));
+                free(above);
+            }
+            free(row);
+        }
+        CHECK_NEAR(log_determinant, dense_cholesky(sigma), BOTH_WIDTHS(0.01, 1e-5));
+        double expected[RANK], along[RANK];
+        for (int i = 0; i < RANK; ++i) {
+            expected[i] = small_random(&state);
+            v[i] = (eits_real)expected[i];
+            along[i] = project ? (double)ctx->projection.basis[i] : 0;
+        }
+        solve_lower(sigma, expected);
+        solve_lower(sigma, along);
+        CHECK_EQUAL(ctx->evidence.drifts, project);
+        const double part = dense_dot(expected, along, RANK), whole = dense_dot(along, along, RANK),
+                     size = sqrt(dense_dot(expected, expected, RANK));
+        for (int i = 0; project && i < RANK; ++i)
+            expected[i] -= part / whole * along[i];
+        CHECK(eits_whiten_errors(ctx, v) >= RANK * (RANK + 1) / 2);
+        CHECK_NEAR(dense_greatest_difference(expected, v, RANK), 0, BOTH_WIDTHS(1e-3, 1e-6) * size);
+        free(w);
+        dense_bench_close(&b.b);
+    }
+}
+
+/* A frame that is drift of the gain alone has no energy that a touch could have: rounding of either
+ * sign is none. */
+static void a_frame_of_drift_alone_has_errors_of_noise(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    eits_real log_determinant, noise_alone;
+    uint64_t macs = 0;
+    for (int k = 0; k < 20; ++k) {
+        double y[RANK] = {0};
+        stage(&b, y);
+        CHECK(eits_factor_covariance(ctx, 0, &noise_alone, &macs));
+        for (int i = 0; i < SMALL_FOLDED; ++i)
+            ctx->frame.d[i] = (eits_real)(1 + 0.37 * k) * (eits_real)ctx->model->v_ref[i];
+        fill_errors(b.errors, 1e-4);
+        CHECK(eits_factor_covariance(ctx, 0, &log_determinant, &macs));
+        CHECK(log_determinant >= noise_alone);
+        CHECK_NEAR(log_determinant, noise_alone, BOTH_WIDTHS(5, 1e-6));
+    }
+    dense_bench_close(&b.b);
+}
+
+/* ---- shapes ---- */
+
+/* The answer to a disc of 1 S/m that a parameter has moved by so many mm: 1 x, 2 y, 3 radius; 4 and
+ * 5 the rim, times cos and sin of twice the angle. */
+static void shaped_answer(const bench *b, const eits_disc *disc, int parameter, double by,
+                          double *out)
+{
+    const eits_model *m = &b->b.c.model;
+    const double pixel = (double)m->pixel_mm, x = (double)disc->x_mm + (parameter == 1 ? by : 0),
+                 y = (double)disc->y_mm + (parameter == 2 ? by : 0);
+    memset(out, 0, RANK * sizeof *out);
+    for (uint32_t j = 0; j < m->n_pixels; ++j) {
+        const double dx = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - x,
+                     dy = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - y,
+                     twice = 2 * atan2(dy, dx);
+        const double further[] = {0, 0, 0, by, by * cos(twice), by * sin(twice)};
+        const double radius = (double)disc->radius_mm + further[parameter];
+        const double cover = fmin(1, fmax(0, 0.5 + (radius - hypot(dx, dy)) / pixel));
+        for (int i = 0; i < RANK; ++i)
+            out[i] += cover / (double)m->column_weight[j] * b->b.d.s[j * RANK + (uint32_t)i];
+    }
+}
+
+/* Re or Im of E_drive E_measure, E averaged over the disc's cover, times -volts change area. */
+static void dipole_answer(const bench *b, const eits_disc *disc, int part, double *out)
+{
+    const eits_model *m = &b->b.c.model;
+    const double pixel = (double)m->pixel_mm, pi = 3.14159265358979323846;
+    double complex field[SMALL_ELECTRODES] = {0};
+    double whole = 0;
+    for (uint32_t j = 0; j < m->n_pixels; ++j) {
+        const double dx =
+            (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
+        const double dy =
+            (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
+        const double cover =
+            fmin(1, fmax(0, 0.5 + ((double)disc->radius_mm - hypot(dx, dy)) / pixel));
+        whole += cover;
+        for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e)
+            field[e] += cover * (dense_entry(&m->fields.at, j, e) +
+                                 I * dense_entry(&m->fields.at, j, SMALL_ELECTRODES + e));
+    }
+    const double radius = (double)disc->radius_mm,
+                 moment = (double)disc->change * pi * (radius * radius + pixel * pixel / 12);
+    memset(out, 0, RANK * sizeof *out);
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        const uint8_t *row = m->protocol + 4 * (size_t)m->fold[k].first;
+        const double complex answer = (field[row[0]] - field[row[1]]) / whole *
+                                      (field[row[2]] - field[row[3]]) / whole *
+                                      -(double)m->fields.volts * moment;
+        for (int i = 0; i < RANK; ++i)
+            out[i] += b->b.d.p[k * RANK + (uint32_t)i] * (part ? cimag(answer) : creal(answer));
+    }
+}
+
+/* All in Sigma's metric. */
+static void shapes_move_the_data_as_ellipses_do(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 0);
+    eits_real log_determinant;
+    uint64_t macs = 0;
+    stage_discs(&b, &ONE, 1);
+    CHECK(eits_factor_covariance(ctx, 0, &log_determinant, &macs));
+    const eits_answer answer = answer_of(&ONE, 1, EITS_SHAPE_PARAMETERS);
+    const double change = (double)ONE.change, radius = (double)ONE.radius_mm, step = 1e-3;
+    double expected[EITS_SHAPE_PARAMETERS][RANK], left[RANK] = {0};
+    for (int p = 0; p < EITS_SHAPE_PARAMETERS; ++p) {
+        double up[RANK], down[RANK];
+        eits_real v[STRIDE];
+        const double unit[] = {1, 6, 6, 0.9 * radius, radius, radius};
+        if (p >= EITS_EDGE_PARAMETERS) {
+            dipole_answer(&b, &ONE, p - EITS_EDGE_PARAMETERS, expected[p]);
+        } else {
+            shaped_answer(&b, &ONE, p, step, up);
+            shaped_answer(&b, &ONE, p, -step, down);
+            for (int i = 0; i < RANK; ++i)
+                expected[p][i] =
+                    change * unit[p] *
+                    (p == 0 ? 0.5 * (up[i] + down[i]) : (up[i] - down[i]) / (2 * step));
+        }
+        for (int i = 0; i < RANK; ++i)
+            v[i] = (eits_real)expected[p][i];
+        (void)eits_whiten_errors(ctx, v);
+        for (int i = 0; i < RANK; ++i)
+            expected[p][i] = (double)v[i];
+    }
+    eits_zero(ctx->evidence.left, STRIDE);
+    CHECK(eits_shape_columns(ctx, &ctx->scratch, &answer, 0) > 0);
+    for (int p = 0; p < EITS_SHAPE_PARAMETERS; ++p) {
+        const double size = sqrt(dense_dot(expected[p], expected[p], RANK)),
+                     part = p == 0 ? 1 : (p < 4 ? 0 : (double)answer.shape[0][p - 4]);
+        CHECK(size > 0);
+        CHECK_NEAR(dense_greatest_difference(expected[p], ctx->evidence.column + STRIDE * p, RANK),
+                   0, BOTH_WIDTHS(1e-3, 1e-6) * size);
+        for (int i = 0; i < RANK; ++i)
+            left[i] -= part * (double)ctx->evidence.column[STRIDE * p + i];
+    }
+    CHECK_NEAR(dense_greatest_difference(left, ctx->evidence.left, RANK), 0,
+               1000 * EPS * sqrt(dense_dot(left, left, RANK)));
+    dense_bench_close(&b.b);
+}
+
+/* Eight parameters a disc where there is room, then four, then none; dipoles where there are fields
+ * and room to keep a disc's. */
+static void parameters_fit_the_data(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 0);
+    const uint32_t expected[] = {8, 8, 8, 4, 4, 4, 0};
+    for (uint32_t count = 0; count < 7; ++count)
+        CHECK_EQUAL(eits_shape_parameters(ctx, count), expected[count]);
+    b.b.c.model.fields.at.stride = RANK * STRIDE + 8;
+    CHECK_EQUAL(eits_shape_parameters(ctx, 1), 6);
+    CHECK_EQUAL(eits_shape_parameters(ctx, 3), 6);
+    b.b.c.model.fields.at.stride = RANK * STRIDE;
+    CHECK_EQUAL(eits_shape_parameters(ctx, 1), 8);
+    b.b.c.model.data_kind = EITS_DATA_NORMALISED;
+    CHECK_EQUAL(eits_shape_parameters(ctx, 1), 6);
+    dense_bench_close(&b.b);
+}
+
+int main(void)
+{
+    the_covariance_is_noise_and_model_errors();
+    a_frame_of_drift_alone_has_errors_of_noise();
+    shapes_move_the_data_as_ellipses_do();
+    parameters_fit_the_data();
+    return checks_report("covariance");
+}

@@ -1,0 +1,393 @@
+/* The test of touches: its linearisation and what that says of a disc left out, against dense
+ * problems solved again; which discs go and which stay. */
+#include "evidence_bench.h"
+
+enum { MOST = 24 };
+
+/* ---- the linearisation ---- */
+
+/* A x = b by Gauss's elimination, all of them changed; n at most MOST. */
+static void solve_dense(double a[MOST][MOST], double *x, int n)
+{
+    for (int i = 0; i < n; ++i) {
+        for (int j = i + 1; j < n; ++j) {
+            const double part = a[j][i] / a[i][i];
+            for (int k = i; k < n; ++k)
+                a[j][k] -= part * a[i][k];
+            x[j] -= part * x[i];
+        }
+    }
+    for (int i = n; i-- > 0;) {
+        for (int k = i + 1; k < n; ++k)
+            x[i] -= a[i][k] * x[k];
+        x[i] /= a[i][i];
+    }
+}
+
+/* F(s) = here - 2 g's + s'A s of the columns, data and priors as they stand. */
+typedef struct square {
+    double a[MOST][MOST], g[MOST], off[MOST], here;
+} square;
+
+static square written_out(const eits_context *ctx, const eits_answer *answer)
+{
+    square q = {.here = 0};
+    const int n = (int)(answer->count * answer->parameters), p = (int)answer->parameters;
+    double *left = dense_copy(ctx->evidence.left, RANK);
+    q.here = dense_dot(left, left, RANK);
+    for (int i = 0; i < n; ++i) {
+        const int k = i / p, own = i % p;
+        const double h =
+            (double)(own < 3 ? EITS_FREE_PRECISION
+                             : (own < 6 ? EITS_SHAPE_PRECISION : EITS_DIPOLE_PRECISION));
+        double *column = dense_copy(ctx->evidence.column + STRIDE * i, RANK);
+        q.off[i] = own < 3
+                       ? 0
+                       : (own == 3 ? (double)(answer->disc[k].radius_mm / answer->radius_mm[k]) - 1
+                                   : (double)answer->shape[k][own - 4]);
+        q.g[i] = dense_dot(column, left, RANK) - h * q.off[i];
+        q.here += h * q.off[i] * q.off[i];
+        for (int j = 0; j <= i; ++j) {
+            double *other = dense_copy(ctx->evidence.column + STRIDE * j, RANK);
+            q.a[i][j] = q.a[j][i] = dense_dot(column, other, RANK) + (i == j ? h : 0);
+            free(other);
+        }
+        free(column);
+    }
+    free(left);
+    return q;
+}
+
+/* F at its least, and where; parameters of discs that are `out` held at no strength and at their
+ * priors' middle. */
+static double least_without(const square *q, const eits_answer *answer, const int *out, double *s)
+{
+    const int n = (int)(answer->count * answer->parameters), p = (int)answer->parameters;
+    double a[MOST][MOST], x[MOST], least = q->here;
+    int free_ones[MOST], count = 0;
+    for (int i = 0; i < n; ++i) {
+        s[i] = out[i / p] ? (i % p == 0 ? -1 : -q->off[i]) : 0;
+        if (!out[i / p])
+            free_ones[count++] = i;
+    }
+    for (int i = 0; i < count; ++i) {
+        x[i] = q->g[free_ones[i]] - dense_dot(q->a[free_ones[i]], s, (size_t)n);
+        for (int j = 0; j < count; ++j)
+            a[i][j] = q->a[free_ones[i]][free_ones[j]];
+    }
+    solve_dense(a, x, count);
+    for (int i = 0; i < count; ++i)
+        s[free_ones[i]] = x[i];
+    for (int i = 0; i < n; ++i)
+        least += s[i] * (dense_dot(q->a[i], s, (size_t)n) - 2 * q->g[i]);
+    return least;
+}
+
+/* Three discs of four parameters and two of eight: the step is where F is least, its matrix's
+ * inverse is that, and leaving discs out, one after another, gives what solving again without them
+ * gives. */
+static void leaving_out_is_solving_again_without(void)
+{
+    static const eits_disc third = {2, 19, 11, R(0.01), 1};
+    const eits_disc discs[] = {ONE, OTHER, third};
+    const double room = BOTH_WIDTHS(3e-3, 1e-8);
+    for (uint32_t count = 2; count < 4; ++count) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        eits_real log_determinant;
+        eits_likelihood now;
+        uint64_t macs = 0;
+        stage_discs(&b, discs, 2);
+        CHECK(eits_factor_covariance(ctx, 0, &log_determinant, &macs));
+        eits_copy(ctx->evidence.data, ctx->frame.y, STRIDE);
+        (void)eits_whiten_errors(ctx, ctx->evidence.data);
+        eits_answer answer = answer_of(discs, count, count == 2 ? 8 : 4);
+        answer.disc[0].x_mm += 2;
+        answer.disc[1].change *= R(0.8);
+        CHECK(eits_linearise(ctx, &ctx->scratch, &answer, &now) > 0);
+        const square q = written_out(ctx, &answer);
+        const int n = (int)now.count;
+        int out[3] = {0};
+        double s[MOST];
+        CHECK_EQUAL(n, count == 2 ? 16 : 12);
+        CHECK_NEAR(now.here, q.here, 1e4 * EPS * q.here);
+        CHECK_NEAR(now.least, least_without(&q, &answer, out, s), room * q.here);
+        for (uint32_t round = 0; round < count; ++round) {
+            const double before = least_without(&q, &answer, out, s);
+            for (int i = 0; i < n; ++i) {
+                if (out[(uint32_t)i / answer.parameters])
+                    continue;
+                double unit = 0;
+                CHECK_NEAR(now.step[i], s[i], 10 * room * (1 + fabs(s[i])));
+                for (int j = 0; j < n; ++j) { /* a row of A^-1 A, within the discs that are left */
+                    unit = 0;
+                    for (int k = 0; k < n; ++k)
+                        unit += out[(uint32_t)k / answer.parameters]
+                                    ? 0
+                                    : (double)ctx->scratch
+                                              .square[EITS_STRIDE(n) * (uint32_t)i + (uint32_t)k] *
+                                          q.a[k][j];
+                    if (!out[(uint32_t)j / answer.parameters])
+                        CHECK_NEAR(unit, i == j,
+                                   30 * room * sqrt(q.a[j][j] / q.a[i][i]) + 10 * room);
+                }
+            }
+            for (uint32_t k = 0; k < count; ++k) {
+                if (out[k])
+                    continue;
+                out[k] = 1;
+                const double rise = least_without(&q, &answer, out, s) - before;
+                CHECK(rise > 0);
+                CHECK_NEAR(eits_linear_rise(&ctx->scratch, &answer, &now, k), rise,
+                           10 * room * rise);
+                out[k] = 0;
+            }
+            const uint32_t gone = (round + 1) % count;
+            CHECK(eits_linear_drop(ctx, &ctx->scratch, &answer, &now, gone) > 0);
+            out[gone] = 1;
+            const double least = least_without(&q, &answer, out, s);
+            CHECK_NEAR(now.least, least, 10 * room * least);
+        }
+        dense_bench_close(&b.b);
+    }
+}
+
+/* From a place and a strength that are off: F falls, and the disc ends nearer; from far off no step
+ * is longer than a pixel, a radius stays in its range, a strength keeps its sign. Without discs F
+ * is that of the data. */
+static void refitting_lowers_the_misfit_by_limited_steps(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    eits_real log_determinant;
+    eits_likelihood now;
+    uint64_t macs = 0;
+    stage_discs(&b, &ONE, 1);
+    CHECK(eits_factor_covariance(ctx, 0, &log_determinant, &macs));
+    eits_copy(ctx->evidence.data, ctx->frame.y, STRIDE);
+    (void)eits_whiten_errors(ctx, ctx->evidence.data);
+    eits_answer near = answer_of(&ONE, 1, EITS_SHAPE_PARAMETERS);
+    near.radius_mm[0] = ONE.radius_mm;
+    memset(near.shape, 0, sizeof near.shape);
+    near.disc[0].x_mm += 2;
+    near.disc[0].change *= R(0.8);
+    (void)eits_linearise(ctx, &ctx->scratch, &near, &now);
+    CHECK(eits_refit(ctx, &ctx->scratch, &near) > 0);
+    CHECK(near.misfit < R(0.05) * now.here);
+    CHECK_NEAR(near.disc[0].x_mm, ONE.x_mm, 0.2);
+    CHECK_NEAR(near.disc[0].change, ONE.change, 0.05 * (double)ONE.change);
+    for (int k = 0; k < 8; ++k) {
+        eits_answer far = answer_of(&ONE, 1, k % 2 ? EITS_SHAPE_PARAMETERS : EITS_PLACE_PARAMETERS);
+        far.disc[0].x_mm += (eits_real)(30 * cos(k));
+        far.disc[0].y_mm += (eits_real)(30 * sin(k));
+        far.disc[0].change *= k < 4 ? R(8.0) : R(0.05);
+        const eits_disc before = far.disc[0];
+        (void)eits_linearise(ctx, &ctx->scratch, &far, &now);
+        (void)eits_refit(ctx, &ctx->scratch, &far);
+        const eits_disc *after = &far.disc[0];
+        CHECK(far.misfit <= now.here && after->change > 0);
+        CHECK(after->change >= R(0.124) * before.change && after->change <= R(8.1) * before.change);
+        CHECK(eits_fabs(after->x_mm - before.x_mm) <= R(18.01) &&
+              eits_fabs(after->y_mm - before.y_mm) <= R(18.01) &&
+              eits_fabs(after->radius_mm - before.radius_mm) <= R(9.01));
+        CHECK(after->radius_mm >= ctx->options.touch_min_radius_mm &&
+              after->radius_mm <= ctx->options.touch_max_radius_mm);
+    }
+    eits_answer none = {.count = 0, .parameters = 8};
+    (void)eits_refit(ctx, &ctx->scratch, &none);
+    double *data = dense_copy(ctx->evidence.data, RANK);
+    CHECK_NEAR(none.misfit, dense_dot(data, data, RANK), 100 * EPS * (double)none.misfit);
+    free(data);
+    dense_bench_close(&b.b);
+}
+
+/* ---- which discs stay ---- */
+
+/* E (or D) of one direction v and of this size, and nothing else. */
+static void one_direction(float *packed, const double *v, double size)
+{
+    for (int i = 0, at = 0; i < RANK; ++i) {
+        for (int j = 0; j <= i; ++j)
+            packed[at++] = (float)(size * v[i] * v[j]);
+    }
+}
+
+static double squared(const double *d)
+{
+    return dense_dot(d, d, SMALL_FOLDED);
+}
+
+static void check_what_stays(eits_context *ctx, const eits_fit *f)
+{
+    eits_fit again = *f;
+    eits_real residual[STRIDE];
+    CHECK_EQUAL(f->tested, 1);
+    eits_copy(residual, f->residual, STRIDE);
+    eits_fit_restart(ctx, &ctx->scratch, &again);
+    double *expected = dense_copy(again.residual, RANK);
+    CHECK_NEAR(dense_greatest_difference(expected, residual, RANK), 0,
+               100 * EPS * sqrt((double)f->total));
+    free(expected);
+    for (uint32_t k = 0; k < f->count; ++k) {
+        const eits_real *place = f->place_mm2[k];
+        CHECK(f->rise[k] > EITS_TOUCH_EVIDENCE && f->explained[k] > 0);
+        CHECK(place[0] > 0 && place[2] > 0 && place[1] * place[1] <= place[0] * place[2]);
+    }
+}
+
+/* The same two discs: where nothing is wrong with the model both are touches, and stay bit for bit;
+ * where it errs in just the way of the weaker one, that goes. */
+static void what_model_errors_could_have_made_goes(void)
+{
+    for (int errs = 0; errs < 2; ++errs) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        eits_disc discs[2] = {ONE, OTHER};
+        double ghost[RANK] = {0};
+        discs[1].change *= R(0.2);
+        add_disc(&b, &discs[1], 1, ghost);
+        stage_discs(&b, discs, 2);
+        one_direction(b.errors, ghost, errs ? 1 / (0.25 * squared(b.d)) : 0);
+        eits_fit f = fit_of(ctx, discs, 2);
+        eits_test_touches(ctx, &ctx->scratch, &f);
+        CHECK_EQUAL(f.count, errs ? 1 : 2);
+        check_what_stays(ctx, &f);
+        CHECK_NEAR(f.disc[0].x_mm, ONE.x_mm, errs ? 1 : 0);
+        CHECK_NEAR(f.disc[0].y_mm, ONE.y_mm, errs ? 1 : 0);
+        CHECK(errs || memcmp(f.disc, discs, sizeof discs) == 0);
+        dense_bench_close(&b.b);
+    }
+}
+
+static void halves_of_a_touch_become_one(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    eits_disc halves[2] = {ONE, ONE};
+    stage_discs(&b, &ONE, 1);
+    halves[0].x_mm -= 4;
+    halves[1].x_mm += 4;
+    halves[0].change = halves[1].change = R(0.5) * ONE.change;
+    eits_fit f = fit_of(ctx, halves, 2);
+    eits_test_touches(ctx, &ctx->scratch, &f);
+    CHECK_EQUAL(f.count, 1);
+    check_what_stays(ctx, &f);
+    CHECK_NEAR(f.disc[0].x_mm, ONE.x_mm, 1.5);
+    CHECK_NEAR(f.disc[0].y_mm, ONE.y_mm, 1.5);
+    dense_bench_close(&b.b);
+}
+
+/* Data that no discs explain and a drift of the sheet does: the discs that were found in it go, the
+ * true one stays; where the sheet cannot drift so, the data fit badly, and a touch is worth less.
+ */
+static void discs_found_in_a_drift_go(void)
+{
+    eits_real rise[2];
+    for (int drifts = 0; drifts < 2; ++drifts) {
+        bench b;
+        eits_context *ctx = set_up(&b, 0);
+        eits_disc discs[2] = {ONE, OTHER};
+        double y[RANK] = {0}, drift[RANK];
+        uint64_t state = 29;
+        add_disc(&b, &ONE, 1, y);
+        const double size = sqrt(dense_dot(y, y, RANK));
+        for (int i = 0; i < RANK; ++i) {
+            drift[i] = 0.1 * size * small_random(&state);
+            y[i] += drift[i];
+        }
+        stage(&b, y);
+        memset(b.errors, 0, sizeof b.errors);
+        one_direction(b.drift, drift, drifts);
+        discs[1].change *= R(0.1);
+        eits_fit f = fit_of(ctx, discs, 2);
+        eits_test_touches(ctx, &ctx->scratch, &f);
+        CHECK_EQUAL(f.tested, 1);
+        CHECK(f.count >= 1);
+        rise[drifts] = f.rise[0];
+        if (drifts) {
+            CHECK_EQUAL(f.count, 1);
+            check_what_stays(ctx, &f);
+            CHECK_NEAR(f.disc[0].x_mm, ONE.x_mm, 0.5);
+            CHECK_NEAR(f.disc[0].y_mm, ONE.y_mm, 0.5);
+        }
+        dense_bench_close(&b.b);
+    }
+    CHECK(rise[1] > 10 * rise[0]);
+}
+
+/* No such section, not asked for, a row left out, numbers out of range: discs stay as they are. */
+static void what_cannot_be_tested_is_left_alone(void)
+{
+    for (int way = 0; way < 7; ++way) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        eits_options o = *eits_get_options(ctx);
+        eits_disc ghosts[6];
+        if (way == 0)
+            b.b.c.model.uncertainty.errors = NULL;
+        o.touch_test = way != 1;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        if (way == 2) {
+            CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[4].first, 1), EITS_OK);
+            CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[4].second, 1), EITS_OK);
+        }
+        stage_discs(&b, &ONE, 1);
+        for (int i = 0; i < PACKED; ++i) {
+            b.errors[i] = way == 3 ? 1e30f : (way == 4 ? 0 : b.errors[i]);
+            b.drift[i] = way == 4 ? 0 : b.drift[i];
+        }
+        if (way == 3) /* the product with |d|^2 overflows a float */
+            ctx->frame.d[0] = R(BOTH_WIDTHS(1e15, 1e150));
+        if (way == 4) /* no error at all, and a reference of nothing */
+            ctx->reference.v0_rms = 0;
+        if (way == 5)
+            ctx->frame.d[0] = R(NAN);
+        for (int k = 0; k < 6; ++k) {
+            ghosts[k] = k == 0 ? ONE : OTHER;
+            ghosts[k].x_mm -= (eits_real)(4 * k);
+        }
+        /* 6 discs have 24 parameters, the data are 20 */
+        eits_fit f = fit_of(ctx, ghosts, way == 6 ? 6 : 2);
+        const eits_fit before = f;
+        eits_test_touches(ctx, &ctx->scratch, &f);
+        CHECK_EQUAL(f.tested, 0);
+        CHECK_EQUAL(f.count, before.count);
+        CHECK(memcmp(f.disc, before.disc, sizeof f.disc) == 0);
+        dense_bench_close(&b.b);
+    }
+}
+
+/* Nothing to explain, or nothing that is a number: the test comes to an end, and discs with data of
+ * nothing go. */
+static void zeros_and_nan_come_to_an_end(void)
+{
+    for (int way = 0; way < 3; ++way) {
+        bench b;
+        eits_context *ctx = set_up(&b, way == 1);
+        const eits_disc discs[2] = {ONE, OTHER};
+        double y[RANK] = {0};
+        stage(&b, y);
+        if (way == 2)
+            ctx->frame.y[3] = R(NAN);
+        eits_fit f = fit_of(ctx, discs, 2);
+        eits_test_touches(ctx, &ctx->scratch, &f);
+        CHECK_EQUAL(f.tested, 1);
+        CHECK_EQUAL(f.count, way == 2 ? 2 : 0);
+        f = fit_of(ctx, discs, 0);
+        eits_test_touches(ctx, &ctx->scratch, &f);
+        CHECK(f.count == 0 && f.tested == 0);
+        dense_bench_close(&b.b);
+    }
+}
+
+int main(void)
+{
+    leaving_out_is_solving_again_without();
+    refitting_lowers_the_misfit_by_limited_steps();
+    what_model_errors_could_have_made_goes();
+    halves_of_a_touch_become_one();
+    discs_found_in_a_drift_go();
+    what_cannot_be_tested_is_left_alone();
+    zeros_and_nan_come_to_an_end();
+    return checks_report("evidence");
+}
