@@ -82,11 +82,15 @@ def ranges_of(table: Mapping[str, Any], scene: Scene, where: str) -> Ranges:
 def _rules(table: Mapping[str, Any], where: str) -> TouchRules:
     given: dict[str, Any] = {}
     for key, value in table.items():
-        if key in ("count", "radius_mm", "contrast"):
+        if key in ("count", "radius_mm", "contrast", "aspect"):
             low, high, whole = _pair(value, f"{where}: {key}")
             if key == "count" and not whole:
                 raise ConfigError(f"{where}: count = {value!r} must be two whole numbers")
             given[key] = (low, high) if key != "count" else (int(low), int(high))
+        elif key == "shape":
+            if not isinstance(value, str):
+                raise ConfigError(f"{where}: shape must be text in quotes, not {value!r}")
+            given[key] = value
         elif isinstance(value, bool) or not isinstance(value, int | float):
             raise ConfigError(f"{where}: {key} must be a number, not {value!r}")
         else:
@@ -157,7 +161,12 @@ def drawn(scene: Scene, ranges: Ranges, seed: int, number: int) -> Scene:
                 .scenes[0]
                 .touches
             )
-            touches = [always(t.x_mm, t.y_mm, t.radius_mm, ShortCircuit(t.contrast)) for t in found]
+            touches = [
+                replace(
+                    always(t.x_mm, t.y_mm, t.radius_mm, ShortCircuit(t.contrast)), shape=t.shape
+                )
+                for t in found
+            ]
         for one in ranges.numbers:
             value = one.draw(seed, number)
             if one.key[0] == "effects":

@@ -8,12 +8,15 @@ A scene depends on (seed, role, its number) only: the first 20 scenes of a set o
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.config import nearest
 from eitskin.errors import GeometryError, UsageError
 from eitskin.scene.streams import stream
 from eitskin.skin.outline import Outline
@@ -44,6 +47,20 @@ class TrueTouch:
     contrast: float
     shape: TouchShape | None = None
 
+    def covers(self, x_mm: FloatArray, y_mm: FloatArray) -> npt.NDArray[np.bool_]:
+        """Whether places so far from its centre, (...), lie in it."""
+        if self.shape is None:
+            return np.asarray(x_mm**2 + y_mm**2 <= self.radius_mm**2)
+        return np.asarray(self.shape.rho2(x_mm, y_mm, self.radius_mm) <= 1)
+
+    def rim_mm(self) -> FloatArray:
+        """Points (64, 2) of its edge."""
+        if self.shape is not None:
+            return np.asarray(self.shape.rim_mm(self.radius_mm) + np.array([self.x_mm, self.y_mm]))
+        turn = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+        edge = np.column_stack([np.cos(turn), np.sin(turn)])
+        return np.asarray(self.radius_mm * edge + np.array([self.x_mm, self.y_mm]))
+
 
 @dataclass(frozen=True)
 class TouchScene:
@@ -60,6 +77,14 @@ class TouchScene:
         """(k,)."""
         return np.array([t.radius_mm for t in self.touches], dtype=np.float64)
 
+    def mask(self, points_mm: FloatArray) -> npt.NDArray[np.bool_]:
+        """Which of ``points_mm`` (p, 2) lie in any touch (a Gaussian's: within half height)."""
+        inside = np.zeros(len(points_mm), dtype=np.bool_)
+        along_x, along_y = np.ascontiguousarray(points_mm.T)
+        for touch in self.touches:
+            inside |= touch.covers(along_x - touch.x_mm, along_y - touch.y_mm)
+        return inside
+
 
 @dataclass(frozen=True)
 class TouchRules:
@@ -72,6 +97,8 @@ class TouchRules:
         gap_mm: least distance between the edges of two touches. 12 mm is two pixels of a 32-pixel
             image of the 194 mm skin: nearer touches are one even in a perfect image.
         rim_margin_mm: least distance from a touch's edge to the rim.
+        shape: "disc", or one of ``touch_shape.SHAPES``; its angle is drawn too.
+        aspect: range of long over short axis; None: the shape's own.
     """
 
     count: tuple[int, int] = (1, 3)
@@ -79,6 +106,8 @@ class TouchRules:
     contrast: tuple[float, float] = (3.0, 10.0)
     gap_mm: float = 12.0
     rim_margin_mm: float = 4.0
+    shape: str = "disc"
+    aspect: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         for name in ("count", "radius_mm", "contrast"):
@@ -90,6 +119,17 @@ class TouchRules:
                 )
         if not (self.gap_mm >= 0 and self.rim_margin_mm >= 0):
             raise UsageError("random touches: gap_mm and rim_margin_mm must be at least 0")
+        if self.shape == "disc":
+            if self.aspect is not None:
+                raise UsageError("random touches: a disc has no aspect; name a shape")
+            return
+        from eitskin.scene.touch_shape import SHAPES
+
+        if self.shape not in SHAPES:
+            known = ["disc", *SHAPES]
+            raise UsageError(f"random touches: shape {self.shape!r}: {nearest(self.shape, known)}")
+        if self.aspect is not None and not 1 <= self.aspect[0] <= self.aspect[1]:
+            raise UsageError("random touches: aspect must be a range from 1 on, low first")
 
 
 @dataclass(frozen=True)
@@ -119,7 +159,15 @@ def random_touches(
         raise UsageError(f"a set needs at least 1 scene, not {count}")
     drawn = TouchRules() if rules is None else rules
     scenes = tuple(
-        TouchScene(f"{role}-s{seed}-{k}", _draw(outline, drawn, stream(seed, f"touches {role}", k)))
+        TouchScene(
+            f"{role}-s{seed}-{k}",
+            _draw(
+                outline,
+                drawn,
+                stream(seed, f"touches {role}", k),
+                partial(stream, seed, f"touch shapes {role}", k),
+            ),
+        )
         for k in range(count)
     )
     return TouchSet(role, seed, scenes)
@@ -171,22 +219,47 @@ def rim_distance_mm(outline: Outline, points_mm: npt.ArrayLike) -> FloatArray:
     return np.asarray(np.where(outline.contains(points), distance, -distance))
 
 
+def _shapes(
+    rules: TouchRules, number: int, shape_generator: Callable[[], np.random.Generator]
+) -> list[TouchShape | None]:
+    """The touches' shapes; of discs nothing is drawn."""
+    if rules.shape == "disc":
+        return [None] * number
+    from eitskin.scene.touch_shape import SHAPES, named_shape
+
+    generator, usual = shape_generator(), SHAPES[rules.shape][1]
+    aspects = generator.uniform(*(rules.aspect or (usual, usual)), size=number)
+    angles = generator.uniform(0.0, 180.0, size=number)
+    return [
+        named_shape(rules.shape, float(a), float(deg))
+        for a, deg in zip(aspects, angles, strict=True)
+    ]
+
+
 def _draw(
-    outline: Outline, rules: TouchRules, generator: np.random.Generator
+    outline: Outline,
+    rules: TouchRules,
+    generator: np.random.Generator,
+    shape_generator: Callable[[], np.random.Generator],
 ) -> tuple[TrueTouch, ...]:
     """One scene: sizes first, then places until all fit; after 200 misses for one touch all places
     are drawn again."""
     number = int(generator.integers(rules.count[0], rules.count[1], endpoint=True))
     radii = generator.uniform(*rules.radius_mm, size=number)
     contrasts = generator.uniform(*rules.contrast, size=number)
+    shapes = _shapes(rules, number, shape_generator)
+    halves = [  # half the long axis
+        radius if shape is None else radius * math.sqrt(shape.aspect)
+        for radius, shape in zip(radii, shapes, strict=True)
+    ]
     x0, y0, x1, y1 = outline.bounding_box_mm
     places: list[tuple[float, float]] = []
     misses = 0
     for _ in range(TRIES):
         x, y = float(generator.uniform(x0, x1)), float(generator.uniform(y0, y1))
-        radius = radii[len(places)]
+        radius = halves[len(places)]
         apart = all(
-            math.hypot(x - u, y - v) >= radius + radii[j] + rules.gap_mm
+            math.hypot(x - u, y - v) >= radius + halves[j] + rules.gap_mm
             for j, (u, v) in enumerate(places)
         )
         if apart and rim_distance_mm(outline, (x, y))[0] >= radius + rules.rim_margin_mm:
@@ -196,8 +269,8 @@ def _draw(
             misses += 1
         if len(places) == number:
             return tuple(
-                TrueTouch(x, y, float(r), float(c))
-                for (x, y), r, c in zip(places, radii, contrasts, strict=True)
+                TrueTouch(x, y, float(r), float(c), shape)
+                for (x, y), r, c, shape in zip(places, radii, contrasts, shapes, strict=True)
             )
         if misses >= 200:
             places, misses = [], 0

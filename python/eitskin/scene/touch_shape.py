@@ -1,8 +1,8 @@
 """Shapes of touches that are no even discs: an ellipse, and how the change falls from its middle.
 
 A round indenter presses with sqrt(1 - rho^2) of the pressure in the middle (Hertz, J. reine angew.
-Math. 92, 1882; Johnson, Contact Mechanics, Cambridge 1985, ch. 4); a fingertip's contact is an
-ellipse with such a dome (Pawluk and Howe, J. Biomech. Eng. 121, 1999). Conductivity is taken to
+Math. 92, 1882; Johnson, Contact Mechanics, Cambridge 1985, ch. 4), a fingertip with a like dome
+(Pawluk and Howe, J. Biomech. Eng. 121, 1999) that is longer than wide. Conductivity is taken to
 follow the pressure. Imported only where a touch names a shape.
 """
 

@@ -69,11 +69,7 @@ def mask_of(
     """+1 where the centres (h, w) lie in a conductive touch, -1 in a resistive one, else 0."""
     mask = np.zeros(x_mm.shape, dtype=np.int8)
     for touch in touches:
-        x, y = x_mm - touch.x_mm, y_mm - touch.y_mm
-        if touch.shape is None:
-            inside = x**2 + y**2 <= touch.radius_mm**2
-        else:
-            inside = touch.shape.rho2(x, y, touch.radius_mm) <= 1
+        inside = touch.covers(x_mm - touch.x_mm, y_mm - touch.y_mm)
         mask[inside] = 1 if touch.contrast > 1 else -1
     return mask
 

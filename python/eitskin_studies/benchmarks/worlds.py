@@ -12,7 +12,7 @@ from eitskin.core.results import Options
 from eitskin.errors import UsageError
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.worlds.score import Progress, WorldScore, core_finder, score_worlds
+from eitskin_studies.worlds.score import CoreFinder, Progress, WorldScore, score_worlds
 from eitskin_studies.worlds.simulate import WorldFactory
 from eitskin_studies.worlds.worlds import WORLDS
 
@@ -44,7 +44,7 @@ def run(settings: Settings, progress: Progress | None = None) -> list[WorldScore
     solver.with_options(**option_values(settings.changes))
     factory = WorldFactory(model.skin, model.protocol, settings.cache)
     return score_worlds(
-        core_finder(solver),
+        CoreFinder(solver),
         factory,
         settings.sets,
         settings.scenes,

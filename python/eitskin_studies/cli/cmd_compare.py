@@ -37,6 +37,13 @@ def add_parser(subparsers: Any) -> None:
         " bilinear)",
         choices=("nearest", "bilinear"),
     )
+    option(
+        parser,
+        "--shape",
+        "of the touches, also of training scenes; ellipses and fingers with axes 1.4 to 2.2",
+        choices=("disc", "ellipse", "hertz", "gauss", "finger"),
+        default="disc",
+    )
     option(parser, "--threads N", "of the C core's frames", default=1)
     option(parser, "--json", "print JSON, with the curves over the threshold")
     option(parser, "--csv FILE", "write the numbers of every scene", Path)
@@ -48,6 +55,7 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Compare and print."""
     from eitskin.fileio import write_bytes
+    from eitskin.scene.random_touches import TouchRules
     from eitskin.scene.simulate import Measurement
     from eitskin.scoring import metrics
     from eitskin.skin.protocol import adjacent
@@ -65,6 +73,10 @@ def run(options: argparse.Namespace) -> int:
         train_scenes=options.train,
         seed=options.seed,
         measurement=Measurement(snr_db=options.snr_db),
+        rules=TouchRules(
+            shape=options.shape,
+            aspect=(1.4, 2.2) if options.shape in ("ellipse", "finger") else None,
+        ),
         lookup=options.lookup or metrics.LOOKUP,
     )
     comparison = compare(

@@ -32,7 +32,7 @@ def add_parser(subparsers: Any) -> None:
     option(run, "--scenes N", "of the set 'random'", default=180)
     option(run, "--train N", "training scenes", default=60)
     option(run, "--set-scenes N", "of each other set", default=30)
-    option(run, "--sets NAME,...", "sets beside 'random' (default: all; '' for none)")
+    option(run, "--sets NAME,...", "sets beside 'random' (default: those of discs; '' for none)")
     option(run, "--snr-db DB,...", "60 must be among them", default="40,60,80")
     option(run, "--seed S", "of all that is random", default=1)
     option(run, "--elements N", "of the frames' mesh", default=11_000)

@@ -229,13 +229,8 @@ def compare(
 
 
 def truth_masks(touches: TouchSet, points_mm: FloatArray) -> npt.NDArray[np.bool_]:
-    """The discs of each scene on the raster's cells (p, 2): (k, p)."""
-    return np.array(
-        [
-            metrics.disc_mask(points_mm, scene.centres_mm(), scene.radii_mm())
-            for scene in touches.scenes
-        ]
-    )
+    """The touches of each scene on the raster's cells (p, 2): (k, p)."""
+    return np.array([scene.mask(points_mm) for scene in touches.scenes])
 
 
 def _run(

@@ -58,6 +58,7 @@ def header(comparison: Comparison) -> list[tuple[str, str]]:
         if how.lookup == "nearest"
         else "is interpolated between pixels (bilinear)"
     )
+    shape = "" if rules.shape == "disc" else f" ({rules.shape})"
     own = any(result.touch_threshold is None for result in comparison.results)
     return [
         (
@@ -72,9 +73,9 @@ def header(comparison: Comparison) -> list[tuple[str, str]]:
             "test scenes",
             (
                 f"{test.touches.name} (seed {how.seed}): {rules.count[0]} to {rules.count[1]}"
-                f" touches, radius {rules.radius_mm[0]:g} to {rules.radius_mm[1]:g} mm, contrast"
-                f" {rules.contrast[0]:g} to {rules.contrast[1]:g}, {rules.gap_mm:g} mm apart edge"
-                f" to edge, {rules.rim_margin_mm:g} mm from the rim"
+                f" touches{shape}, radius {rules.radius_mm[0]:g} to {rules.radius_mm[1]:g} mm,"
+                f" contrast {rules.contrast[0]:g} to {rules.contrast[1]:g}, {rules.gap_mm:g} mm"
+                f" apart edge to edge, {rules.rim_margin_mm:g} mm from the rim"
             ),
         ),
         (

@@ -26,6 +26,10 @@ EXPERIMENTS = {
     "electrodes": "16, 32 and 64 electrodes and skip patterns, at equal noise and at equal time",
     "shapes": "a rounded rectangle, a forearm and a hand outline",
     "tank": "measured frames of water tanks, every method, plain and normalised difference",
+    "other-worlds": (
+        "touches counted where the model is wrong: other shapes, uneven sheets, drift, misplaced"
+        " electrodes; what fails first"
+    ),
     "levers": (
         "what was tried to do better, each for itself: what helps for its MACs, and what does not"
     ),
@@ -40,4 +44,5 @@ def load(name: str) -> Experiment:
     """
     if name not in EXPERIMENTS:
         raise UsageError(f"study: no experiment is named {name!r}; {nearest(name, EXPERIMENTS)}")
-    return cast(Experiment, importlib.import_module(f"eitskin_studies.experiments.{name}"))
+    module = f"eitskin_studies.experiments.{name.replace('-', '_')}"
+    return cast(Experiment, importlib.import_module(module))

@@ -25,7 +25,7 @@ from eitskin.fileio import write_beside
 from eitskin.scene.random_touches import TouchSet, TrueTouch
 from eitskin.scene.simulate import Measurement, conductivity_with, measure
 from eitskin.scene.streams import stream
-from eitskin.scoring.metrics import Raster, disc_mask
+from eitskin.scoring.metrics import Raster
 from eitskin.scoring.snr import BASE_SAMPLES, FINE_BITS, FINE_CONVERTER_DB, noise_deviation_v
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
@@ -80,17 +80,11 @@ class FrameSession:
         return lru_cache(maxsize=4)(self._measure)
 
     def truths(self, raster: Raster) -> BoolArray:
-        """The true discs of each scene on the cells of ``raster``, (k, p); kept for the last
+        """The true touches of each scene on the cells of ``raster``, (k, p); kept for the last
         raster."""
         kept = self._truths
         if kept.get("raster") is not raster:
-            scenes = self.touches.scenes
-            masks = np.array(
-                [
-                    disc_mask(raster.points_mm, scene.centres_mm(), scene.radii_mm())
-                    for scene in scenes
-                ]
-            )
+            masks = np.array([scene.mask(raster.points_mm) for scene in self.touches.scenes])
             kept.update(raster=raster, masks=masks)
         masks = kept["masks"]
         assert isinstance(masks, np.ndarray)
@@ -175,7 +169,7 @@ class SceneSolver:
     ) -> FloatArray:
         if self.folder is None:
             return self._solve(name, drawn, progress, drift)
-        discs = [[list(vars(t).values()) for t in s.touches] for s in drawn.scenes]
+        discs = [[_facts_of(t) for t in s.touches] for s in drawn.scenes]
         place = [
             self.skin.name,
             f"{self.protocol.hash:016x}",
@@ -227,6 +221,12 @@ class SceneSolver:
             contact_by = 1 + drift.contact * generator.uniform(-1, 1, len(contact))
             volts.append(amplitude_by * forward.voltages(sheet_by * touched, contact * contact_by))
         return np.array(volts)
+
+
+def _facts_of(touch: TrueTouch) -> list[float | str]:
+    """All that a touch is, for a digest."""
+    disc: list[float | str] = [touch.x_mm, touch.y_mm, touch.radius_mm, touch.contrast]
+    return disc if touch.shape is None else [*disc, *vars(touch.shape).values()]
 
 
 def apparent_change_s_per_m_mm2(touch: TrueTouch, sheet_s_per_m: float) -> float:

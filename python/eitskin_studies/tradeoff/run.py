@@ -51,7 +51,9 @@ class RunSettings:
     scenes: int = 180
     train_scenes: int = 60
     set_scenes: int = 30
-    sets: tuple[str, ...] = tuple(name for name in SETS if name not in (TRAIN, HEADLINE))
+    sets: tuple[str, ...] = tuple(
+        name for name, one in SETS.items() if name not in (TRAIN, HEADLINE) and not one.other_world
+    )
     snrs_db: tuple[float, ...] = (40.0, 60.0, 80.0)
     seed: int = 1
     simulated_elements: int = 11_000

@@ -38,11 +38,13 @@ DRIFT = Drift(sheet=0.03, contact=0.1, amplitude=0.01)
 @dataclass(frozen=True)
 class SceneSet:
     """What is touched in a set of scenes. ``draw`` takes outline, seed and count; ``drifts``: the
-    skin has changed since the reference was taken."""
+    skin has changed since the reference was taken. ``other_world``: touches are not what the model
+    takes them for; such a set is measured where it is named."""
 
     text: str
     draw: Callable[[Outline, int, int], TouchSet]
     drifts: bool = False
+    other_world: bool = False
 
 
 def _random(role: str, rules: TouchRules | None = None) -> Callable[[Outline, int, int], TouchSet]:
@@ -116,6 +118,21 @@ SETS: dict[str, SceneSet] = {
         " amplitude by 1 %",
         _random("drift"),
         drifts=True,
+    ),
+    "ellipses": SceneSet(
+        "1 to 3 flat ellipses, axes 1.4 to 2.2",
+        _random("ellipses", TouchRules(shape="ellipse", aspect=(1.4, 2.2))),
+        other_world=True,
+    ),
+    "fingers": SceneSet(
+        "1 to 3 ellipses with the profile of Hertz, axes 1.4 to 2.2",
+        _random("fingers", TouchRules(shape="finger", aspect=(1.4, 2.2))),
+        other_world=True,
+    ),
+    "gauss": SceneSet(
+        "1 to 3 Gaussian blobs, half height at 4 to 8 mm",
+        _random("gauss", TouchRules(radius_mm=(4.0, 8.0), shape="gauss")),
+        other_world=True,
     ),
 }
 

@@ -56,6 +56,8 @@ class WorldScore:
         false_per_scene, missed_per_scene: touches.
         median_mm, p95_mm: distance of found touches from the true ones; None where none was found.
         radius_ratio: median of found over true radius.
+        warned: of the scenes that are not exact, the share in which the finder names something
+            wrong with the frame; None where it names nothing ever, or all are exact.
         refused: scenes whose frames the finder rejects; their touches count as missed.
     """
 
@@ -68,6 +70,7 @@ class WorldScore:
     median_mm: float | None
     p95_mm: float | None
     radius_ratio: float | None
+    warned: float | None
     refused: int
 
     def as_dict(self) -> dict[str, Any]:
@@ -85,20 +88,34 @@ class WorldScore:
         return self.exact.low, self.exact.high
 
 
-def core_finder(solver: Reconstructor) -> Finder:
-    """What ``solver`` finds: a tare on the quiet frames, then the frame, with nothing before it."""
+class CoreFinder:
+    """What ``solver`` finds: a tare on the quiet frames, then the frame, with nothing before it.
+    ``diagnostics`` names what the core finds wrong with the last frame."""
 
-    def find(quiet_v: FloatArray, frame_v: FloatArray) -> Sequence[FoundTouch]:
-        solver.tare(quiet_v)
-        solver.forget()
-        return solver.reconstruct(frame_v).touches
+    def __init__(self, solver: Reconstructor) -> None:
+        self._solver, self._own_sign = solver, solver.options.sign
+        self.diagnostics: tuple[str, ...] = ()
 
-    return find
+    def look_for(self, sign: str | None) -> None:
+        """Changes of ``sign`` from now on; None: as the solver was told at first."""
+        self._solver.with_options(sign=sign or self._own_sign)
+
+    def __call__(self, quiet_v: FloatArray, frame_v: FloatArray) -> Sequence[FoundTouch]:
+        """Touches of a frame (m,), given the quiet frames (q, m) of its session."""
+        self.diagnostics = ()
+        self._solver.tare(quiet_v)
+        self._solver.forget()
+        result = self._solver.reconstruct(frame_v)
+        self.diagnostics = tuple(result.info.diagnostics_by_name)
+        return result.touches
 
 
 def score_set(found_by: Finder, of: WorldScenes) -> WorldScore:
     """The numbers of one set."""
+    if isinstance(found_by, CoreFinder):
+        found_by.look_for(of.world.sign)
     matchings, ratios, refused = [], [], 0
+    warned: list[bool] = []
     for scene, quiet_v, frame_v in zip(of.scenes, of.quiet_v, of.frames_v, strict=True):
         try:
             found = found_by(quiet_v, frame_v)
@@ -106,6 +123,8 @@ def score_set(found_by: Finder, of: WorldScenes) -> WorldScore:
             found, refused = (), refused + 1
         one = match(scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found])
         matchings.append(one)
+        if isinstance(found_by, CoreFinder) and not one.exact:
+            warned.append(bool(found_by.diagnostics))
         ratios += [found[j].radius_mm / scene.touches[i].radius_mm for i, j in one.pairs]
     count = len(matchings)
     distances = [d for m in matchings for d in m.distances_mm]
@@ -120,6 +139,7 @@ def score_set(found_by: Finder, of: WorldScenes) -> WorldScore:
         median_mm=None if median is None else float(median),
         p95_mm=None if p95 is None else float(p95),
         radius_ratio=float(np.median(ratios)) if ratios else None,
+        warned=float(np.mean(warned)) if warned else None,
         refused=refused,
     )
 

@@ -61,13 +61,15 @@ class Errors:
 @dataclass(frozen=True)
 class World:
     """A set: touches, errors, noise (None: none). ``adc_bits`` 0: no converter; None: 12, or 16
-    from 70 dB on, as elsewhere."""
+    from 70 dB on, as elsewhere. ``sign``: which changes the core is told to look for; None: as it
+    is."""
 
     text: str
     touches: TouchKinds = field(default_factory=TouchKinds)
     errors: Errors = field(default_factory=Errors)
     snr_db: float | None = 60.0
     adc_bits: int | None = None
+    sign: str | None = None
 
 
 NONE = TouchKinds(count=(0, 0))
@@ -116,7 +118,7 @@ WORLDS: dict[str, World] = {
         errors=Errors(drift=0.02),
     ),
     "drift_2_percent_light": World(
-        "the same with contrast 1.3 to 2",
+        "1 to 3 discs of contrast 1.3 to 2; the same drift",
         TouchKinds(contrast=(1.3, 2.0)),
         Errors(drift=0.02),
     ),
@@ -137,29 +139,40 @@ WORLDS: dict[str, World] = {
         "1 to 3 Gaussian blobs, half height at 4 to 8 mm",
         TouchKinds(radius_mm=(4.0, 8.0), shape="gauss"),
     ),
-    "fingers": World("1 to 3 ellipses with Hertz profile, axes 1.4 to 2.2", FINGERS),
-    "fingers_mild_errors": World("the same with mild errors of all kinds", FINGERS, MILD),
+    "insulating_touches": World(
+        "1 to 3 discs of contrast .1 to .5, both signs looked for",
+        TouchKinds(contrast=(0.1, 0.5)),
+        sign="both",
+    ),
+    "fingers": World("1 to 3 fingers: ellipses with Hertz profile, axes 1.4 to 2.2", FINGERS),
+    "fingers_mild_errors": World("1 to 3 fingers with mild errors of all kinds", FINGERS, MILD),
     "eight_mild_errors": World(
         "8 discs at 4 radii with mild errors of all kinds", EIGHT, MILD, snr_db=80.0
     ),
     "two_fingers_16_to_24_mm": World(
         "two fingers side by side, radius 5 to 8 mm", _two_fingers(16.0, 24.0)
     ),
-    "two_fingers_12_to_16_mm": World("the same, nearer", _two_fingers(12.0, 16.0)),
-    "no_touch": World("nothing but noise and contacts", NONE),
-    "no_touch_drift_2_percent": World("drift alone", NONE, Errors(drift=0.02)),
-    "no_touch_uneven_20_percent": World("an uneven sheet alone", NONE, Errors(uneven=0.2)),
-    "no_touch_misplaced_3_mm": World("misplaced electrodes alone", NONE, Errors(misplaced_mm=3.0)),
+    "two_fingers_12_to_16_mm": World("two fingers side by side, nearer", _two_fingers(12.0, 16.0)),
+    "no_touch": World("no touch, noise and contacts", NONE),
+    "no_touch_drift_2_percent": World("no touch, a smooth drift of 2 %", NONE, Errors(drift=0.02)),
+    "no_touch_uneven_20_percent": World("no touch, an uneven sheet", NONE, Errors(uneven=0.2)),
+    "no_touch_misplaced_3_mm": World(
+        "no touch, misplaced electrodes", NONE, Errors(misplaced_mm=3.0)
+    ),
     "no_touch_contact_drift_10_percent": World(
-        "contacts changed since the tare", NONE, Errors(contact_drift=0.1)
+        "no touch, contacts changed since the tare", NONE, Errors(contact_drift=0.1)
     ),
     "no_touch_amplitude_drift_1_percent": World(
-        "the current changed since the tare", NONE, Errors(amplitude_drift=0.01)
+        "no touch, the current changed since the tare", NONE, Errors(amplitude_drift=0.01)
     ),
     "no_touch_converter_without_dither": World(
-        "12 bits without noise, and .01 % of drift", NONE, Errors(drift=1e-4), None, 12
+        "no touch, 12 bits without noise, and .01 % of drift", NONE, Errors(drift=1e-4), None, 12
     ),
     "no_touch_noiseless": World(
-        "neither noise nor converter, and a millionth of drift", NONE, Errors(drift=1e-6), None, 0
+        "no touch, neither noise nor converter, and a millionth of drift",
+        NONE,
+        Errors(drift=1e-6),
+        None,
+        0,
     ),
 }

@@ -21,7 +21,7 @@ from eitskin.scene.session import MeshCache
 EXPECTED = {
     "single_press", "light_press", "two_touch", "pinch", "swipe", "ring7", "roll", "rotate", "grip",
     "drying_gel", "loose_electrode", "bridged", "mains_hum", "drift", "real_board",
-    "random_touches", "demo",
+    "random_touches", "demo", "two_fingers",
 }  # fmt: skip
 BENCH = MeshCache()
 

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from eitskin.errors import GeometryError, UsageError
-from eitskin.scene.random_touches import TouchRules, random_touches, rim_distance_mm, spaced_touches
+from eitskin.scene.random_touches import (
+    TouchRules,
+    TouchScene,
+    random_touches,
+    rim_distance_mm,
+    spaced_touches,
+)
 from eitskin.scene.streams import stream
 from eitskin.skin.outline import disk, polygon
 
@@ -95,3 +103,35 @@ def test_rim_distance_of_an_ell() -> None:
     points = [[10, 10], [60, 45], [60, 60], [25, 100], [50, 50.1]]
     assert rim_distance_mm(ELL, points) == pytest.approx([10, 5, -10, 20, 0], abs=0.11)
     assert rim_distance_mm(PAPER, [[90, 0], [0, 0]]) == pytest.approx([7, 97])
+
+
+def test_shapes_are_drawn_apart_so_that_sizes_stay() -> None:
+    discs = random_touches(disk(194), 3, 5)
+    fingers = random_touches(disk(194), 3, 5, rules=TouchRules(shape="finger", aspect=(1.4, 2.2)))
+    for disc_scene, finger_scene in zip(discs.scenes, fingers.scenes, strict=True):
+        assert np.array_equal(disc_scene.radii_mm(), finger_scene.radii_mm())
+        for touch in finger_scene.touches:
+            assert touch.shape is not None and 1.4 <= touch.shape.aspect <= 2.2
+            edge = touch.shape.rim_mm(touch.radius_mm) + np.array([touch.x_mm, touch.y_mm])
+            assert np.hypot(*edge.T).max() <= 97 - 4 + 1e-9
+    points = np.random.default_rng(1).uniform(-97, 97, (500, 2))
+    touch = fingers.scenes[0].touches[0]
+    inside = TouchScene("one", (touch,)).mask(points)
+    assert touch.shape is not None
+    offsets = points - (touch.x_mm, touch.y_mm)
+    assert np.array_equal(
+        inside, touch.shape.rho2(offsets[:, 0], offsets[:, 1], touch.radius_mm) <= 1
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"shape": "fist"}, "shape 'fist'"),
+        ({"aspect": (1.0, 2.0)}, "a disc has no aspect"),
+        ({"shape": "finger", "aspect": (0.5, 2.0)}, "from 1 on"),
+    ],
+)
+def test_shapes_that_cannot_be_are_refused(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        TouchRules(**given)

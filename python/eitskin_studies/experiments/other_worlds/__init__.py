@@ -1,0 +1,89 @@
+"""How the default reconstruction counts touches in worlds that its model knows nothing of."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+from eitskin.errors import FrameError
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.scoring.matching import match
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
+from eitskin_studies.experiments.other_worlds.tables import (
+    conditions,
+    fails_table,
+    headline_table,
+    holds_table,
+    summary,
+)
+from eitskin_studies.pictures.worlds_pictures import draw_examples, draw_shares
+from eitskin_studies.worlds.score import CoreFinder, score_set
+from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
+from eitskin_studies.worlds.worlds import WORLDS
+
+TITLE = "Other worlds: touches where the model is wrong"
+FAMILY = "judging"
+USUAL = 200
+SHOWN = (
+    "drift_2_percent_light",
+    "uneven_20_percent",
+    "misplaced_3_mm",
+    "ellipses",
+    "two_fingers_12_to_16_mm",
+    "no_touch_converter_without_dither",
+)
+
+
+def run(workspace: Workspace) -> ExperimentOutcome:
+    """Every set, by the C core in float32 with the prebuilt model and default options."""
+    settings = workspace.settings
+    model, blob = load_prebuilt()
+    finder = CoreFinder(Reconstructor(model, blob=blob))
+    factory = WorldFactory(model.skin, model.protocol, workspace.folder / "frames")
+    count, seed = settings.count(USUAL), settings.seed
+    facts = {"model": hashlib.sha256(blob).hexdigest()[:16], "scenes": count, "family": FAMILY}
+
+    def scenes(name: str) -> WorldScenes:
+        return factory.scenes(name, count, seed, family=FAMILY, progress=workspace.progress)
+
+    def of_set(name: str, what: str, make: Any) -> Any:
+        world = repr(WORLDS[name])
+        return workspace.kept({**facts, "set": name, "world": world, "what": what}, make)
+
+    scores = [
+        of_set(name, "score", lambda name=name: score_set(finder, scenes(name)).as_dict())
+        for name in workspace.progress(list(WORLDS), "sets")
+    ]
+    examples = {
+        name: of_set(name, "example", lambda name=name: _first_wrong(finder, scenes(name)))
+        for name in SHOWN
+    }
+    return ExperimentOutcome(
+        tables=(fails_table(scores), holds_table(scores), headline_table(scores)),
+        data={"scores": scores, "examples": examples, "seed": seed, "scenes": count},
+        pictures={
+            "shares.png": lambda path: draw_shares(path, scores),
+            "examples.png": lambda path: draw_examples(path, examples, model.skin.outline),
+        },
+        words={"conditions": conditions(settings, count), "summary": summary(scores)},
+    )
+
+
+def _first_wrong(finder: CoreFinder, of: WorldScenes) -> dict[str, Any]:
+    """The first scene that is not exact, or the last: true touches' rims and found discs."""
+    example: dict[str, Any] = {}
+    for scene, quiet_v, frame_v in zip(of.scenes, of.quiet_v, of.frames_v, strict=True):
+        try:
+            found = finder(quiet_v, frame_v)
+        except FrameError:
+            found = ()
+        discs = [(t.x_mm, t.y_mm, t.radius_mm) for t in found]
+        example = {
+            "name": scene.name,
+            "rims_mm": [touch.rim_mm().round(1).tolist() for touch in scene.touches],
+            "found_mm": [[round(float(value), 1) for value in disc] for disc in discs],
+        }
+        if not match(scene.centres_mm(), [disc[:2] for disc in discs]).exact:
+            break
+    return example
