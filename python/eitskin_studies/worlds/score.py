@@ -93,19 +93,19 @@ class CoreFinder:
     ``diagnostics`` names what the core finds wrong with the last frame."""
 
     def __init__(self, solver: Reconstructor) -> None:
-        self._solver, self._own_sign = solver, solver.options.sign
+        self.solver, self._own_sign = solver, solver.options.sign
         self.diagnostics: tuple[str, ...] = ()
 
     def look_for(self, sign: str | None) -> None:
         """Changes of ``sign`` from now on; None: as the solver was told at first."""
-        self._solver.with_options(sign=sign or self._own_sign)
+        self.solver.with_options(sign=sign or self._own_sign)
 
     def __call__(self, quiet_v: FloatArray, frame_v: FloatArray) -> Sequence[FoundTouch]:
         """Touches of a frame (m,), given the quiet frames (q, m) of its session."""
         self.diagnostics = ()
-        self._solver.tare(quiet_v)
-        self._solver.forget()
-        result = self._solver.reconstruct(frame_v)
+        self.solver.tare(quiet_v)
+        self.solver.forget()
+        result = self.solver.reconstruct(frame_v)
         self.diagnostics = tuple(result.info.diagnostics_by_name)
         return result.touches
 

@@ -25,6 +25,7 @@ from eitskin_studies.worlds.worlds import WORLDS
 TITLE = "Other worlds: touches where the model is wrong"
 FAMILY = "judging"
 USUAL = 200
+BARE = {"row_gains": False, "touch_test": False}
 SHOWN = (
     "drift_2_percent_light",
     "uneven_20_percent",
@@ -36,10 +37,12 @@ SHOWN = (
 
 
 def run(workspace: Workspace) -> ExperimentOutcome:
-    """Every set, by the C core in float32 with the prebuilt model and default options."""
+    """Every set, by the C core in float32 with the prebuilt model: with default options, and
+    without what guards against the model's own errors."""
     settings = workspace.settings
     model, blob = load_prebuilt()
-    finder = CoreFinder(Reconstructor(model, blob=blob))
+    finder, bare = (CoreFinder(Reconstructor(model, blob=blob)) for _ in range(2))
+    bare.solver.with_options(**BARE)
     factory = WorldFactory(model.skin, model.protocol, workspace.folder / "frames")
     count, seed = settings.count(USUAL), settings.seed
     facts = {"model": hashlib.sha256(blob).hexdigest()[:16], "scenes": count, "family": FAMILY}
@@ -51,8 +54,13 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         world = repr(WORLDS[name])
         return workspace.kept({**facts, "set": name, "world": world, "what": what}, make)
 
+    def scored(name: str) -> dict[str, Any]:
+        drawn = scenes(name)
+        without = score_set(bare, drawn).as_dict()
+        return {**score_set(finder, drawn).as_dict(), "without": without}
+
     scores = [
-        of_set(name, "score", lambda name=name: score_set(finder, scenes(name)).as_dict())
+        of_set(name, "score", lambda name=name: scored(name))
         for name in workspace.progress(list(WORLDS), "sets")
     ]
     examples = {
@@ -66,7 +74,10 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             "shares.png": lambda path: draw_shares(path, scores),
             "examples.png": lambda path: draw_examples(path, examples, model.skin.outline),
         },
-        words={"conditions": conditions(settings, count), "summary": summary(scores)},
+        words={
+            "conditions": conditions(settings, count, model.model_errors is not None),
+            "summary": summary(scores),
+        },
     )
 
 

@@ -13,6 +13,7 @@ FAILS_BELOW = 0.9
 HEAD = (
     "set",
     "exact (95 %)",
+    "exact without guards",
     "false a scene",
     "missed a scene",
     "median, mm",
@@ -101,10 +102,16 @@ def summary(scores: Scores) -> str:
     return text
 
 
-def conditions(settings: ExperimentSettings, count: int) -> str:
-    """How the numbers were made."""
+def conditions(settings: ExperimentSettings, count: int, knows_errors: bool) -> str:
+    """How the numbers were made; ``knows_errors``: the model says what it may be wrong by."""
+    guards = (
+        ""
+        if knows_errors
+        else " The prebuilt model does not say what it may be wrong by, so that these do nothing."
+    )
     return (
-        f'The C core in float32, default options, the prebuilt model. Family "judging", seed'
+        "The C core in float32, the prebuilt model, default options; without guards: without"
+        f' `row_gains` and `touch_test`.{guards} Scenes of the family "judging", seed'
         f" {settings.seed}, {count} scenes a set, each with a skin of its own: contacts ±20 %, 64"
         " quiet frames, and 60 dB, but 80 dB in sets of eight; 12 bits, 16 at 80 dB. Frames come"
         " from a mesh of about 11000 elements, solved nonlinearly. A touch is found within 10 mm"
@@ -137,6 +144,7 @@ def _row(one: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         f"`{one['name']}`",
         _number(one, EXACT),
+        _number(one["without"], EXACT),
         number("false_per_scene"),
         number("missed_per_scene"),
         number("median_mm"),
