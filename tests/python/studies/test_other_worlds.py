@@ -12,8 +12,11 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.errors import FrameError, UsageError
+from eitskin.scoring.metrics import raster_inside
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
+from eitskin_studies.tradeoff.run import RunSettings
+from eitskin_studies.tradeoff.scene_sets import SceneFactory
 from eitskin_studies.worlds.score import as_text, score_set
 from eitskin_studies.worlds.simulate import WorldFactory, draw_touches
 from eitskin_studies.worlds.worlds import WORLDS
@@ -105,3 +108,13 @@ def test_the_command_scores_the_core_on_the_sets_that_are_named(capsys):
 def test_the_command_refuses_unknown_sets_and_options(given, capsys):
     assert main(["bench", "worlds", *given]) == UsageError.exit_code
     assert "eitskin:" in capsys.readouterr().err
+
+
+def test_tradeoff_has_sets_of_other_shapes_where_they_are_named(factory, tmp_path):
+    assert not {"ellipses", "fingers", "gauss"} & set(RunSettings().sets)
+    makes = SceneFactory(factory.skin, factory.protocol, 1, 1500, tmp_path)
+    session = makes.session("fingers", 2, lambda items, what: items)
+    raster = raster_inside(factory.skin.outline, 3.0)
+    assert session.touches.scenes[0].touches[0].shape is not None
+    assert session.truths(raster).any(axis=1).all()
+    assert len(list(tmp_path.iterdir())) == 1
