@@ -19,6 +19,7 @@ FORMS = {
     "negated": ("int", "0"),
     "flag": ("bool", "False"),
     "stages": ("dict[str, StageStats]", "{}"),
+    "known": ("float | None", "None"),  # None: not known, 0 in C
     "one": ("int", "1"),  # a number, 1 where none is given
 }
 REALS = ("f32", "real")

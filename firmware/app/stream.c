@@ -111,8 +111,17 @@ static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_p
         eits_packet_touch body[EITS_MAX_TOUCHES];
         for (uint32_t k = 0; k < count; ++k) {
             const eits_touch t = touches[k];
-            body[k] = (eits_packet_touch){
-                t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n};
+            body[k] = (eits_packet_touch){.id = t.id,
+                                          .x_mm = t.x_mm,
+                                          .y_mm = t.y_mm,
+                                          .radius_mm = t.radius_mm,
+                                          .strength_s_per_m_mm2 = t.strength_s_per_m_mm2,
+                                          .explained = t.explained,
+                                          .force_n = t.force_n,
+                                          .confidence = t.confidence,
+                                          .x_variance_mm2 = t.x_variance_mm2,
+                                          .xy_covariance_mm2 = t.xy_covariance_mm2,
+                                          .y_variance_mm2 = t.y_variance_mm2};
         }
         head->count = (uint16_t)count;
         head->age_us = fw_now_us(instrument) - frame->end_us;

@@ -70,8 +70,8 @@ static void crowds_on_both_sides_of_the_limit(void)
     ctx->frame.y[0] = ctx->info.data_norm = 10;
     ctx->solver.residual[0] = 1; /* 0.01 of |y|^2 */
     ctx->info.lambda_max = 20, ctx->info.lambda_noise = 2;
-    eits_touch t[4] = {{.radius_mm = 9, .confidence = 1},
-                       {.x_mm = 18, .y_mm = 24, .radius_mm = 9, .confidence = R(0.04)}};
+    eits_touch t[4] = {{.radius_mm = 9, .explained = 1},
+                       {.x_mm = 18, .y_mm = 24, .radius_mm = 9, .explained = R(0.04)}};
     said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.01, 2, 2), 0);
     CHECK_NEAR(eits_get_info(ctx)->unexplained, 0.01, 1e-6);
     t[1].x_mm = 12, t[1].y_mm = 16; /* nearer */
@@ -92,14 +92,14 @@ static void crowds_on_both_sides_of_the_limit(void)
     ctx->info.lambda_noise = 0; /* none was learned */
     said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0729, 10, 2 / 2.7), 0);
     ctx->info.lambda_noise = 2, ctx->info.lambda_max = 20;
-    t[1].confidence = R(0.0004); /* the weakest explains next to nothing */
+    t[1].explained = R(0.0004); /* the weakest explains next to nothing */
     said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0729, 0.2, 0.2 / 2.7), 1);
-    t[1].confidence = R(0.04);
+    t[1].explained = R(0.04);
     ctx->solver.residual[0] = 1;
     said_as(ctx, t, 1, score_of(1, 8, 2, 1, 0.01, 10, 3), 0);
     CHECK_EQUAL(crowded(ctx, t, 0), 0);
-    t[2] = (eits_touch){.x_mm = -40, .radius_mm = 9, .confidence = R(0.04)};
-    t[3] = (eits_touch){.x_mm = -80, .radius_mm = 9, .confidence = R(0.04)};
+    t[2] = (eits_touch){.x_mm = -40, .radius_mm = 9, .explained = R(0.04)};
+    t[3] = (eits_touch){.x_mm = -80, .radius_mm = 9, .explained = R(0.04)};
     said_as(ctx, t, 3, score_of(3, 8, 2, 1, 0.01, 2, 2), 0);
     CHECK_EQUAL(crowded(ctx, t, 4), 1); /* as many as may be */
     o.max_touches = 5;

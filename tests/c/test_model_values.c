@@ -326,7 +326,7 @@ static void use(const small_model *made)
         CHECK(isfinite((double)touches[k].x_mm) && isfinite((double)touches[k].y_mm) &&
               touches[k].radius_mm > 0);
         CHECK(isfinite((double)touches[k].strength_s_per_m_mm2) &&
-              isfinite((double)touches[k].confidence));
+              isfinite((double)touches[k].explained));
     }
     free(memory);
 }

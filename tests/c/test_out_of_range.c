@@ -17,7 +17,7 @@ static void finite_touches(const eits_context *ctx, const eits_touch *touches, u
     for (uint32_t k = 0; k < count; ++k)
         CHECK(isfinite(touches[k].x_mm) && isfinite(touches[k].y_mm) &&
               isfinite(touches[k].radius_mm) && isfinite(touches[k].strength_s_per_m_mm2) &&
-              isfinite(touches[k].confidence));
+              isfinite(touches[k].explained));
 }
 
 /* Pixels of 1e38 mm make a touch's strength infinite, and weights may have no inverse: then the

@@ -116,7 +116,7 @@ static void one_touch_anywhere(void)
             press(&b, &f, 1, 0);
             CHECK_EQUAL(b.count, 1);
             const eits_touch *t = check_found(&b, f, 0.1 * PIXEL, 0.05);
-            CHECK(t != NULL && t->confidence > R(0.98) && t->confidence <= 1);
+            CHECK(t != NULL && t->explained > R(0.98) && t->explained <= 1);
             CHECK(eits_get_info(ctx)->touch_macs > 0);
             bias += t == NULL ? 1 : (double)t->strength_s_per_m_mm2 / strength(f) / 15;
         }
@@ -191,7 +191,7 @@ static void dropped_and_limited(void)
     eits_options o = defaults;
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
-    const double fraction = (double)b.found[1].confidence;
+    const double fraction = (double)b.found[1].explained;
     CHECK_NEAR(fraction, 0.09 / 1.09, 0.02); /* energies go with the square of the strengths */
     o.touch_min_fraction = (eits_real)(1.2 * fraction);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -357,7 +357,7 @@ static void at_rim_and_corner(void)
         const double off =
             hypot((double)b.found[0].x_mm - edges[k].x, (double)b.found[0].y_mm - edges[k].y);
         CHECK_NEAR(off, 0, 0.5 * PIXEL);
-        CHECK(b.found[0].strength_s_per_m_mm2 > 0 && b.found[0].confidence > R(0.9));
+        CHECK(b.found[0].strength_s_per_m_mm2 > 0 && b.found[0].explained > R(0.9));
     }
     tear_down(&b);
     (void)set_up(&b, EITS_STORAGE_I8, 1); /* a round image has corners without pixels */

@@ -112,7 +112,7 @@ static void units_do_not_matter(void)
         for (int k = 0; k < 2; ++k) { /* powers of two: the same bits */
             CHECK(found[k].x_mm == first[k].x_mm && found[k].y_mm == first[k].y_mm &&
                   found[k].radius_mm == first[k].radius_mm);
-            CHECK(found[k].confidence == first[k].confidence && found[k].id == first[k].id);
+            CHECK(found[k].explained == first[k].explained && found[k].id == first[k].id);
             CHECK(found[k].strength_s_per_m_mm2 == first[k].strength_s_per_m_mm2 * unit);
         }
     }
@@ -134,10 +134,10 @@ static double unexplained(const double *y, const double *atoms, uint32_t count, 
     return dense_dot(rest, rest, RANK);
 }
 
-/* Confidence is the fraction of |y|^2 that leaving the touch out leaves unexplained, the others
- * taking up what they can: for discs that overlap, at pixel centres, with their strengths alone
- * fitted. One peak of the image has nothing behind it. */
-static void confidence_is_what_leaving_out_costs(void)
+/* What a touch explains is the fraction of |y|^2 that leaving the touch out leaves unexplained, the
+ * others taking up what they can: for discs that overlap, at pixel centres, with their strengths
+ * alone fitted. One peak of the image has nothing behind it. */
+static void explained_is_what_leaving_out_costs(void)
 {
     /* x, y mm, change */
     static const double places[4][3] = {{-27, -27, 0}, {-3, 3, 0.05}, {15, 9, 0.04}, {3, 21, 0.03}};
@@ -181,7 +181,7 @@ static void confidence_is_what_leaving_out_costs(void)
         const double fraction = (unexplained(y, atoms + RANK, 3, k - 1) - all) / total;
         CHECK(fraction > 0.03 && fraction < 0.6);
         /* strengths come by ten passes, not exactly */
-        CHECK_NEAR(found[t].confidence, fraction, 0.01 * fraction);
+        CHECK_NEAR(found[t].explained, fraction, 0.01 * fraction);
     }
     small_context_close(&c);
     small_model_free(&made);
@@ -258,7 +258,7 @@ static void radius_by_the_data_or_by_the_noise(void)
 
 int main(void)
 {
-    confidence_is_what_leaving_out_costs();
+    explained_is_what_leaving_out_costs();
     each_touch_must_exceed_the_detection_threshold();
     work_is_counted();
     units_do_not_matter();

@@ -36,15 +36,15 @@ static void tear_down(bench *b)
     small_model_free(&b->made);
 }
 
-/* Its own S'y is 10 sqrt(confidence) times the noise's: faint from 0.009 down; above 0.05 a birth
+/* Its own S'y is 10 sqrt(explained) times the noise's: faint from 0.009 down; above 0.05 a birth
  * is sure. */
-static eits_touch at(double x, double y, double confidence)
+static eits_touch at(double x, double y, double explained)
 {
     return (eits_touch){.x_mm = (eits_real)x,
                         .y_mm = (eits_real)y,
                         .radius_mm = 9,
                         .strength_s_per_m_mm2 = 1,
-                        .confidence = (eits_real)confidence};
+                        .explained = (eits_real)explained};
 }
 
 static uint32_t none(eits_context *ctx, eits_touch *reported)
@@ -52,15 +52,15 @@ static uint32_t none(eits_context *ctx, eits_touch *reported)
     return eits_track(ctx, reported, 0);
 }
 
-static uint32_t one_along_y(eits_context *ctx, eits_touch *reported, double y, double confidence)
+static uint32_t one_along_y(eits_context *ctx, eits_touch *reported, double y, double explained)
 {
-    reported[0] = at(0, y, confidence);
+    reported[0] = at(0, y, explained);
     return eits_track(ctx, reported, 1);
 }
 
-static uint32_t one(eits_context *ctx, eits_touch *reported, double x, double confidence)
+static uint32_t one(eits_context *ctx, eits_touch *reported, double x, double explained)
 {
-    reported[0] = at(x, 0, confidence);
+    reported[0] = at(x, 0, explained);
     return eits_track(ctx, reported, 1);
 }
 
@@ -135,8 +135,8 @@ static void tracks_end_after_the_hold(void)
     CHECK_EQUAL(one(ctx, t, 5, 0.005), 1); /* known, so that there is no doubt */
     CHECK_EQUAL(t[0].id, 1);
     CHECK_EQUAL(none(ctx, t), 1);
-    CHECK(t[0].id == 1 && t[0].x_mm == 5 && t[0].confidence == 0 &&
-          t[0].strength_s_per_m_mm2 == 1 && t[0].radius_mm == 9);
+    CHECK(t[0].id == 1 && t[0].x_mm == 5 && t[0].explained == 0 && t[0].strength_s_per_m_mm2 == 1 &&
+          t[0].radius_mm == 9);
     CHECK_EQUAL(none(ctx, t), 1);
     CHECK_EQUAL(none(ctx, t), 0);
     CHECK_EQUAL(one(ctx, t, 5, 0.5), 1); /* too late: another */
@@ -180,7 +180,7 @@ static void a_full_house(void)
 }
 
 /* Noise of the place that the filter expects; how far it is off on average, found and reported. */
-static void jitter(eits_context *ctx, double speed, double confidence, double *found_mm,
+static void jitter(eits_context *ctx, double speed, double explained, double *found_mm,
                    double *reported_mm)
 {
     uint64_t random = 9;
@@ -188,8 +188,8 @@ static void jitter(eits_context *ctx, double speed, double confidence, double *f
     *found_mm = *reported_mm = 0;
     eits_forget(ctx);
     for (int k = 0; k < 60; ++k) {
-        const double x = -50 + speed * k, off = 4 * small_random(&random) / (10 * sqrt(confidence));
-        CHECK_EQUAL(one(ctx, t, x + off, confidence), 1);
+        const double x = -50 + speed * k, off = 4 * small_random(&random) / (10 * sqrt(explained));
+        CHECK_EQUAL(one(ctx, t, x + off, explained), 1);
         CHECK_EQUAL(t[0].id, ctx->tracker.next_id - 1);
         if (k >= 10) {
             *found_mm += off * off;
@@ -224,7 +224,7 @@ static void smoothing(void)
     tear_down(&b);
 }
 
-/* Radius and strength follow the gain of the place; the confidence is the frame's own. */
+/* Radius and strength follow the gain of the place; explained is the frame's own. */
 static void smooth_strengths(void)
 {
     bench b;
@@ -233,14 +233,14 @@ static void smooth_strengths(void)
     for (int k = 0; k < 20; ++k)
         CHECK_EQUAL(one(ctx, t, 0, 0.01), 1);
     t[0] = (eits_touch){
-        .x_mm = 2, .y_mm = -4, .radius_mm = 11, .strength_s_per_m_mm2 = 3, .confidence = R(0.02)};
+        .x_mm = 2, .y_mm = -4, .radius_mm = 11, .strength_s_per_m_mm2 = 3, .explained = R(0.02)};
     CHECK_EQUAL(eits_track(ctx, t, 1), 1);
     const double gain = (double)t[0].x_mm / 2;
     CHECK(gain > 0.1 && gain < 0.9);
     CHECK_NEAR(t[0].y_mm, -4 * gain, 1e-5);
     CHECK_NEAR(t[0].radius_mm, 9 + 2 * gain, 1e-5);
     CHECK_NEAR(t[0].strength_s_per_m_mm2, 1 + 2 * gain, 1e-5);
-    CHECK_NEAR(t[0].confidence, 0.02, 1e-8);
+    CHECK_NEAR(t[0].explained, 0.02, 1e-8);
     tear_down(&b);
 }
 

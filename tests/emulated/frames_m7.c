@@ -151,11 +151,22 @@ static int tare(unsigned count)
 static void print_touches(const eits_touch *touches, uint32_t found)
 {
     printf(" touches %lu", (unsigned long)found);
-    for (uint32_t t = 0; t < found; ++t)
-        printf(" %lu:%08lx:%08lx:%08lx:%08lx:%08lx:%08lx", (unsigned long)touches[t].id,
-               bits_of(touches[t].x_mm), bits_of(touches[t].y_mm), bits_of(touches[t].radius_mm),
-               bits_of(touches[t].strength_s_per_m_mm2), bits_of(touches[t].confidence),
-               bits_of(touches[t].force_n));
+    for (uint32_t k = 0; k < found; ++k) {
+        const eits_touch *t = touches + k;
+        const float reals[] = {t->x_mm,
+                               t->y_mm,
+                               t->radius_mm,
+                               t->strength_s_per_m_mm2,
+                               t->explained,
+                               t->force_n,
+                               t->confidence,
+                               t->x_variance_mm2,
+                               t->xy_covariance_mm2,
+                               t->y_variance_mm2};
+        printf(" %lu", (unsigned long)t->id);
+        for (size_t l = 0; l < sizeof reals / sizeof reals[0]; ++l)
+            printf(":%08lx", bits_of(reals[l]));
+    }
     printf("\n");
 }
 

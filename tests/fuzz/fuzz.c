@@ -73,7 +73,11 @@ void fuzz_check_touches(const eits_context *ctx, const eits_touch *touches, uint
              eits_is_finite(t->strength_s_per_m_mm2));
         MUST(t->radius_mm >= eits_get_options(ctx)->touch_min_radius_mm &&
              t->radius_mm <= eits_get_options(ctx)->touch_max_radius_mm);
+        MUST(t->explained >= 0 && t->explained <= 1);
         MUST(t->confidence >= 0 && t->confidence <= 1);
+        MUST(eits_is_finite(t->x_variance_mm2) && t->x_variance_mm2 >= 0);
+        MUST(eits_is_finite(t->y_variance_mm2) && t->y_variance_mm2 >= 0);
+        MUST(eits_is_finite(t->xy_covariance_mm2));
         MUST(t->id != 0);
         for (uint32_t l = 0; l < k; ++l)
             MUST(touches[l].id != t->id);

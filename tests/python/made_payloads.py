@@ -19,5 +19,8 @@ def build_image(image: SolvedImage) -> bytes:
 
 
 def build_touches(touches: SolvedTouches) -> bytes:
-    each = (TouchPacket.LAYOUT.struct.pack(*astuple(touch)) for touch in touches.touches)
+    each = (
+        TouchPacket.LAYOUT.struct.pack(*(value or 0 for value in astuple(touch)))
+        for touch in touches.touches
+    )
     return pack(touches.solved) + b"".join(each)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from dataclasses import astuple
 
 from eitskin.core.diagnostics_table import Touch
 
@@ -15,9 +16,6 @@ def bits(value: float) -> str:
 
 def printed_touches(touches: Sequence[Touch]) -> str:
     """Their number, then each one's id and the bits of its numbers."""
-    each = (
-        (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n)
-        for t in touches
-    )
+    each = ([value or 0.0 for value in astuple(t)[1:]] for t in touches)
     words = [f" {t.id}:{':'.join(map(bits, n))}" for t, n in zip(touches, each, strict=True)]
     return f"{len(words)}{''.join(words)}"

@@ -174,11 +174,21 @@ static void check_touches(const eits_touch *touches, uint32_t count)
         const eits_touch *t = touches + k;
         CHECK(t->id != 0 && eits_is_finite(t->x_mm) && eits_is_finite(t->y_mm) &&
               eits_is_finite(t->radius_mm));
-        CHECK(eits_is_finite(t->strength_s_per_m_mm2) && t->confidence >= 0 && t->confidence <= 1);
+        CHECK(eits_is_finite(t->strength_s_per_m_mm2) && t->explained >= 0 && t->explained <= 1);
         for (uint32_t l = 0; l < k; ++l)
             CHECK(touches[l].id != t->id);
-        const eits_real numbers[] = {
-            t->x_mm, t->y_mm, t->radius_mm, t->strength_s_per_m_mm2, t->confidence, t->force_n};
+        CHECK(t->confidence >= 0 && t->confidence <= 1 && t->x_variance_mm2 >= 0 &&
+              t->y_variance_mm2 >= 0);
+        const eits_real numbers[] = {t->x_mm,
+                                     t->y_mm,
+                                     t->radius_mm,
+                                     t->strength_s_per_m_mm2,
+                                     t->explained,
+                                     t->force_n,
+                                     t->confidence,
+                                     t->x_variance_mm2,
+                                     t->xy_covariance_mm2,
+                                     t->y_variance_mm2};
         crc = eits_crc32(crc, &t->id, sizeof t->id);
         crc = eits_crc32(crc, numbers, sizeof numbers);
     }
@@ -252,7 +262,7 @@ static void probe_for_drift(int portable)
         CHECK(count == expected_count);
         for (uint32_t k = 0; k < count; ++k)
             CHECK(seen[k].x_mm == expected[k].x_mm && seen[k].y_mm == expected[k].y_mm &&
-                  seen[k].confidence == expected[k].confidence);
+                  seen[k].explained == expected[k].explained);
     }
     check_guards(&fresh);
     ++counts.probes;

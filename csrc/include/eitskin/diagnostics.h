@@ -151,9 +151,17 @@ typedef struct eits_touch {
     eits_real strength_s_per_m_mm2;
     /* fraction of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
      * not found in this frame and is held */
-    eits_real confidence;
+    eits_real explained;
     /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
     eits_real force_n;
+    /* probability that it is one touch, neither none nor a part of one; 0 where that is not known:
+     * the model does not say what it may be wrong by, rows are left out of the frame, or the touch
+     * is held */
+    eits_real confidence;
+    /* covariance of the centre as this frame shows it, mm^2; 0 where it is not known */
+    eits_real x_variance_mm2;
+    eits_real xy_covariance_mm2;
+    eits_real y_variance_mm2;
 } eits_touch;
 
 /* A name for one bit of eits_diagnostic ("electrode open", "outlier"...), never NULL. */

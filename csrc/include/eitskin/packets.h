@@ -16,7 +16,7 @@ extern "C" {
 #endif
 
 /* The first byte of every packet; a packet of another version is rejected. */
-#define EITS_LINK_VERSION     3u
+#define EITS_LINK_VERSION     4u
 #define EITS_LINK_MAX_PAYLOAD 16384u
 
 /* Below 0x80 from the board, from there on to it. */
@@ -344,9 +344,15 @@ typedef struct eits_packet_touch {
     /* S mm^2/m */
     float strength_s_per_m_mm2;
     /* fraction of the data that it alone explains, 0 to 1; 0: held, not found */
-    float confidence;
+    float explained;
     /* 0 where the model is not calibrated */
     float force_n;
+    /* probability that it is one touch; 0: not known */
+    float confidence;
+    /* covariance of the centre; 0: not known */
+    float x_variance_mm2;
+    float xy_covariance_mm2;
+    float y_variance_mm2;
 } eits_packet_touch;
 
 /* Stages that are timed. */

@@ -36,6 +36,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     if (may_have_touches(ctx)) {
         eits_fit_touches(ctx, scratch, &f);
         eits_test_touches(ctx, scratch, &f);
+        eits_rate_touches(&f);
         ctx->info.unexplained = f.total > 0 ? eits_fit_left(ctx, &f) / f.total : 0;
     }
     const uint32_t finite = eits_report_touches(ctx, &f, found);

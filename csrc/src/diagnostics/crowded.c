@@ -40,10 +40,10 @@ static eits_real nearest(const eits_touch *touches, uint32_t count)
 static eits_real score(const eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
     const eits_real noise = ctx->info.lambda_noise, left = ctx->info.unexplained;
-    eits_real widest = 0, weakest = touches[0].confidence;
+    eits_real widest = 0, weakest = touches[0].explained;
     for (uint32_t k = 0; k < count; ++k) {
         widest = touches[k].radius_mm > widest ? touches[k].radius_mm : widest;
-        weakest = lesser(weakest, touches[k].confidence);
+        weakest = lesser(weakest, touches[k].explained);
     }
     const eits_real above =
         noise > 0 ? lesser(EITS_CROWD_STRONG, eits_sqrt(weakest) * ctx->info.lambda_max / noise)

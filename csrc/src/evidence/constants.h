@@ -86,6 +86,22 @@
  * long; smaller: steps that come to nothing */
 #define EITS_SHORTER R(0.4)
 
+/* ---- Chosen: by hand; not measured yet. Check: ctest --preset host -R evidence */
+
+/* at which every other disc is a touch [rise]. larger: every touch is less sure */
+#define EITS_CONFIDENCE_HALF R(20.0)
+
+/* power of the rise that the odds go with [halves]. larger: nothing between sure and unsure;
+ * smaller: nothing is sure */
+#define EITS_CONFIDENCE_STEPS 2
+
+/* of the linearisation's covariance of a place. larger: ellipses cover more */
+#define EITS_PLACE_FACTOR R(1.0)
+
+/* of both variances, for what the linearisation cannot know [mm^2]. larger: ellipses of clear
+ * touches cover more */
+#define EITS_PLACE_MIN_MM2 R(0.01)
+
 /* clang-format on */
 
 #endif

@@ -83,4 +83,10 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
  * that stays. */
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
+/* confidence.c */
+
+/* What the test's numbers have meant on scenes with a truth: f->confidence, and f->place_mm2 as
+ * wide as places err. Of discs that were tested. */
+void eits_rate_touches(eits_fit *f);
+
 #endif

@@ -16,6 +16,8 @@ typedef struct eits_fit {
     eits_real rise[EITS_MAX_TOUCHES];
     /* covariance of x and y: xx, xy, yy, mm^2 */
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
+    /* probability that the disc is one touch (evidence/confidence.c) */
+    eits_real confidence[EITS_MAX_TOUCHES];
     const eits_real *data; /* stride: what the discs are to explain */
     eits_real *residual;   /* stride, row 0 of the scratch: what they leave of it */
     eits_real total;       /* |y|^2 */

@@ -8,7 +8,7 @@
  * the atoms' Gram matrix: the usual formula of least squares for leaving one variable out. It needs
  * no refit for each candidate: one Cholesky factor of at most EITS_MAX_TOUCHES squared serves all.
  * In: f with its atoms and residual. Out: fewer discs, f->explained of those that stay, which is
- * reported as the touch's confidence. */
+ * reported as the touch's. */
 #include "touch/constants.h"
 #include "touch/disc_fit.h"
 

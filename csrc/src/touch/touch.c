@@ -154,7 +154,11 @@ uint32_t eits_report_touches(const eits_context *ctx, const eits_fit *f, eits_to
             .y_mm = disc->y_mm,
             .radius_mm = disc->radius_mm,
             .strength_s_per_m_mm2 = disc->change * eits_disc_area(ctx, disc),
-            .confidence = f->explained[k] < 1 ? f->explained[k] : 1,
+            .explained = f->explained[k] < 1 ? f->explained[k] : 1,
+            .confidence = f->tested ? f->confidence[k] : 0,
+            .x_variance_mm2 = f->tested ? f->place_mm2[k][0] : 0,
+            .xy_covariance_mm2 = f->tested ? f->place_mm2[k][1] : 0,
+            .y_variance_mm2 = f->tested ? f->place_mm2[k][2] : 0,
         };
         const eits_real numbers[] = {touch.x_mm, touch.y_mm, touch.radius_mm,
                                      touch.strength_s_per_m_mm2, f->explained[k]};

@@ -35,7 +35,7 @@ static eits_real square(eits_real value)
 /* What S'y this touch has by itself, about: the whole frame's by its fraction of the energy. */
 static eits_real own_lambda(const eits_context *ctx, const eits_touch *touch)
 {
-    return ctx->info.lambda_max * eits_sqrt(touch->confidence);
+    return ctx->info.lambda_max * eits_sqrt(touch->explained);
 }
 
 /* Fainter than noise: it may be there all the same when it is not found. */
@@ -177,7 +177,7 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
 static void name(eits_context *ctx, eits_followed *f)
 {
     const int clear = own_lambda(ctx, &f->touch) >= EITS_SURE_CLEARNESS * ctx->info.lambda_noise &&
-                      f->touch.confidence >= EITS_SURE_FRACTION;
+                      f->touch.explained >= EITS_SURE_FRACTION;
     if (f->touch.id != 0 || (f->seen < ctx->options.track_confirm && !clear))
         return;
     f->touch.id = ctx->tracker.next_id;
@@ -207,7 +207,8 @@ static void update_tracks(eits_context *ctx, const eits_touch *found, uint32_t c
             count == EITS_MAX_TOUCHES)
             continue;
         ++f->missed;
-        f->touch.confidence = 0;
+        /* not found: how well its place was known stays that of the last frame that showed it */
+        f->touch.explained = f->touch.confidence = 0;
         next[count++] = *f;
     }
     for (uint32_t k = 0; k < count; ++k)

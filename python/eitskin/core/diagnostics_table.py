@@ -99,6 +99,14 @@ class Touch:
     strength_s_per_m_mm2: float
     # fraction of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
     # not found in this frame and is held
-    confidence: float
+    explained: float
     # how hard it presses, N; 0 where the model is not calibrated (force.h)
     force_n: float = 0.0
+    # probability that it is one touch, neither none nor a part of one; 0 where that is not known:
+    # the model does not say what it may be wrong by, rows are left out of the frame, or the touch
+    # is held
+    confidence: float | None = None
+    # covariance of the centre as this frame shows it, mm^2; 0 where it is not known
+    x_variance_mm2: float | None = None
+    xy_covariance_mm2: float | None = None
+    y_variance_mm2: float | None = None

@@ -19,6 +19,7 @@ from eitskin.core.results import (
     Options,
     Reconstruction,
     check_reference_frames,
+    known_touch,
 )
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
 
@@ -328,4 +329,4 @@ def _bits(word: int) -> tuple[int, ...]:
 
 
 def _touch(t: Any) -> Touch:
-    return Touch(*(getattr(t, name) for name in _TOUCH_NAMES))
+    return known_touch([getattr(t, name) for name in _TOUCH_NAMES])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
@@ -121,6 +122,18 @@ class Info(InfoFields):
         """For JSON: the same names, without the underscore of ``lambda_``; diagnostics by name."""
         values = {key.rstrip("_"): value for key, value in asdict(self).items()}
         return values | {"diagnostics": list(self.diagnostics_by_name), "found": list(self.found)}
+
+
+def known_touch(values: Sequence[Any]) -> Touch:
+    """A touch from eits_touch's fields in order; what is 0 because it is not known is None."""
+    whole = list(values)
+    known = [one.type == "float | None" for one in fields(Touch)]
+    first = known.index(True)
+    if not whole[first]:
+        whole[first] = None
+    if not whole[first + 1]:
+        whole[first + 1 :] = [None] * (len(known) - first - 1)
+    return Touch(*whole)
 
 
 def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:

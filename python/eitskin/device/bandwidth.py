@@ -13,7 +13,7 @@ BITS_A_BYTE = 10  # start, eight, stop
 USED = 0.9  # of the line; the rest is for replies, faults and what comes in bursts
 PACKET_BYTES = 16  # head, checksum, zeros and stuffing
 RAW_BYTES, ROW_BYTES = 16, 5
-SOLVED_BYTES, PIXEL_BYTES, TOUCHES_BYTES = 104, 4, 8 * 28
+SOLVED_BYTES, PIXEL_BYTES, TOUCHES_BYTES = 104, 4, 8 * 44
 
 
 def frame_bytes(info: BoardInfo, what: Stream) -> int:

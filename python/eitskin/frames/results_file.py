@@ -15,7 +15,7 @@ from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 
 FORMAT = "eitskin-results"
-VERSION = 1
+VERSION = 2
 
 
 def save_results(
@@ -45,8 +45,16 @@ def save_results(
         "touch_strength_s_per_m_mm2": np.array(
             [touch.strength_s_per_m_mm2 for _, touch in touches]
         ),
-        "touch_confidence": np.array([touch.confidence for _, touch in touches]),
+        "touch_explained": np.array([touch.explained for _, touch in touches]),
         "touch_force_n": np.array([touch.force_n for _, touch in touches]),
+        "touch_confidence": np.array([touch.confidence for _, touch in touches], dtype=float),
+        "touch_place_mm2": np.array(
+            [
+                (touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2)
+                for _, touch in touches
+            ],
+            dtype=float,
+        ).reshape(-1, 3),
         "info": np.array(json.dumps([results[number].info.as_dict() for number in numbers])),
     }
     with write_beside(path) as temporary, temporary.open("wb") as stream:

@@ -415,7 +415,7 @@ class Examiner:
             np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) / (a.radius_mm + b.radius_mm)
             for a, b in combinations(touches, 2)
         ]
-        weakest = min(touch.confidence for touch in touches)
+        weakest = min(touch.explained for touch in touches)
         features = (
             count * CROWD_ELECTRODES / self.model.protocol.n_electrodes,
             min([CROWD_FAR, *apart]),

@@ -20,6 +20,7 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import SPLIT_MERGE
 from eitskin.core.results import Options
 from eitskin.model.model import Model
+from eitskin.reference.confidence import rated
 from eitskin.reference.disc_fit import Disc, Fit, Reduced
 from eitskin.reference.evidence import DataErrors, keep_likely
 from eitskin.reference.split_merge import join, part
@@ -89,16 +90,27 @@ def find_touches(
     share of |y|^2 that they leave (0 where the image is zero), and the data (r,) that they were
     fitted to in the end. With ``errors`` those are left out that such errors could have made."""
     fit = Fit(model, frame, options)
-    explained = np.zeros(0)
+    explained, tested = np.zeros(0), None
     if np.abs(image).max() > 0:
         explained = search(fit, frame, image, interplay)
         if errors is not None:
-            keep_likely(fit, errors)
+            tested = keep_likely(fit, errors)
             explained = fit.explained()
     found = [
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
+    if tested is not None:
+        found = [
+            replace(
+                touch,
+                confidence=float(sure),
+                x_variance_mm2=float(xx),
+                xy_covariance_mm2=float(xy),
+                y_variance_mm2=float(yy),
+            )
+            for touch, sure, (xx, xy, yy) in zip(found, *rated(tested), strict=True)
+        ]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
     unexplained = fit.left() / fit.whole if fit.whole > 0 and np.abs(image).max() > 0 else 0.0
     return tuple(found), unexplained, fit.data

@@ -78,7 +78,9 @@ class Tracker:
             one = now.met(before[owner[k]], touch) if k in owner else now.newborn(touch)
             after.append(self._named(one, options, lambda_noise))
         waited = [
-            replace(one, missed=one.missed + 1, touch=replace(one.touch, confidence=0.0))
+            replace(
+                one, missed=one.missed + 1, touch=replace(one.touch, explained=0.0, confidence=None)
+            )
             for number, one in enumerate(before)
             if number not in owner.values() and one.touch.id and one.missed < options.track_hold
         ]
@@ -94,8 +96,7 @@ class Tracker:
 
     def _named(self, one: Followed, options: Options, lambda_noise: float) -> Followed:
         sure = (
-            one.own_lambda >= SURE_CLEARNESS * lambda_noise
-            and one.touch.confidence >= SURE_FRACTION
+            one.own_lambda >= SURE_CLEARNESS * lambda_noise and one.touch.explained >= SURE_FRACTION
         )
         if one.touch.id or not (one.seen >= options.track_confirm or sure):
             return one
@@ -116,7 +117,7 @@ class _Frame:
         return bool((np.abs(self.grid.index - cell) <= 1).all(axis=1).any())
 
     def newborn(self, touch: Touch) -> Followed:
-        own = self.lambda_max * math.sqrt(touch.confidence)
+        own = self.lambda_max * math.sqrt(touch.explained)
         noise = self.lambda_noise / own if own > 0 else 0.0
         place = self.grid.pixel_mm**2 * (
             (self.options.track_smooth * noise) ** 2 + MIN_DEVIATION**2

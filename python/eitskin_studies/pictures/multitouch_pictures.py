@@ -272,7 +272,7 @@ def _trade(axes: Axes, ambiguities: Ambiguities) -> None:
     axes.legend(frameon=False, fontsize=7, loc="lower left")
 
 
-def draw_confidence(path: str | Path, ambiguities: Ambiguities) -> None:
+def draw_touch_scores(path: str | Path, ambiguities: Ambiguities) -> None:
     """How a touch's numbers order true and false touches: ROC curves, a panel a variant.
 
     Raises:
@@ -286,7 +286,7 @@ def draw_confidence(path: str | Path, ambiguities: Ambiguities) -> None:
             axes = figure.add_subplot(1, len(NAMES), number + 1)
             one = ambiguities.touches[name]
             named = (
-                ("confidence", one.explained),
+                ("explained", one.explained),
                 ("its root over noise", one.over_noise),
                 ("strength / greatest", one.strength),
             )

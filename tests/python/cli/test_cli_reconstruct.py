@@ -25,7 +25,10 @@ from small_models import prebuilt, session
 Done = Callable[..., str]
 
 PNG = b"\x89PNG\r\n\x1a\n"
-TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence", "force_n"}
+TOUCH = {
+    "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "explained", "force_n", "confidence",
+    "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2",
+}  # fmt: skip
 INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs",
     "lambda", "lambda_max",

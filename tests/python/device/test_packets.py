@@ -182,7 +182,10 @@ def test_images_and_touches_are_read_as_built() -> None:
     assert isinstance(again, pk.SolvedImage)
     assert again.solved == solved(50, -12)
     assert again.image.tobytes() == image.tobytes()
-    touches = (Touch(1, 2.5, -3.5, 4.0, 5.0, 0.5), Touch(2**32 - 1, 0.0, 0.0, 1.0, 1.0, 1.0))
+    touches = (
+        Touch(1, 2.5, -3.5, 4.0, 5.0, 0.5, 0.25, 0.75, 1.5, 0.0, 2.0),
+        Touch(2**32 - 1, 0.0, 0.0, 1.0, 1.0, 1.0),
+    )
     found = pk.SolvedTouches(solved(2), touches)
     assert pl.parse(link.PacketType.TOUCHES, build_touches(found)) == found
     assert pl.parse(

@@ -18,8 +18,8 @@ from small_models import prebuilt, session
 FIELDS = {
     "format", "version", "frame", "frame_name", "image_s_per_m", "pixel_mm", "image_origin_mm",
     "touch_frame", "touch_id",
-    "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_confidence",
-    "touch_force_n", "info",
+    "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_explained",
+    "touch_force_n", "touch_confidence", "touch_place_mm2", "info",
 }  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
     with np.load(path, allow_pickle=False) as archive:
         saved = {name: archive[name] for name in archive.files}
     assert set(saved) == FIELDS
-    assert (str(saved["format"]), int(saved["version"])) == ("eitskin-results", 1)
+    assert (str(saved["format"]), int(saved["version"])) == ("eitskin-results", 2)
     assert saved["frame"].tolist() == [0, 2, 9]
     assert saved["frame_name"].tolist() == ["test-s3-0", "test-s3-2", "test-s3-9"]
     assert saved["image_s_per_m"].shape == (3, 32, 32)
@@ -58,10 +58,14 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
     for field, name in (
         ("radius_mm",) * 2,
         ("strength_s_per_m_mm2",) * 2,
-        ("confidence",) * 2,
+        ("explained",) * 2,
         ("force_n",) * 2,
     ):
         assert saved[f"touch_{name}"].tolist() == [getattr(touch, field) for _, touch in touches]
+    place = [(t.x_variance_mm2, t.xy_covariance_mm2, t.y_variance_mm2) for _, t in touches]
+    np.testing.assert_array_equal(saved["touch_place_mm2"], np.array(place, dtype=float))
+    known = [touch.confidence for _, touch in touches]
+    np.testing.assert_array_equal(saved["touch_confidence"], np.array(known, dtype=float))
     info = json.loads(str(saved["info"]))
     assert [entry["stop"] for entry in info] == ["iterations"] * 3
     assert info[1]["lambda"] == results[2].info.lambda_ and "lambda_" not in info[1]

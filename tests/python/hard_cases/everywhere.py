@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import Info, Options
+from eitskin.core.results import Info, Options, known_touch
 from eitskin.errors import EitskinError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.options import default_options
@@ -47,14 +47,7 @@ class Outcome:
         """Whether every number that comes out is."""
         numbers = [getattr(self.info, name) for name in NUMBERS]
         for t in self.touches:
-            numbers += [
-                t.x_mm,
-                t.y_mm,
-                t.radius_mm,
-                t.strength_s_per_m_mm2,
-                t.confidence,
-                t.force_n,
-            ]
+            numbers += [value for value in astuple(t) if value is not None]
         return bool(
             np.isfinite(self.image).all()
             and np.isfinite(self.coefficients).all()
@@ -96,12 +89,7 @@ class Host(CoreEngine):
             self._context, self._touches, len(self._touches), self._touch_count
         )
         each = (self._touches[k] for k in range(self._touch_count[0]))
-        found = tuple(
-            Touch(
-                t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n
-            )
-            for t in each
-        )
+        found = tuple(known_touch([getattr(t, f.name) for f in fields(Touch)]) for t in each)
         return Outcome(status, self._image.copy(), self.coefficients(), found, self.last_info())
 
 

@@ -44,7 +44,10 @@ def compare(model: Model, quiet: np.ndarray, frames: np.ndarray, **options: obje
                 assert ours.strength_s_per_m_mm2 == pytest.approx(
                     expected.strength_s_per_m_mm2, rel=rel
                 )
-                assert ours.confidence == pytest.approx(expected.confidence, rel=rel, abs=1e-4)
+                assert ours.explained == pytest.approx(expected.explained, rel=rel, abs=1e-4)
+                for field in ("confidence", "x_variance_mm2", "y_variance_mm2"):
+                    known = getattr(expected, field)
+                    assert getattr(ours, field) == (known and pytest.approx(known, rel=0.05))
     return count
 
 
@@ -103,7 +106,7 @@ def test_touches_are_where_they_were_put(engine: str) -> None:
         # conductivity, to first order in its size: higher orders add some 10 % at this one
         expected = 2 * 4 / 6 * 0.01 * np.pi * 9.0**2
         assert touches[0].strength_s_per_m_mm2 == pytest.approx(expected, rel=0.15)
-        assert touches[0].confidence > 0.9
+        assert touches[0].explained > 0.9
 
 
 def test_touches_come_strongest_first_with_ids_of_their_own() -> None:
@@ -116,7 +119,7 @@ def test_touches_come_strongest_first_with_ids_of_their_own() -> None:
         strength = [t.strength_s_per_m_mm2 for t in touches]
         assert strength == sorted(strength, reverse=True)
         assert len({t.id for t in touches}) == len(touches)
-        assert all(0 < t.confidence <= 1 and 3.0 <= t.radius_mm <= 30.0 for t in touches)
+        assert all(0 < t.explained <= 1 and 3.0 <= t.radius_mm <= 30.0 for t in touches)
         most = max(most, len(touches))
     assert most == 3
 

@@ -93,14 +93,14 @@ def test_the_core_follows_as_the_reference_does(changes: dict[str, object]) -> N
                 one.y_mm,
                 one.radius_mm,
                 one.strength_s_per_m_mm2,
-                one.confidence,
+                one.explained,
             ) == pytest.approx(
                 (
                     other.x_mm,
                     other.y_mm,
                     other.radius_mm,
                     other.strength_s_per_m_mm2,
-                    other.confidence,
+                    other.explained,
                 ),
                 rel=1e-9,
                 abs=1e-9,
@@ -155,7 +155,7 @@ def test_touches_stay_on_the_skin() -> None:
             [Touch(0, 20.0 * k - 20, 0.0, 8.0, 1.0, 0.5)], chosen, 10.0 if k < 4 else 1.2, 1.0
         )
     places = [tracker.step([], chosen, 0.0, 1.0) for _ in range(30)]
-    assert all(len(one) == 1 and one[0].confidence == 0 for one in places)
+    assert all(len(one) == 1 and one[0].explained == 0 for one in places)
     assert 80 < places[-1][0].x_mm < 97 + 2 * grid.pixel_mm
 
 

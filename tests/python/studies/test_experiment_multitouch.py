@@ -197,10 +197,10 @@ def test_area_under_roc() -> None:
     )
 
 
-def _seen(places: list[tuple[float, float]], confidence: list[float]) -> SeenFrame:
+def _seen(places: list[tuple[float, float]], explained: list[float]) -> SeenFrame:
     x, y = ([place[axis] for place in places] for axis in (0, 1))
     return SeenFrame(
-        x, y, [9.0] * len(x), [2.0, 1.0][: len(x)], confidence, False, 0.04, 100.0, 1, 1
+        x, y, [9.0] * len(x), [2.0, 1.0][: len(x)], explained, False, 0.04, 100.0, 1, 1
     )
 
 

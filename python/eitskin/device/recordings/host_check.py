@@ -4,7 +4,7 @@ and touches compared with what it sent."""
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -216,15 +216,7 @@ def same_diagnostics(info: Info, raw: RawFrame, solved: Solved, options: Options
 
 
 def _numbers(touch: Touch) -> bytes:
-    values = (
-        touch.x_mm,
-        touch.y_mm,
-        touch.radius_mm,
-        touch.strength_s_per_m_mm2,
-        touch.confidence,
-        touch.force_n,
-    )
-    return np.array(values, dtype="<f4").tobytes()
+    return np.array(astuple(touch)[1:], dtype="<f4").tobytes()
 
 
 def _difference(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> float:

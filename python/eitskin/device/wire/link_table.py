@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from eitskin.device.wire.layout import Command, Layout, Payload
 
-LINK_VERSION = 3
+LINK_VERSION = 4
 LINK_MAX_PAYLOAD = 16384
 FAULT_RAISE_FRAMES = 3
 FAULT_CLEAR_FRAMES = 8
@@ -436,8 +436,12 @@ class TouchPacket(Payload):
         ("y_mm", "f", ""),
         ("radius_mm", "f", ""),
         ("strength_s_per_m_mm2", "f", ""),
-        ("confidence", "f", ""),
+        ("explained", "f", ""),
         ("force_n", "f", ""),
+        ("confidence", "f", ""),
+        ("x_variance_mm2", "f", ""),
+        ("xy_covariance_mm2", "f", ""),
+        ("y_variance_mm2", "f", ""),
     )
     # from 1; stays with a touch from frame to frame
     id: int
@@ -450,9 +454,15 @@ class TouchPacket(Payload):
     # S mm^2/m
     strength_s_per_m_mm2: float
     # fraction of the data that it alone explains, 0 to 1; 0: held, not found
-    confidence: float
+    explained: float
     # 0 where the model is not calibrated
     force_n: float
+    # probability that it is one touch; 0: not known
+    confidence: float
+    # covariance of the centre; 0: not known
+    x_variance_mm2: float
+    xy_covariance_mm2: float
+    y_variance_mm2: float
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from eitskin.core.diagnostics_table import STOPS, Touch
+from eitskin.core.diagnostics_table import STOPS
+from eitskin.core.results import known_touch
 from eitskin.device.wire.layout import Payload
 from eitskin.device.wire.link_table import STAGES, PacketType, RawHead, StageStats, TouchPacket
 from eitskin.device.wire.packets import (
@@ -125,7 +126,7 @@ def parse_touches(payload: bytes) -> SolvedTouches:
     solved, each = unpack(Solved, payload, "TOUCHES", more=True), TouchPacket.LAYOUT
     _check_rest(payload, solved, each.size * solved.count, "TOUCHES")
     found = each.struct.iter_unpack(payload[solved.LAYOUT.size :])
-    return SolvedTouches(solved, tuple(Touch(*values) for values in found))
+    return SolvedTouches(solved, tuple(map(known_touch, found)))
 
 
 _PARSERS: dict[int, Callable[[bytes], FromBoard]] = {

@@ -52,7 +52,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         ambiguity_tables.ambiguity_table(ambiguous),
         ambiguity_tables.rule_table(ambiguous),
         ambiguity_tables.chance_table(ambiguous),
-        ambiguity_tables.confidence_table(ambiguous),
+        ambiguity_tables.touch_score_table(ambiguous),
     )
     return ExperimentOutcome(
         made,
@@ -61,7 +61,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             "exact.png": lambda path: pictures.draw_counts(path, counted),
             "gallery.png": lambda path: pictures.draw_gallery(path, touch_data.skin, examples),
             "doubt.png": lambda path: pictures.draw_ambiguity(path, ambiguous),
-            "confidence.png": lambda path: pictures.draw_confidence(path, ambiguous),
+            "touch_scores.png": lambda path: pictures.draw_touch_scores(path, ambiguous),
         },
         {
             "conditions": conditions(touch_data, workspace),
@@ -100,7 +100,7 @@ def data(counted: CountedScenes, limited: list[Limit], ambiguous: Ambiguities) -
             table.name: [dict(zip(table.head, row, strict=True)) for row in table.rows]
             for table in (
                 ambiguity_tables.ambiguity_table(ambiguous),
-                ambiguity_tables.confidence_table(ambiguous),
+                ambiguity_tables.touch_score_table(ambiguous),
             )
         },
     }

@@ -31,8 +31,8 @@ FEATURES = (
     "nearest pair's distance / sum of its radii, at most 2",
     "widest radius / seed radius",
     "root of the share unexplained",
-    "weakest touch over noise: root of its confidence times max(S'y) / that of noise, at most 10",
-    "root of the weakest touch's confidence / the share unexplained, at most 3",
+    "weakest touch over noise: root of what it explains times max(S'y) / that of noise, at most 10",
+    "root of what the weakest touch explains / the share unexplained, at most 3",
 )
 RIDGE = 1e-3
 AIM, BAR_DB = 0.95, 60.0
@@ -87,7 +87,7 @@ def features(seen: SeenFrame, near: float, seed_radius_mm: float) -> tuple[float
     """As ``FEATURES`` says; of no touch those of one that is sure."""
     if not seen.x_mm:
         return 0.0, CROWD_FAR, 1.0, 0.0, CROWD_STRONG, CROWD_CLEAR
-    weakest, left = min(seen.confidence), seen.unexplained
+    weakest, left = min(seen.explained), seen.unexplained
     return (
         float(len(seen.x_mm)),
         min(CROWD_FAR, near),
@@ -224,7 +224,7 @@ def reliability(chances: FloatArray, exact: BoolArray) -> Reliability:
 
 
 @dataclass(frozen=True)
-class Confidences:
+class TouchScores:
     """Found touches of many frames: whether each is a true one, and three scores of it."""
 
     true: BoolArray
@@ -233,20 +233,20 @@ class Confidences:
     strength: FloatArray
 
 
-def confidences(frames: Sequence[tuple[SeenFrame, FloatArray]]) -> Confidences:
-    """``explained``: confidence; ``over_noise``: its root times max(S'y) / that of noise;
+def touch_scores(frames: Sequence[tuple[SeenFrame, FloatArray]]) -> TouchScores:
+    """``explained``: its own; ``over_noise``: its root times max(S'y) / that of noise;
     ``strength``: of the greatest found."""
     true, columns = [], []
     for seen, truth_mm in frames:
         hit = {found for _, found in match(truth_mm, seen.places_mm).pairs}
-        for k, confidence in enumerate(seen.confidence):
+        for k, explained in enumerate(seen.explained):
             true.append(k in hit)
             columns.append(
                 (
-                    confidence,
-                    math.sqrt(confidence) * seen.clear,
+                    explained,
+                    math.sqrt(explained) * seen.clear,
                     seen.strength[k] / max(seen.strength),
                 )
             )
     scores = np.array(columns, dtype=np.float64).reshape(-1, 3)
-    return Confidences(np.array(true, dtype=np.bool_), scores[:, 0], scores[:, 1], scores[:, 2])
+    return TouchScores(np.array(true, dtype=np.bool_), scores[:, 0], scores[:, 1], scores[:, 2])

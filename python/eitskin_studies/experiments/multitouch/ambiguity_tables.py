@@ -1,4 +1,4 @@
-"""Tables of the ambiguity: the present signal, the linear score, the confidence of each touch."""
+"""Tables of the ambiguity: the present signal, the linear score, the numbers of each touch."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def chance_table(ambiguities: Ambiguities) -> Table:
     return Table("chance", head, tuple(rows))
 
 
-def confidence_table(ambiguities: Ambiguities) -> Table:
+def touch_score_table(ambiguities: Ambiguities) -> Table:
     """How well a touch's own numbers tell true from false touches."""
     rows = []
     for name in NAMES:
@@ -132,8 +132,8 @@ def confidence_table(ambiguities: Ambiguities) -> Table:
         "method",
         "found touches",
         "of these false",
-        "confidence",
+        "explained",
         "its root over noise",
         "strength / greatest",
     )
-    return Table("confidence", head, tuple(rows))
+    return Table("touch_scores", head, tuple(rows))

@@ -14,12 +14,12 @@ from eitskin.scoring.snr import noise_deviation_v
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.multitouch import ceiling
 from eitskin_studies.experiments.multitouch.ambiguity import (
-    Confidences,
     Rule,
     ScoredFrame,
-    confidences,
+    TouchScores,
     fit_rule,
     score_frame,
+    touch_scores,
 )
 from eitskin_studies.experiments.multitouch.cells import (
     MIXED,
@@ -88,7 +88,7 @@ class Ambiguities:
     rule: Rule
     cells: dict[str, list[ScoredFrame]]
     mixed: dict[str, list[ScoredFrame]]
-    touches: dict[str, Confidences]
+    touches: dict[str, TouchScores]
 
 
 def count_all(touch_data: TouchData, workspace: Workspace) -> CountedScenes:
@@ -204,7 +204,7 @@ def ambiguities(touch_data: TouchData, workspace: Workspace, counted: CountedSce
             for snr_db in SNRS_DB
             for pair in _pairs(touch_data, cell, variant, snr_db)
         ]
-        found.touches[variant.name] = confidences(pairs)
+        found.touches[variant.name] = touch_scores(pairs)
     return found
 
 

@@ -59,7 +59,7 @@ class SeenFrame:
     y_mm: list[float]
     radius_mm: list[float]
     strength: list[float]
-    confidence: list[float]
+    explained: list[float]
     said: bool
     unexplained: float
     clear: float
@@ -98,7 +98,7 @@ def solve(model: Model, variant: TouchVariant, measured: MeasuredFrames) -> list
             [round(t.y_mm, DIGITS) for t in touches],
             [round(t.radius_mm, DIGITS) for t in touches],
             [round(abs(t.strength_s_per_m_mm2), DIGITS) for t in touches],
-            [float(f"{t.confidence:.5g}") for t in touches],
+            [float(f"{t.explained:.5g}") for t in touches],
             "crowded" in info.diagnostics_by_name,
             float(f"{info.unexplained:.5g}"),
             float(f"{clear:.5g}"),
