@@ -219,7 +219,9 @@ def test_masks_of_another_shape(engine: str, rows: object) -> None:
 def test_no_change_gives_no_touch(engine: str) -> None:
     reconstructor = made(engine)
     result = reconstructor.reconstruct(session().reference_v)
-    assert result.info.stop == "below-threshold" and result.touches == () and not result.image.any()
+    # numpy's mean of the quiet frames is this very frame; the core's differs from it by rounding
+    assert result.info.stop in ("below-threshold", "zero")
+    assert result.touches == () and not result.image.any()
     reconstructor.tare(session().exact_quiet_v)
     result = reconstructor.reconstruct(session().exact_quiet_v)
     assert result.info.stop == "zero" and result.touches == () and not result.image.any()

@@ -1,0 +1,256 @@
+"""The test of touches, row gains and the floor of noise: C against numpy on skins that differ from
+the model, and what switches them off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.results import Reconstruction
+from eitskin.model.eitm import decode_model, encode_model
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.solve.reconstructor import ENGINES, Reconstructor
+from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
+from small_models import prebuilt
+
+pytestmark = pytest.mark.skipif(
+    prebuilt()[0].model_errors is None, reason="the prebuilt model does not say its errors yet"
+)
+
+SCENES = 2
+# Places and radii of 224 scenes of the tuning family differed by up to 8e-8 mm between numpy and
+# float64. Of 1120, float32 and float64 differed by .0001 mm in nine of ten, by more than .1 mm in
+# three, and in count in one: before the test, data that no discs explain (a drifted skin's) get
+# other discs in float32, up to a dozen, and what is left of them was fitted from elsewhere.
+BOUND_MM = {"c64": 1e-6, "c": 0.2}
+BOUND_REL = {"c64": 1e-6, "c": 0.1}
+WORLDS = (
+    "discs_1_to_3",
+    "ellipses",
+    "fingers",
+    "two_fingers_12_to_16_mm",
+    "eight_at_4_radii",
+    "eight_mild_errors",
+    "uneven_20_percent",
+    "drift_2_percent_light",
+    "drift_2_percent_strong",
+)
+UNTOUCHED = ("no_touch_drift_2_percent", "no_touch_uneven_20_percent", "no_touch_noiseless")
+OFF = {"touch_test": 0, "row_gains": 0}
+
+
+@cache
+def factory() -> WorldFactory:
+    return WorldFactory(paper_skin(), adjacent(16), elements=3000)
+
+
+@cache
+def world(name: str, count: int = SCENES) -> WorldScenes:
+    return factory().scenes(name, count, 5)
+
+
+@cache
+def blob(*, errors: bool = True) -> bytes:
+    """The paper skin's model, with what it may be wrong by or without."""
+    model, content = prebuilt()
+    assert model.model_errors is not None and model.model_errors.row_gains
+    return content if errors else encode_model(replace(model, model_errors=None))
+
+
+def made(engine: str, *, errors: bool = True, **options: object) -> Reconstructor:
+    content = blob(errors=errors)
+    reconstructor = Reconstructor(decode_model(content, "x"), engine=engine, blob=content)
+    reconstructor.with_options(**options)
+    return reconstructor
+
+
+def one(
+    engine: str, quiet_v: np.ndarray, frame_v: np.ndarray, *, errors: bool = True, **options: object
+) -> Reconstruction:
+    """``frame_v`` (m,) after a tare on ``quiet_v`` (k, m)."""
+    reconstructor = made(engine, errors=errors, **options)
+    reconstructor.tare(quiet_v)
+    return reconstructor.reconstruct(frame_v)
+
+
+def sizes_mm(result: Reconstruction) -> np.ndarray:
+    return np.array([(t.x_mm, t.y_mm, t.radius_mm) for t in result.touches]).reshape(-1, 3)
+
+
+def covariance_mm2(touch: Touch) -> list[float | None]:
+    return [touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2]
+
+
+def agree(results: dict[str, Reconstruction]) -> int:
+    """How many touches all engines found, alike."""
+    expected = results["numpy"]
+    for name, bound in BOUND_MM.items():
+        result, rel = results[name], BOUND_REL[name]
+        assert len(result.touches) == len(expected.touches), name
+        assert np.abs(sizes_mm(result) - sizes_mm(expected)).max(initial=0) <= bound, name
+        assert result.info.unexplained == pytest.approx(expected.info.unexplained, rel=rel, abs=rel)
+        for ours, other in zip(result.touches, expected.touches, strict=True):
+            assert ours.strength_s_per_m_mm2 == pytest.approx(other.strength_s_per_m_mm2, rel=rel)
+            assert ours.explained == pytest.approx(other.explained, rel=rel)
+            assert (ours.confidence is None) == (other.confidence is None)
+            if other.confidence is not None:
+                assert ours.confidence == pytest.approx(other.confidence, rel=rel)
+                here = np.array([covariance_mm2(touch) for touch in (ours, other)], dtype=float)
+                assert np.abs(here[0] - here[1]).max() <= 2 * rel * here.max()
+    return len(expected.touches)
+
+
+@pytest.mark.parametrize("name", [*WORLDS, *UNTOUCHED])
+def test_all_engines_find_the_same_touches_in_other_worlds(name: str) -> None:
+    scenes = world(name)
+    for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
+        count = agree({engine: one(engine, quiet_v, frame_v) for engine in ENGINES})
+        assert (count == 0) == (name in UNTOUCHED)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_touches_that_a_drift_of_the_skin_makes_are_found_without_the_test_alone(
+    engine: str,
+) -> None:
+    scenes = world("no_touch_drift_2_percent")
+    for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
+        assert not one(engine, quiet_v, frame_v).touches
+        assert len(one(engine, quiet_v, frame_v, touch_test=0).touches) > 3
+
+
+@pytest.mark.parametrize("name", ["fingers", "drift_2_percent_light", "uneven_20_percent"])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_switched_off_it_is_as_if_the_model_did_not_say_what_it_may_be_wrong_by(
+    engine: str, name: str
+) -> None:
+    """Bit for bit; and without that section the options change nothing."""
+    quiet_v, frame_v = world(name).quiet_v[0], world(name).frames_v[0]
+    plain = one(engine, quiet_v, frame_v, errors=False)
+    for result in (
+        one(engine, quiet_v, frame_v, **OFF),
+        one(engine, quiet_v, frame_v, errors=False, **OFF),
+    ):
+        assert (result.image == plain.image).all() and result.touches == plain.touches
+    both = one(engine, quiet_v, frame_v)
+    assert not (both.image == plain.image).all()  # by the row gains
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_row_gains_can_be_switched_after_the_tare(engine: str) -> None:
+    """At once, without another tare, and back."""
+    scenes = world("uneven_20_percent")
+    expected = [
+        one(engine, scenes.quiet_v[0], scenes.frames_v[0], row_gains=on).image for on in (0, 1)
+    ]
+    reconstructor = made(engine)
+    reconstructor.tare(scenes.quiet_v[0])
+    for on in (0, 1, 0):
+        reconstructor.with_options(row_gains=on)
+        image = reconstructor.reconstruct(scenes.frames_v[0]).image
+        assert np.abs(image - expected[on]).max() <= 1e-6 * np.abs(image).max()
+    assert np.abs(expected[0] - expected[1]).max() > 0.01 * np.abs(expected[1]).max()
+
+
+def row_factors(log_sd: float) -> np.ndarray:
+    """A factor for each row (m,), the same for a row and its reciprocal."""
+    fold, generator = prebuilt()[0].fold, np.random.default_rng(8)
+    of_fold = np.exp(log_sd * generator.normal(size=len(fold.first)))
+    factors = np.ones(prebuilt()[0].protocol.n_rows)
+    factors[fold.first] = factors[fold.second] = of_fold
+    return factors
+
+
+def exact() -> tuple[np.ndarray, np.ndarray]:
+    """Frames of the model's own reference (8, m) and of discs (m,), all but free of noise."""
+    model, scenes = prebuilt()[0], world("discs_1_to_3")
+    rms = float(np.sqrt((model.golden.reference_v**2).mean()))
+    noise = 1e-6 * rms * np.random.default_rng(1).normal(size=(8, len(scenes.frames_v[0])))
+    added = scenes.frames_v[0] - scenes.quiet_v[0].mean(axis=0)
+    return model.golden.reference_v + noise, model.golden.reference_v + added
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_row_gains_undo_what_multiplies_rows(engine: str) -> None:
+    """A sheet that multiplies each row's voltages, of the reference as of touches: the same touches
+    as without; where the reference is further from the model than a sheet makes it, or than
+    reciprocity allows, rows are left as they are."""
+    quiet_v, frame_v = exact()
+    straight = one(engine, quiet_v, frame_v)
+    assert straight.touches
+    few, many = row_factors(0.12), row_factors(0.4)
+    undone = one(engine, few * quiet_v, few * frame_v)
+    assert np.abs(sizes_mm(undone) - sizes_mm(straight)).max() <= 0.05
+    left = one(engine, few * quiet_v, few * frame_v, row_gains=0)
+    assert len(left.touches) != len(straight.touches) or (
+        np.abs(sizes_mm(left) - sizes_mm(straight)).max() > 0.2
+    )
+    turned = np.ones_like(few)
+    turned[prebuilt()[0].fold.second] = 1.2
+    for factors in (many, turned):
+        with_, without = (
+            one(engine, factors * quiet_v, factors * frame_v, row_gains=on, touch_test=0)
+            for on in (1, 0)
+        )
+        assert (with_.image == without.image).all()
+
+
+def test_all_engines_agree_with_rows_masked_and_lost() -> None:
+    """Rows whose reciprocals are in use are tested; with a pair gone nothing is, on any engine."""
+    fold, scenes = prebuilt()[0].fold, world("uneven_20_percent")
+    quiet_v, frame_v = scenes.quiet_v[0], scenes.frames_v[0]
+    mask = np.zeros(len(frame_v), dtype=bool)
+    mask[fold.first[[3, 40]]] = mask[fold.second[[9, 71]]] = True
+    single = frame_v.copy()
+    single[fold.first[[20, 33]]] = np.nan
+    pair = frame_v.copy()
+    pair[[fold.first[50], fold.second[50]]] = np.nan
+    for frame in (frame_v, single, pair):
+        results, untested = {}, {}
+        for engine in ENGINES:
+            for test, into in ((1, results), (0, untested)):
+                reconstructor = made(engine, touch_test=test)
+                reconstructor.mask_rows(mask)
+                reconstructor.tare(quiet_v)
+                into[engine] = reconstructor.reconstruct(frame)
+        assert agree(results) > 0
+        if frame is pair:
+            assert all(results[e].touches == untested[e].touches for e in ENGINES)
+
+
+@pytest.mark.parametrize("frames", [1, 8])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_noiseless_reference_makes_no_touch_of_a_millionth(engine: str, frames: int) -> None:
+    """Of a change of each row, at random or smooth, that a noiseless front end would show. (With
+    diagnostics, rows that differ from their reciprocals would be left out as outliers, and frames
+    that lack rows are not tested.)"""
+    generator, scenes = np.random.default_rng(3), world("no_touch_noiseless")
+    reconstructor = made(engine, diagnostics=0)
+    for quiet_v, drifted_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
+        learned = reconstructor.tare(quiet_v[:frames])
+        assert frames == 1 or (learned.noise_v > 0 and learned.lambda_noise > 0)
+        assert not reconstructor.reconstruct(quiet_v[0]).touches
+        assert not reconstructor.reconstruct(drifted_v).touches
+        for _ in range(4):
+            changed = quiet_v[0] * (1 + 1e-6 * generator.normal(size=len(drifted_v)))
+            assert not reconstructor.reconstruct(changed).touches
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_steps_of_a_converter_without_dither_are_no_touch_where_it_is_told_of_them(
+    engine: str,
+) -> None:
+    """Its quiet frames are all alike; a frame of steps would else be a change without noise."""
+    scenes, without = world("no_touch_converter_without_dither", 4), 0
+    for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
+        step_v = np.diff(np.unique(np.append(quiet_v[0], frame_v))).min()
+        reconstructor = made(engine, noise_floor_v=step_v / np.sqrt(12))
+        learned = reconstructor.tare(quiet_v)
+        assert learned.noise_v == pytest.approx(step_v / np.sqrt(12), rel=1e-6)
+        assert not reconstructor.reconstruct(frame_v).touches
+        without += len(one(engine, quiet_v, frame_v).touches)
+    assert without > 0
