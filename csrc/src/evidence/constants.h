@@ -82,6 +82,13 @@
 /* the longest step of a radius [pixels]. as MAX_MOVE */
 #define EITS_MAX_RADIUS_MOVE R(0.5)
 
+/* a step that promises less is not taken [of F]. larger: fits end early; smaller: costs */
+#define EITS_SETTLED_MISFIT R(1.0)
+
+/* after so many, no simpler answer is tried any more [multiply-accumulates]. larger: crowds cost
+ * more; smaller: false touches stay in crowds */
+#define EITS_TEST_MACS 3000000
+
 /* of a step that did not lower the misfit, the next to be tried. larger: more steps that are too
  * long; smaller: steps that come to nothing */
 #define EITS_SHORTER R(0.4)

@@ -43,11 +43,18 @@ static int is_near(const eits_disc *a, const eits_disc *b)
     return a->polarity == b->polarity && eits_fma(dx, dx, dy * dy) < reach * reach;
 }
 
-static int any_near(const eits_answer *a)
+/* Whether near discs may be one touch: where one of them is worth little beside the other. */
+static int may_be_one(const verdict *v, uint32_t i, uint32_t j, eits_real needed)
 {
-    for (uint32_t j = 1; j < a->count; ++j) {
+    const eits_real weaker = v->rise[i] < v->rise[j] ? v->rise[i] : v->rise[j];
+    return weaker < EITS_CLEAR_AS_DISCS * needed && is_near(&v->answer.disc[i], &v->answer.disc[j]);
+}
+
+static int any_may_be_one(const verdict *v, eits_real needed)
+{
+    for (uint32_t j = 1; j < v->answer.count; ++j) {
         for (uint32_t i = 0; i < j; ++i) {
-            if (is_near(&a->disc[i], &a->disc[j]))
+            if (may_be_one(v, i, j, needed))
                 return 1;
         }
     }
@@ -160,7 +167,7 @@ static int take_linear(eits_context *ctx, const eits_scratch *scratch, verdict *
         if (out[k])
             rest = without(ctx, &rest, k);
     }
-    *macs += eits_refit(ctx, scratch, &rest);
+    *macs += eits_refit(ctx, scratch, &rest, 0);
     const eits_real allowed = EITS_TOUCH_EVIDENCE * excess(ctx, rest.misfit, left);
     if (!(rest.misfit - before < allowed * (eits_real)(v->answer.count - left)))
         return 0;
@@ -174,14 +181,15 @@ static int take_simpler(eits_context *ctx, const eits_scratch *scratch, verdict 
                         uint32_t weakest, uint64_t *macs)
 {
     const eits_answer *from = &v->answer;
+    const eits_real threshold = needed(ctx, v), enough = from->misfit + threshold;
     eits_answer best = without(ctx, from, weakest);
-    *macs += eits_refit(ctx, scratch, &best);
+    *macs += eits_refit(ctx, scratch, &best, enough);
     for (uint32_t j = 1; j < from->count; ++j) {
         for (uint32_t i = 0; i < j; ++i) {
-            if (!is_near(&from->disc[i], &from->disc[j]))
+            if (!may_be_one(v, i, j, threshold))
                 continue;
             eits_answer one = with_merged(ctx, from, i, j);
-            *macs += eits_refit(ctx, scratch, &one);
+            *macs += eits_refit(ctx, scratch, &one, enough);
             if (one.misfit < best.misfit)
                 best = one;
         }
@@ -199,9 +207,10 @@ static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v
     eits_likelihood likelihood;
     uint8_t out[EITS_MAX_TOUCHES];
     int fitted = 0, linear = 1;
+    const uint64_t most = *macs + EITS_TEST_MACS;
     while (v->answer.count > 0) {
         uint32_t weakest = look(ctx, scratch, v, fitted, &likelihood, macs);
-        if (v->rise[weakest] > EITS_CLEAR * needed(ctx, v) && !any_near(&v->answer))
+        if (v->rise[weakest] > EITS_CLEAR * needed(ctx, v) && !any_may_be_one(v, needed(ctx, v)))
             return;
         if (linear) {
             const uint32_t left = drop_linearly(ctx, scratch, v, &likelihood, out, macs);
@@ -211,15 +220,17 @@ static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v
                 continue;
             }
         }
+        if (*macs > most) /* too many to try each: what is left is believed */
+            return;
         if (!fitted) {
-            *macs += eits_refit(ctx, scratch, &v->answer);
+            *macs += eits_refit(ctx, scratch, &v->answer, 0);
             weakest = look(ctx, scratch, v, 1, &likelihood, macs);
             fitted = 1;
         }
         if (!take_simpler(ctx, scratch, v, weakest, macs))
             return;
     }
-    *macs += eits_refit(ctx, scratch, &v->answer);
+    *macs += eits_refit(ctx, scratch, &v->answer, 0);
 }
 
 /* Whether the discs need no closer look: as discs, which costs least. */
@@ -230,8 +241,8 @@ static int is_clear(eits_context *ctx, const eits_scratch *scratch, verdict *v, 
     v->answer.parameters = EITS_PLACE_PARAMETERS;
     const uint32_t weakest = look(ctx, scratch, v, 0, &likelihood, macs);
     v->first_excess = excess(ctx, v->answer.misfit, v->answer.count);
-    v->clear = v->rise[weakest] > EITS_CLEAR_AS_DISCS * needed(ctx, v) && !any_near(&v->answer) &&
-               v->first_excess < EITS_FITS;
+    v->clear = v->rise[weakest] > EITS_CLEAR_AS_DISCS * needed(ctx, v) &&
+               !any_may_be_one(v, needed(ctx, v)) && v->first_excess < EITS_FITS;
     v->answer.parameters = all;
     return v->clear;
 }

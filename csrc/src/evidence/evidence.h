@@ -74,8 +74,10 @@ eits_real eits_linear_rise(const eits_scratch *scratch, const eits_answer *answe
 uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
                           eits_likelihood *likelihood, uint32_t k);
 
-/* Gauss and Newton's steps until F no longer falls, three at most; sets answer->misfit. */
-uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer);
+/* Gauss and Newton's steps, a few at most, until F is `enough` or hardly falls; sets
+ * answer->misfit. */
+uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
+                    eits_real enough);
 
 /* elimination.c */
 

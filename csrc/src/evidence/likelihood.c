@@ -208,7 +208,8 @@ static eits_answer moved(const eits_context *ctx, const eits_answer *from, const
     return to;
 }
 
-uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer)
+uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
+                    eits_real enough)
 {
     eits_likelihood now, next;
     if (answer->count == 0) {
@@ -219,6 +220,8 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
     uint64_t macs = eits_linearise(ctx, scratch, answer, &now);
     eits_real fraction = 1;
     for (int step = 0; step < EITS_REFIT_STEPS; ++step) {
+        if (now.here <= enough || now.here - now.least < EITS_SETTLED_MISFIT)
+            break;
         const eits_answer trial = moved(ctx, answer, now.step, fraction);
         macs += eits_linearise(ctx, scratch, &trial, &next);
         if (next.here < now.here) {
