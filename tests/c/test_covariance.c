@@ -2,6 +2,9 @@
  * and its factor; what the parameters of a disc, and of shapes that are none, move the data by. */
 #include "evidence_bench.h"
 
+#include "frame/fold.h"
+#include "frame/whitening.h"
+
 #include <complex.h>
 
 /* ---- the covariance ---- */
@@ -70,7 +73,8 @@ static void the_covariance_is_noise_and_model_errors(void)
         covariance(&b, drift, noise_v, w, sigma);
         eits_real log_determinant, v[STRIDE];
         uint64_t macs = 0, state = 3;
-        CHECK(eits_factor_covariance(ctx, drift, &log_determinant, &macs) && macs > 0);
+        CHECK(eits_factor_covariance(ctx, &ctx->scratch, drift, &log_determinant, &macs) &&
+              macs > 0);
         for (int i = 0; i < RANK; ++i) {
             double *row = dense_copy(ctx->evidence.factor + STRIDE * i, RANK);
             for (int j = 0; j <= i; ++j) {
@@ -113,11 +117,11 @@ static void a_frame_of_drift_alone_has_errors_of_noise(void)
     for (int k = 0; k < 20; ++k) {
         double y[RANK] = {0};
         stage(&b, y);
-        CHECK(eits_factor_covariance(ctx, 0, &noise_alone, &macs));
+        CHECK(eits_factor_covariance(ctx, &ctx->scratch, 0, &noise_alone, &macs));
         for (int i = 0; i < SMALL_FOLDED; ++i)
             ctx->frame.d[i] = (eits_real)(1 + 0.37 * k) * (eits_real)ctx->model->v_ref[i];
         fill_errors(b.errors, 1e-4);
-        CHECK(eits_factor_covariance(ctx, 0, &log_determinant, &macs));
+        CHECK(eits_factor_covariance(ctx, &ctx->scratch, 0, &log_determinant, &macs));
         CHECK(log_determinant >= noise_alone);
         CHECK_NEAR(log_determinant, noise_alone, BOTH_WIDTHS(5, 1e-6));
     }
@@ -145,6 +149,66 @@ static void shaped_answer(const bench *b, const eits_disc *disc, int parameter, 
         for (int i = 0; i < RANK; ++i)
             out[i] += cover / (double)m->column_weight[j] * b->b.d.s[j * RANK + (uint32_t)i];
     }
+}
+
+/* Rows left out: the errors go through F, and white noise of each row in use through the reduction
+ * of the rest, written out row by row. What the factor adds lest a lost direction be singular is a
+ * hundredth of the regularisation. */
+static void the_covariance_of_the_rows_left_is_theirs(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 0);
+    CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[4].first, 1), EITS_OK);
+    CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[4].second, 1), EITS_OK);
+    stage_discs(&b, &ONE, 1);
+    CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_TRIANGLE);
+    eits_real log_determinant;
+    uint64_t macs = 0;
+    CHECK(eits_factor_covariance(ctx, &ctx->scratch, 1, &log_determinant, &macs));
+    double f[RANK][RANK], noise[RANK][RANK] = {{0}}, square = 0;
+    for (int j = 0; j < RANK; ++j) { /* F, column by column */
+        eits_real unit[STRIDE] = {0};
+        unit[j] = 1;
+        (void)eits_whiten(ctx, unit);
+        for (int i = 0; i < RANK; ++i)
+            f[i][j] = (double)unit[i];
+    }
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        eits_real moved[STRIDE];
+        square += (double)ctx->frame.d[k] * (double)ctx->frame.d[k];
+        if (ctx->frame.sides[k] == EITS_SIDE_NONE)
+            continue;
+        ctx->scratch.index[0] = k;
+        ctx->scratch.value[0] = 1;
+        (void)eits_reduce(ctx, &ctx->scratch, 1, moved);
+        for (int i = 0; i < RANK; ++i) {
+            for (int j = 0; j < RANK; ++j)
+                noise[i][j] += (double)moved[i] * (double)moved[j];
+        }
+    }
+    const double least =
+        (double)(EITS_ERROR_MIN_NOISE * ctx->reference.v0_rms * ctx->reference.gain);
+    for (int i = 0; i < RANK; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            double sigma = least * least * noise[i][j], size = 0, found = 0;
+            for (int k = 0; k < RANK; ++k) {
+                for (int l = 0; l < RANK; ++l) {
+                    const int at = k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
+                    sigma += f[i][k] * f[j][l] *
+                             ((double)EITS_ERROR_SHARE * square * (double)b.errors[at] +
+                              (double)b.drift[at]);
+                }
+            }
+            for (int k = 0; k <= j; ++k)
+                found += (double)ctx->evidence.factor[STRIDE * i + k] *
+                         (double)ctx->evidence.factor[STRIDE * j + k];
+            for (int k = 0; k <= i; ++k)
+                size += (double)ctx->evidence.factor[STRIDE * i + k] *
+                        (double)ctx->evidence.factor[STRIDE * i + k];
+            CHECK_NEAR(found, sigma, 0.01 * size + BOTH_WIDTHS(1e-9, 1e-12));
+        }
+    }
+    dense_bench_close(&b.b);
 }
 
 /* Re or Im of E_drive E_measure, E averaged over the disc's cover, times -volts change area. */
@@ -187,7 +251,7 @@ static void shapes_move_the_data_as_ellipses_do(void)
     eits_real log_determinant;
     uint64_t macs = 0;
     stage_discs(&b, &ONE, 1);
-    CHECK(eits_factor_covariance(ctx, 0, &log_determinant, &macs));
+    CHECK(eits_factor_covariance(ctx, &ctx->scratch, 0, &log_determinant, &macs));
     const eits_answer answer = answer_of(&ONE, 1, EITS_SHAPE_PARAMETERS);
     const double change = (double)ONE.change, radius = (double)ONE.radius_mm, step = 1e-3;
     double expected[EITS_SHAPE_PARAMETERS][RANK], left[RANK] = {0};
@@ -249,6 +313,7 @@ static void parameters_fit_the_data(void)
 int main(void)
 {
     the_covariance_is_noise_and_model_errors();
+    the_covariance_of_the_rows_left_is_theirs();
     a_frame_of_drift_alone_has_errors_of_noise();
     shapes_move_the_data_as_ellipses_do();
     parameters_fit_the_data();

@@ -4,7 +4,8 @@
  *
  * P's rows are orthogonal (eits_row_form), so that white noise stays uncorrelated. Where the
  * regularisation is raised for this frame, the reduced data are F y with F diagonal, and so is
- * Sigma's: F Sigma F. Rows left out make F a triangle; such frames are not tested.
+ * Sigma's: F Sigma F. Rows left out make F a triangle: F (errors) F', and the noise of the rows
+ * that are left (frame/whitening.c).
  *
  * The gain's drift is projected out of y and of all answers; in the metric of Sigma it is once
  * more, so that it costs nothing to explain.
@@ -16,15 +17,19 @@
 #include "base/vec.h"
 #include "diagnostics/diagnostics.h"
 #include "evidence/constants.h"
+#include "frame/triangle.h"
+#include "frame/whitening.h"
 #include "kernels/kernels.h"
 
 /* The mean variance of a fold in use, in model volts^2. */
 static eits_real noise_variance(const eits_context *ctx)
 {
-    const eits_real least = EITS_ERROR_MIN_NOISE * eits_fabs(ctx->reference.gain) *
-                            ctx->reference.v0_rms,
-                    learned = eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded;
-    return learned > least * least ? learned : least * least;
+    const eits_real min = EITS_ERROR_MIN_NOISE * ctx->reference.gain * ctx->reference.v0_rms;
+    uint32_t used = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k)
+        used += ctx->frame.sides[k] != EITS_SIDE_NONE;
+    const eits_real learned = eits_noise_energy(ctx) / (eits_real)(used > 0 ? used : 1u);
+    return learned > min * min ? learned : min * min;
 }
 
 /* |d|^2 of the folds in use, less the gain's drift. */
@@ -44,22 +49,65 @@ static eits_real *row_of_factor(const eits_context *ctx, uint32_t i)
     return ctx->evidence.factor + EITS_STRIDE(ctx->model->rank) * i;
 }
 
-/* Row i of Sigma up to its diagonal; zeros behind it. */
-static void covariance_row(const eits_context *ctx, uint32_t i, eits_real errors, eits_real drift,
-                           eits_real noise)
+/* What Sigma is the sum of: so much of the model's errors, of the sheet's drift and of white
+ * noise. */
+typedef struct shares {
+    eits_real errors, drift, noise;
+} shares;
+
+/* Element j of row i of the errors' part, j <= i. */
+static eits_real error_at(const eits_context *ctx, shares of, uint32_t i, uint32_t j)
 {
     const eits_uncertainty *u = &ctx->model->uncertainty;
-    const size_t first = (size_t)i * (i + 1u) / 2u;
+    const size_t at = (size_t)i * (i + 1u) / 2u + j;
+    return eits_fma(of.errors, (eits_real)u->errors[at], of.drift * (eits_real)u->drift[at]);
+}
+
+/* Sigma's rows up to their diagonals, zeros behind, where F is 1 or diagonal. */
+static void covariance(const eits_context *ctx, shares of)
+{
     const eits_real *weight =
         ctx->whitening.form == EITS_WHITENING_DIAGONAL ? ctx->whitening.map : NULL;
-    eits_real *row = row_of_factor(ctx, i);
-    eits_zero(row, EITS_STRIDE(ctx->model->rank));
-    for (uint32_t j = 0; j <= i; ++j)
-        row[j] = eits_fma(errors, (eits_real)u->errors[first + j],
-                          drift * (eits_real)u->drift[first + j]);
-    row[i] = eits_fma(noise, (eits_real)ctx->model->row_form.energy[i], row[i]);
-    for (uint32_t j = 0; weight != NULL && j <= i; ++j)
-        row[j] *= weight[i] * weight[j];
+    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
+        eits_real *row = row_of_factor(ctx, i);
+        eits_zero(row, EITS_STRIDE(ctx->model->rank));
+        for (uint32_t j = 0; j <= i; ++j)
+            row[j] = error_at(ctx, of, i, j);
+        row[i] = eits_fma(of.noise, (eits_real)ctx->model->row_form.energy[i], row[i]);
+        for (uint32_t j = 0; weight != NULL && j <= i; ++j)
+            row[j] *= weight[i] * weight[j];
+    }
+}
+
+/* The same where rows are left out: F M F' with F a triangle, and noise by its directions. */
+static uint64_t covariance_of_rest(const eits_context *ctx, const eits_scratch *scratch, shares of)
+{
+    const uint32_t rank = ctx->model->rank;
+    const size_t stride = EITS_STRIDE(rank);
+    eits_real *product = scratch->square, *row_of_errors = scratch->row[1];
+    uint64_t macs = (uint64_t)rank * rank * rank;
+    eits_zero(product, rank * stride);
+    for (uint32_t k = 0; k < rank; ++k) {
+        eits_zero(row_of_errors, stride);
+        for (uint32_t j = 0; j < rank; ++j)
+            row_of_errors[j] = j <= k ? error_at(ctx, of, k, j) : error_at(ctx, of, j, k);
+        for (uint32_t i = 0; i <= k; ++i)
+            eits_axpy(ctx->kernels, product + stride * i, row_of(ctx, ctx->whitening.map, i)[k],
+                      row_of_errors, rank);
+    }
+    for (uint32_t i = 0; i < rank; ++i) {
+        eits_real *row = row_of_factor(ctx, i);
+        eits_zero(row, stride);
+        for (uint32_t j = 0; j <= i; ++j)
+            row[j] = dot_of_row(ctx, j, product + stride * i, row_of(ctx, ctx->whitening.map, j));
+    }
+    for (uint32_t k = 0; k < rank; ++k) {
+        macs += eits_noise_direction(ctx, k, row_of_errors);
+        for (uint32_t i = 0; i < rank; ++i)
+            eits_axpy(ctx->kernels, row_of_factor(ctx, i), of.noise * row_of_errors[i],
+                      row_of_errors, i + 1u);
+    }
+    return macs + (uint64_t)rank * rank * rank / 2u;
 }
 
 /* Cholesky's factor of the rows, each from those above it. Returns log det Sigma; NaN where that is
@@ -84,15 +132,18 @@ static eits_real factor(const eits_context *ctx)
     return log_determinant;
 }
 
-int eits_factor_covariance(eits_context *ctx, int drift, eits_real *log_determinant, uint64_t *macs)
+int eits_factor_covariance(eits_context *ctx, const eits_scratch *scratch, int drift,
+                           eits_real *log_determinant, uint64_t *macs)
 {
     const uint32_t rank = ctx->model->rank;
-    if (ctx->model->uncertainty.errors == NULL || ctx->whitening.form == EITS_WHITENING_TRIANGLE ||
-        ctx->projection.count > 1 || !ctx->options.touch_test)
+    if (ctx->model->uncertainty.errors == NULL || ctx->projection.count > 1 ||
+        !ctx->options.touch_test)
         return 0;
-    const eits_real errors = EITS_ERROR_SHARE * data_energy(ctx), noise = noise_variance(ctx);
-    for (uint32_t i = 0; i < rank; ++i)
-        covariance_row(ctx, i, errors, drift ? 1 : 0, noise);
+    const shares of = {EITS_ERROR_SHARE * data_energy(ctx), drift ? 1 : 0, noise_variance(ctx)};
+    if (ctx->whitening.form == EITS_WHITENING_TRIANGLE)
+        *macs += covariance_of_rest(ctx, scratch, of);
+    else
+        covariance(ctx, of);
     *log_determinant = factor(ctx);
     *macs += (uint64_t)rank * rank * rank / 6u;
     if (!eits_is_finite(*log_determinant))

@@ -254,7 +254,8 @@ static verdict judge(eits_context *ctx, const eits_scratch *scratch, const eits_
     eits_real log_determinant;
     v.answer.count = f->count;
     v.answer.parameters = eits_shape_parameters(ctx, f->count);
-    if (v.answer.parameters == 0 || !eits_factor_covariance(ctx, drift, &log_determinant, macs)) {
+    if (v.answer.parameters == 0 ||
+        !eits_factor_covariance(ctx, scratch, drift, &log_determinant, macs)) {
         v.answer.parameters = 0;
         return v;
     }

@@ -33,10 +33,10 @@ typedef struct eits_answer {
 
 /* covariance.c */
 
-/* L for this frame; 0 where there is none: the model does not say what it may be wrong by, or rows
- * are left out of the frame. *log_determinant is that of Sigma, *drift says whether D is in it. */
-int eits_factor_covariance(eits_context *ctx, int drift, eits_real *log_determinant,
-                           uint64_t *macs);
+/* L for this frame, in evidence.factor; 0 where there is none: the model does not say what it may
+ * be wrong by, or nobody wants to know. *log_determinant is that of Sigma; `drift`: with D. */
+int eits_factor_covariance(eits_context *ctx, const eits_scratch *scratch, int drift,
+                           eits_real *log_determinant, uint64_t *macs);
 
 /* v = L^-1 v (stride numbers), the gain's drift taken out. */
 uint64_t eits_whiten_errors(const eits_context *ctx, eits_real *v);

@@ -151,7 +151,24 @@ static uint64_t finish_whitening(const eits_context *ctx, eits_real fraction, ei
     return macs;
 }
 
-static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v);
+/* v = T^-1 v; v = T'^-1 v. */
+static void solve(const eits_context *ctx, eits_real *triangle, eits_real *v)
+{
+    for (uint32_t i = ctx->model->rank; i-- > 0;) {
+        const eits_real *row = row_of(ctx, triangle, i), before = v[i];
+        v[i] = 0;
+        v[i] = (before - dot_of_row(ctx, i, row, v)) / row[i];
+    }
+}
+
+static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v)
+{
+    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
+        const eits_real *row = row_of(ctx, triangle, i), after = v[i] / row[i];
+        add_row(ctx, i, v, -after, row);
+        v[i] = after;
+    }
+}
 
 /* Noise in S'F'y, over that in S'y with all rows. White noise on the rows has the covariance
  * (G'G)^-1 in y; its mean square over S's columns is the trace of S'F' (G'G)^-1 F S, found by
@@ -265,25 +282,6 @@ uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch)
     return 0;
 }
 
-/* v = T^-1 v; v = T'^-1 v. */
-static void solve(const eits_context *ctx, eits_real *triangle, eits_real *v)
-{
-    for (uint32_t i = ctx->model->rank; i-- > 0;) {
-        const eits_real *row = row_of(ctx, triangle, i), before = v[i];
-        v[i] = 0;
-        v[i] = (before - dot_of_row(ctx, i, row, v)) / row[i];
-    }
-}
-
-static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v)
-{
-    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
-        const eits_real *row = row_of(ctx, triangle, i), after = v[i] / row[i];
-        add_row(ctx, i, v, -after, row);
-        v[i] = after;
-    }
-}
-
 /* R'^-1 is had from what is kept: R = G F diag(w) but for F's scale, so y = G^-1 G'^-1 F'^-1
  * diag(1/w^2) P_o d_o. */
 uint64_t eits_whiten_data(eits_context *ctx, eits_real *v)
@@ -296,4 +294,15 @@ uint64_t eits_whiten_data(eits_context *ctx, eits_real *v)
     solve_transposed(ctx, ctx->whitening.metric, v);
     solve(ctx, ctx->whitening.metric, v);
     return 3u * triangle_macs(ctx);
+}
+
+/* y = sqrt(square) G^-1 R'^-1 U_o' d_o / s_1, and U_o' U_o is R'R but for e: white noise of
+ * variance 1 has the covariance square / s_1^2 G^-1 G'^-1. */
+uint64_t eits_noise_direction(const eits_context *ctx, uint32_t k, eits_real *out)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_zero(out, EITS_STRIDE(rank));
+    out[k] = eits_sqrt(ctx->whitening.square) / ctx->whitening.s1;
+    solve(ctx, ctx->whitening.metric, out);
+    return triangle_macs(ctx);
 }

@@ -31,6 +31,11 @@ eits_real eits_detection_threshold(const eits_context *ctx);
  * is to meet. */
 uint64_t eits_whiten_data(eits_context *ctx, eits_real *v);
 
+/* While whitening.form is EITS_WHITENING_TRIANGLE: the k-th of `rank` directions (stride numbers)
+ * that white noise of variance 1 on the rows in use moves the data along, each independently: its
+ * covariance is the sum of their outer products. Returns the multiply-accumulates. */
+uint64_t eits_noise_direction(const eits_context *ctx, uint32_t k, eits_real *out);
+
 /* v = F v (stride numbers); v as it is where nothing is whitened for masked rows. Returns the
  * multiply-accumulates. */
 uint64_t eits_whiten(const eits_context *ctx, eits_real *v);

@@ -105,7 +105,7 @@ def test_the_scan_keeps_its_time(run: Run) -> None:
         " frames solved"
     )
     assert max(scans) <= 208 * info.slot_us
-    assert stats.stack_used < 12 * 1024  # the F767 has 16 KB
+    assert stats.stack_used < 18 * 1024  # the F767 has 24 KB
 
 
 def test_the_voltages_are_the_skins(run: Run) -> None:
