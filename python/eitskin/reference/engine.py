@@ -507,28 +507,30 @@ class ReferenceEngine:
         return np.array([self._of_known(basis, d) for d in turned_dipoles(self.model, disc)])
 
     def _data_errors(self, basis: FloatArray) -> DataErrors | None:
-        """What the frame's data may be wrong by; None where touches are not to be tested, or rows
-        are left out."""
+        """What the frame's data may be wrong by; None where touches are not to be tested."""
         model, folded = self.model, self._folded
         errors, rows = model.model_errors, model.row_form
         if errors is None or rows is None or not self.options.touch_test:
             return None
-        if len(basis) > 1 or not (self._whitening is None or folded.whole):
+        if len(basis) > 1:
             return None
         along, square = self._along(folded), float(folded.d @ folded.d)
         if along is not None and along @ along > 0:
             square = max(0.0, square - float(folded.d @ along) ** 2 / float(along @ along))
         least = (ERROR_MIN_NOISE * self._gain * self._v0_rms) ** 2
-        noise = max(self._noise_energy / len(model.fold.first), least)
-        weight = 1.0 if self._whitening is None else np.diag(self._whitening.data)
-        scale = np.outer(weight, weight)
-        error = ERROR_SHARE * square * errors.error + noise * np.diag(rows.energy.astype(float))
+        known = folded.first | folded.second
+        noise = max(self._noise_energy / max(1, int(known.sum())), least)
+        see, of_noise = np.eye(model.rank), np.diag(rows.energy.astype(float))
+        if self._whitening is not None:
+            see, reduced = self._whitening.see, self._whitening.data @ self._p[:, known]
+            of_noise = see @ of_noise @ see.T if folded.whole else reduced @ reduced.T
+        error = ERROR_SHARE * square * (see @ errors.error @ see.T) + noise * of_noise
         fields, room = model.fields, model.rank * stride_for(model.rank)
         tells = fields is not None and stride_for(fields.columns.shape[1]) <= room
         dipoles = (
             partial(self._dipoles, basis) if tells and model.data_kind == "difference" else None
         )
-        return DataErrors(scale * error, scale * errors.drift, dipoles)
+        return DataErrors(error, see @ errors.drift @ see.T, dipoles)
 
     def _solve(
         self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None

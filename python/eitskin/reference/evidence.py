@@ -23,6 +23,7 @@ from eitskin.core.constants_table import (
     MIN_PIVOT,
     MOST_CHANGE,
     REFIT_STEPS,
+    SETTLED_MISFIT,
     SHAPE_PRECISION,
     SHORTER,
     TOUCH_EVIDENCE,
@@ -223,12 +224,15 @@ class Hypothesis:
         shape[:, : answer.parameters - PLACE] += fraction * np.clip(steps[:, PLACE:], -1, 1)
         return replace(answer, discs=discs, shape=shape)
 
-    def refit(self, answer: Answer) -> Answer:
-        """Gauss and Newton's steps until F no longer falls; sets its misfit."""
+    def refit(self, answer: Answer, enough: float = 0.0) -> Answer:
+        """Gauss and Newton's steps, a few at most, until F is ``enough`` or hardly falls; sets its
+        misfit."""
         if not answer.discs:
             return replace(answer, misfit=float(self.data @ self.data))
         now, fraction = self.linearise(answer), 1.0
         for _ in range(REFIT_STEPS):
+            if now.here <= enough or now.here - now.least < SETTLED_MISFIT:
+                break
             trial = self.moved(answer, now.step, fraction)
             after = self.linearise(trial)
             if after.here < now.here:
@@ -249,9 +253,14 @@ class Hypothesis:
         return TOUCH_EVIDENCE * self.excess(self.answer.misfit, len(self.answer.discs))
 
     def near_pairs(self) -> list[tuple[int, int]]:
-        """Pairs i < j of discs that may be one touch, by j and then i."""
-        discs = self.answer.discs
-        return [(i, j) for j in range(len(discs)) for i in range(j) if is_near(discs[i], discs[j])]
+        """Pairs i < j of near discs, one of them worth little beside the other, by j and then i."""
+        discs, weak = self.answer.discs, self.rise < CLEAR_AS_DISCS * self.needed()
+        return [
+            (i, j)
+            for j in range(len(discs))
+            for i in range(j)
+            if (weak[i] or weak[j]) and is_near(discs[i], discs[j])
+        ]
 
     def without(self, answer: Answer, k: int) -> Answer:
         """``answer`` without disc k."""
@@ -313,9 +322,10 @@ class Hypothesis:
     def take_simpler(self, weakest: int) -> bool:
         """Take the best of the answers with one disc less: without the weakest, or with a near pair
         as one."""
-        best = self.refit(self.without(self.answer, weakest))
+        enough = self.answer.misfit + self.needed()
+        best = self.refit(self.without(self.answer, weakest), enough)
         for i, j in self.near_pairs():
-            one = self.refit(self.as_one(self.answer, i, j))
+            one = self.refit(self.as_one(self.answer, i, j), enough)
             best = one if one.misfit < best.misfit else best
         return self.take(best, self.needed())
 
