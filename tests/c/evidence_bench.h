@@ -19,6 +19,7 @@
 
 enum { RANK = 20, SIDE = 12, STRIDE = 24, PACKED = RANK * (RANK + 1) / 2 };
 
+static const double BOARD = 0.5; /* what the board's volts are of the model's */
 static const small_spec SPEC = {.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .fields = 1};
 static const eits_disc ONE = {-13, 4, 12, R(0.02), 1}, OTHER = {15, -8, 13, R(0.015), 1};
 
@@ -54,7 +55,7 @@ static inline eits_context *set_up(bench *b, int project)
     fill_errors(b->errors, 1e-4);
     fill_errors(b->drift, 1e-5);
     b->b.c.model.uncertainty = (eits_uncertainty){.errors = b->errors, .drift = b->drift};
-    small_reference(ctx->model, 1, b->frame);
+    small_reference(ctx->model, BOARD, b->frame);
     CHECK_EQUAL(eits_reference_set(ctx, b->frame, SMALL_ROWS), EITS_OK);
     return ctx;
 }
@@ -73,15 +74,15 @@ static inline void stage(bench *b, const double *y)
     uint32_t masked;
     uint64_t macs;
     eits_context *ctx = b->b.c.ctx;
-    small_reference(ctx->model, 1, b->frame);
+    small_reference(ctx->model, BOARD, b->frame);
     for (int k = 0; k < SMALL_FOLDED; ++k) {
         const eits_fold fold = ctx->model->fold[k];
         b->d[k] = 0;
         for (int i = 0; i < RANK; ++i)
             b->d[k] += b->b.d.p[k * RANK + i] * y[i] / energy(b, i);
-        b->frame[fold.first] += (eits_real)b->d[k];
+        b->frame[fold.first] += (eits_real)(BOARD * b->d[k]);
         if (fold.second != EITS_FOLD_NONE)
-            b->frame[fold.second] += (eits_real)(fold.sign * b->d[k]);
+            b->frame[fold.second] += (eits_real)(BOARD * fold.sign * b->d[k]);
     }
     CHECK_EQUAL(eits_frame_stage(ctx, b->frame, SMALL_ROWS, &masked, &macs), EITS_OK);
 }

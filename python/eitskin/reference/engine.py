@@ -530,7 +530,14 @@ class ReferenceEngine:
         dipoles = (
             partial(self._dipoles, basis) if tells and model.data_kind == "difference" else None
         )
-        return DataErrors(error, see @ errors.drift @ see.T, dipoles)
+        triangle = model.rank * (model.rank + 1) // 2
+        whiten, data = (
+            (0, 0)
+            if self._whitening is None
+            else ((model.rank, model.rank) if folded.whole else (triangle, 3 * triangle))
+        )
+        reduce = 4 * len(known) + int(known.sum()) * model.rank + data
+        return DataErrors(error, see @ errors.drift @ see.T, dipoles, whiten, reduce)
 
     def _solve(
         self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None

@@ -18,10 +18,6 @@ from eitskin.solve.reconstructor import ENGINES, Reconstructor
 from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
 from small_models import prebuilt
 
-pytestmark = pytest.mark.skipif(
-    prebuilt()[0].model_errors is None, reason="the prebuilt model does not say its errors yet"
-)
-
 SCENES = 2
 # Places and radii of 224 scenes of the tuning family differed by up to 8e-8 mm between numpy and
 # float64. Of 1120, float32 and float64 differed by .0001 mm in nine of ten, by more than .1 mm in
@@ -86,11 +82,11 @@ def covariance_mm2(touch: Touch) -> list[float | None]:
     return [touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2]
 
 
-def agree(results: dict[str, Reconstruction]) -> int:
-    """How many touches all engines found, alike."""
+def agree(results: dict[str, Reconstruction], loose: float = 0.0) -> int:
+    """How many touches all engines found, alike; numbers but places to ``loose`` at least."""
     expected = results["numpy"]
     for name, bound in BOUND_MM.items():
-        result, rel = results[name], BOUND_REL[name]
+        result, rel = results[name], max(BOUND_REL[name], loose)
         assert len(result.touches) == len(expected.touches), name
         assert np.abs(sizes_mm(result) - sizes_mm(expected)).max(initial=0) <= bound, name
         assert result.info.unexplained == pytest.approx(expected.info.unexplained, rel=rel, abs=rel)
@@ -200,7 +196,7 @@ def test_row_gains_undo_what_multiplies_rows(engine: str) -> None:
 
 
 def test_all_engines_agree_with_rows_masked_and_lost() -> None:
-    """Rows whose reciprocals are in use are tested; with a pair gone nothing is, on any engine."""
+    """Whether or not their reciprocals are in use."""
     fold, scenes = prebuilt()[0].fold, world("uneven_20_percent")
     quiet_v, frame_v = scenes.quiet_v[0], scenes.frames_v[0]
     mask = np.zeros(len(frame_v), dtype=bool)
@@ -210,26 +206,24 @@ def test_all_engines_agree_with_rows_masked_and_lost() -> None:
     pair = frame_v.copy()
     pair[[fold.first[50], fold.second[50]]] = np.nan
     for frame in (frame_v, single, pair):
-        results, untested = {}, {}
+        results = {}
         for engine in ENGINES:
-            for test, into in ((1, results), (0, untested)):
-                reconstructor = made(engine, touch_test=test)
-                reconstructor.mask_rows(mask)
-                reconstructor.tare(quiet_v)
-                into[engine] = reconstructor.reconstruct(frame)
-        assert agree(results) > 0
-        if frame is pair:
-            assert all(results[e].touches == untested[e].touches for e in ENGINES)
+            reconstructor = made(engine)
+            reconstructor.mask_rows(mask)
+            reconstructor.tare(quiet_v)
+            results[engine] = reconstructor.reconstruct(frame)
+        # a lost row's covariance has what keeps its factors regular, in numpy and in C not the same
+        assert agree(results, 2e-4 if frame is pair else 0.0) > 0
+        assert all(touch.confidence for touch in results["numpy"].touches)  # they were tested
 
 
 @pytest.mark.parametrize("frames", [1, 8])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_noiseless_reference_makes_no_touch_of_a_millionth(engine: str, frames: int) -> None:
-    """Of a change of each row, at random or smooth, that a noiseless front end would show. (With
-    diagnostics, rows that differ from their reciprocals would be left out as outliers, and frames
-    that lack rows are not tested.)"""
+    """Of a change of each row, at random or smooth, that a noiseless front end would show: some
+    rows are then left out as outliers."""
     generator, scenes = np.random.default_rng(3), world("no_touch_noiseless")
-    reconstructor = made(engine, diagnostics=0)
+    reconstructor = made(engine)
     for quiet_v, drifted_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
         learned = reconstructor.tare(quiet_v[:frames])
         assert frames == 1 or (learned.noise_v > 0 and learned.lambda_noise > 0)
