@@ -162,6 +162,7 @@ typedef struct eits_evidence {
     eits_real *left;       /* stride: L^-1 of what the touches leave of y */
     eits_real *gain_drift; /* stride: L^-1 of the projection's direction, of length 1 */
     uint32_t drifts;       /* 1: it is in force */
+    uint32_t columns_made; /* since the test of this frame began */
 } eits_evidence;
 
 /* A touch that is followed (touch/tracker.h). */

@@ -50,8 +50,12 @@
  * become touches */
 #define EITS_CLEAR_AS_DISCS R(10.0)
 
-/* excess up to which the data are explained as they are: no shapes are looked at, and no drift of
- * the sheet. larger: drift and shapes become touches; smaller: costs */
+/* excess up to which shapes are not even looked at where the discs are clear without. larger:
+ * shapes become touches; smaller: costs */
+#define EITS_FITS_AS_DISCS R(4.0)
+
+/* excess of what stays up to which no drift of the sheet is thought of. larger: drift becomes
+ * touches; smaller: costs */
 #define EITS_FITS R(2.0)
 
 /* ---- Chosen: by hand; not measured. Check: ctest --preset host -R evidence */
@@ -85,9 +89,9 @@
 /* a step that promises less is not taken [of F]. larger: fits end early; smaller: costs */
 #define EITS_SETTLED_MISFIT R(1.0)
 
-/* after so many, no simpler answer is tried any more [multiply-accumulates]. larger: crowds cost
- * more; smaller: false touches stay in crowds */
-#define EITS_TEST_MACS 3000000
+/* of parameters: after so many, no simpler answer is tried any more; about 6 kMAC each at rank 64
+ * [columns]. larger: crowds cost more; smaller: false touches stay in crowds */
+#define EITS_TEST_COLUMNS 600
 
 /* of a step that did not lower the misfit, the next to be tried. larger: more steps that are too
  * long; smaller: steps that come to nothing */

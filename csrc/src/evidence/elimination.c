@@ -22,9 +22,8 @@ typedef struct verdict {
     eits_real evidence; /* F + threshold n + log det Sigma */
     eits_real rise[EITS_MAX_TOUCHES];
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
-    int changed;            /* 1: discs were dropped or merged */
-    eits_real first_excess; /* of the discs as they came, without shapes */
-    int clear;              /* 1: by the linearisation without shapes alone */
+    int changed; /* 1: discs were dropped or merged */
+    int clear;   /* 1: by the linearisation without shapes alone */
 } verdict;
 
 /* How much worse the data fit than Sigma says; at least 1. */
@@ -207,7 +206,6 @@ static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v
     eits_likelihood likelihood;
     uint8_t out[EITS_MAX_TOUCHES];
     int fitted = 0, linear = 1;
-    const uint64_t most = *macs + EITS_TEST_MACS;
     while (v->answer.count > 0) {
         uint32_t weakest = look(ctx, scratch, v, fitted, &likelihood, macs);
         if (v->rise[weakest] > EITS_CLEAR * needed(ctx, v) && !any_may_be_one(v, needed(ctx, v)))
@@ -220,7 +218,8 @@ static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v
                 continue;
             }
         }
-        if (*macs > most) /* too many to try each: what is left is believed */
+        /* too many to try each: what is left is believed */
+        if (ctx->evidence.columns_made > EITS_TEST_COLUMNS)
             return;
         if (!fitted) {
             *macs += eits_refit(ctx, scratch, &v->answer, 0);
@@ -240,9 +239,9 @@ static int is_clear(eits_context *ctx, const eits_scratch *scratch, verdict *v, 
     const uint32_t all = v->answer.parameters;
     v->answer.parameters = EITS_PLACE_PARAMETERS;
     const uint32_t weakest = look(ctx, scratch, v, 0, &likelihood, macs);
-    v->first_excess = excess(ctx, v->answer.misfit, v->answer.count);
     v->clear = v->rise[weakest] > EITS_CLEAR_AS_DISCS * needed(ctx, v) &&
-               !any_may_be_one(v, needed(ctx, v)) && v->first_excess < EITS_FITS;
+               !any_may_be_one(v, needed(ctx, v)) &&
+               excess(ctx, v->answer.misfit, v->answer.count) < EITS_FITS_AS_DISCS;
     v->answer.parameters = all;
     return v->clear;
 }
@@ -263,6 +262,7 @@ static verdict judge(eits_context *ctx, const eits_scratch *scratch, const eits_
         v.answer.disc[k] = f->disc[k];
         v.answer.radius_mm[k] = f->disc[k].radius_mm;
     }
+    ctx->evidence.columns_made = 0;
     eits_copy(ctx->evidence.data, f->data, EITS_STRIDE(ctx->model->rank));
     *macs += eits_whiten_errors(ctx, ctx->evidence.data);
     if (drift || !is_clear(ctx, scratch, &v, macs))
@@ -279,7 +279,7 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
     verdict v = judge(ctx, scratch, f, 0, &f->macs);
     if (v.answer.parameters == 0)
         return;
-    if (!v.clear && v.first_excess > EITS_FITS) {
+    if (!v.clear && excess(ctx, v.answer.misfit, v.answer.count) > EITS_FITS) {
         const verdict drifted = judge(ctx, scratch, f, 1, &f->macs);
         if (drifted.answer.parameters > 0 && drifted.evidence < v.evidence)
             v = drifted;

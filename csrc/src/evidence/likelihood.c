@@ -91,6 +91,7 @@ uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const ei
     eits_real gradient[EITS_EVIDENCE_COLUMNS];
     uint64_t macs = 0;
     out->count = n;
+    ctx->evidence.columns_made += n;
     eits_copy(ctx->evidence.left, ctx->evidence.data, stride);
     for (uint32_t k = 0; k < answer->count; ++k)
         macs += eits_shape_columns(ctx, scratch, answer, k);

@@ -94,13 +94,9 @@ class Fit:
 
     def area_mm2(self, disc: Disc) -> float:
         """What the disc's covers add up to on the pixels that count."""
-        return float(self.covers(disc).sum()) * self.model.grid.pixel_mm**2
-
-    def covers(self, disc: Disc) -> FloatArray:
-        """How much of each pixel that counts the disc covers (n,)."""
         distance = np.hypot(*(self.centres - (disc.x_mm, disc.y_mm)).T)
         cover = np.clip(0.5 + (disc.radius_mm - distance) / self.model.grid.pixel_mm, 0.0, 1.0)
-        return np.where(self.model.column_weight != 0, cover, 0.0)
+        return float(cover[self.model.column_weight != 0].sum()) * self.model.grid.pixel_mm**2
 
     def best_change(self, disc: Disc, atom: FloatArray, target: FloatArray) -> float:
         """The change that explains ``target`` best along ``atom``, of the disc's own sign."""

@@ -530,14 +530,7 @@ class ReferenceEngine:
         dipoles = (
             partial(self._dipoles, basis) if tells and model.data_kind == "difference" else None
         )
-        triangle = model.rank * (model.rank + 1) // 2
-        whiten, data = (
-            (0, 0)
-            if self._whitening is None
-            else ((model.rank, model.rank) if folded.whole else (triangle, 3 * triangle))
-        )
-        reduce = 4 * len(known) + int(known.sum()) * model.rank + data
-        return DataErrors(error, see @ errors.drift @ see.T, dipoles, whiten, reduce)
+        return DataErrors(error, see @ errors.drift @ see.T, dipoles)
 
     def _solve(
         self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None

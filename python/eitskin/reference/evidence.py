@@ -14,6 +14,7 @@ from eitskin.core.constants_table import (
     CLEAR_AS_DISCS,
     DIPOLE_PRECISION,
     FITS,
+    FITS_AS_DISCS,
     FREE_PRECISION,
     LEAST_CHANGE,
     MAX_MOVE,
@@ -26,7 +27,7 @@ from eitskin.core.constants_table import (
     SETTLED_MISFIT,
     SHAPE_PRECISION,
     SHORTER,
-    TEST_MACS,
+    TEST_COLUMNS,
     TOUCH_EVIDENCE,
 )
 from eitskin.reference.disc_fit import Disc, Fit
@@ -45,15 +46,11 @@ PRECISION = np.array([FREE_PRECISION] * 3 + [SHAPE_PRECISION] * 3 + [DIPOLE_PREC
 class DataErrors:
     """What a frame's data y (r,) may be wrong by: covariances ``error`` (r, r), of noise and of
     model errors, and ``drift`` (r, r), of a skin that drifts; ``dipoles`` gives what a disc adds to
-    y as a dipole that turns (2, r), None where the model cannot tell. ``whiten_macs`` and
-    ``reduce_macs``: multiply-accumulates of whitening what a disc answers, and of reducing folded
-    data."""
+    y as a dipole that turns (2, r), None where the model cannot tell."""
 
     error: FloatArray
     drift: FloatArray
     dipoles: Callable[[Disc], FloatArray] | None
-    whiten_macs: int = 0
-    reduce_macs: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +158,7 @@ class Hypothesis:
             parameters_of(fit, errors, count),
         )
         self.changed = self.clear = False
-        self.first_excess, self.macs = 1.0, 0
+        self.columns_made = 0
         self.rise, self.place_mm2 = np.zeros(count), np.zeros((count, 3))
 
     @property
@@ -185,8 +182,8 @@ class Hypothesis:
 
     def linearise(self, answer: Answer) -> Likelihood:
         """F about ``answer``."""
-        self.macs += self.macs_of(answer)
         columns = np.vstack([self.columns(answer, k) for k in range(len(answer.discs))])
+        self.columns_made += len(columns)
         offsets = answer.offsets()
         parts = offsets.copy()  # how much of each column there is
         parts[:, :PLACE] = 1, 0, 0, 0
@@ -198,20 +195,6 @@ class Hypothesis:
         inverse = root.T @ root
         step = inverse @ gradient
         return Likelihood(here, here - float(gradient @ step), step, inverse)
-
-    def macs_of(self, answer: Answer) -> int:
-        """The multiply-accumulates of a linearisation, as the core counts them: of crowds, that
-        decides how many simpler answers are tried."""
-        fit, p, n = self.fit, answer.parameters, answer.parameters * len(answer.discs)
-        r, ignored = fit.model.rank, 2 * fit.model.rank * len(fit.basis)
-        covered = sum(np.count_nonzero(fit.covers(disc)) for disc in answer.discs)
-        each = min(p, EDGE) * (self.errors.whiten_macs + ignored)
-        each += p * (r * (r + 1) // 2 + ignored + r)
-        macs = covered * min(p, EDGE) * r + n * (n + 1) // 2 * r + n**3 // 2
-        if p == ALL:
-            each += 2 * (self.errors.reduce_macs + ignored)
-            macs += covered * (2 * fit.model.protocol.n_electrodes + 4)
-        return int(macs + each * len(answer.discs))
 
     def moved(self, answer: Answer, step: FloatArray, fraction: float) -> Answer:
         """``answer`` a ``fraction`` of ``step`` (n,) further."""
@@ -326,7 +309,6 @@ class Hypothesis:
             if not rises[weakest] < TOUCH_EVIDENCE * self.excess(now.least, len(left)):
                 break
             now.drop(offsets, left.pop(weakest))
-            self.macs += offsets.shape[1] * offsets.size * (offsets.size + offsets.shape[1])
         return left
 
     def take_linear(self, left: list[int]) -> bool:
@@ -359,7 +341,7 @@ class Hypothesis:
 
     def eliminate(self) -> None:
         """From the discs as they are to those that stay."""
-        fitted, linear, most = False, True, self.macs + TEST_MACS
+        fitted, linear = False, True
         while self.answer.discs:
             weakest, now = self.look(fitted=fitted)
             if self.rise[weakest] > CLEAR * self.needed() and not self.near_pairs():
@@ -370,7 +352,7 @@ class Hypothesis:
                     linear = self.take_linear(left)
                     fitted = linear or fitted
                     continue
-            if self.macs > most:  # too many to try each: what is left is believed
+            if self.columns_made > TEST_COLUMNS:
                 return
             if not fitted:
                 self.answer = self.refit(self.answer)
@@ -385,9 +367,9 @@ class Hypothesis:
         parameters = self.answer.parameters
         self.answer = replace(self.answer, parameters=PLACE)
         weakest, _ = self.look(fitted=False)
-        self.first_excess = self.excess(self.answer.misfit, len(self.answer.discs))
+        excess = self.excess(self.answer.misfit, len(self.answer.discs))
         clear = self.rise[weakest] > CLEAR_AS_DISCS * self.needed() and not self.near_pairs()
-        self.clear = clear and self.first_excess < FITS
+        self.clear = clear and excess < FITS_AS_DISCS
         self.answer = replace(self.answer, parameters=parameters)
         return self.clear
 
@@ -400,7 +382,7 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
     best = Hypothesis(fit, errors, drift=False)
     if not best.is_clear():
         best.eliminate()
-        if best.first_excess > FITS:
+        if best.excess(best.answer.misfit, len(best.answer.discs)) > FITS:
             drifted = Hypothesis(fit, errors, drift=True)
             drifted.eliminate()
             best = drifted if drifted.evidence < best.evidence else best

@@ -170,13 +170,15 @@ MAX_INSTRUCTIONS = {0: 2_500_000, ALL_TOUCH_FIT: 4_000_000}
 def test_what_a_frame_costs_at_most(
     program: Path, tmp_path: Path, warm: bool, touch_fit: int
 ) -> None:
-    """Solve and touches, with peaks alone and with the whole search; each frame, also the first and
-    those where a touch comes: moving touches, and 20 random scenes that follow each other without
-    any rest."""
+    """Solve and touches, with peaks alone and untested, and with the whole search; each frame, also
+    the first and those where a touch comes: moving touches, and 20 random scenes that follow each
+    other without any rest."""
     model, blob = load_prebuilt()
     random = simulated_session()
     for quiet, frames in (moving_touches(), (random.quiet_v, random.frames_v)):
-        options = replace(default_options(model), warm_start=warm, touch_fit=touch_fit)
+        options = replace(
+            default_options(model), warm_start=warm, touch_fit=touch_fit, touch_test=touch_fit != 0
+        )
         board = run(program, tmp_path, blob, quiet, frames, options)
         costs = [result.solve_instructions + result.touch_instructions for result in board]
         print(

@@ -65,7 +65,7 @@ def test_round_trip(storage: str, data_kind: str) -> None:
 def test_header_as_documented() -> None:
     blob = small_blob()
     assert blob[:4] == b"EITM"
-    assert struct.unpack_from("<HH", blob, 4) == (1, 4)
+    assert struct.unpack_from("<HH", blob, 4) == (1, 3)
     total, crc, count, zero = struct.unpack_from("<4I", blob, 8)
     assert total == len(blob) and total % 16 == 0
     assert crc == zlib.crc32(blob[16:])
