@@ -36,6 +36,16 @@ static void covariance(const bench *b, int drift, double noise_v, const double *
     }
 }
 
+/* Sigma's element i, j <= i, of the factor R in the rows of evidence.factor: Sigma = R'R. */
+static double factored(const eits_context *ctx, int i, int j)
+{
+    double sum = 0;
+    for (int k = 0; k <= j; ++k)
+        sum += (double)ctx->evidence.factor[STRIDE * k + i] *
+               (double)ctx->evidence.factor[STRIDE * k + j];
+    return sum;
+}
+
 /* In place: the lower triangle becomes L. Returns log det. */
 static double dense_cholesky(double a[RANK][RANK])
 {
@@ -76,14 +86,9 @@ static void the_covariance_is_noise_and_model_errors(void)
         CHECK(eits_factor_covariance(ctx, &ctx->scratch, drift, &log_determinant, &macs));
         CHECK_EQUAL(macs, RANK * RANK * RANK / 6 + (project ? RANK * (RANK + 1) / 2 : 0));
         for (int i = 0; i < RANK; ++i) {
-            double *row = dense_copy(ctx->evidence.factor + STRIDE * i, RANK);
-            for (int j = 0; j <= i; ++j) {
-                double *above = dense_copy(ctx->evidence.factor + STRIDE * j, RANK);
-                CHECK_NEAR(dense_dot(row, above, (size_t)j + 1), sigma[i][j],
+            for (int j = 0; j <= i; ++j)
+                CHECK_NEAR(factored(ctx, i, j), sigma[i][j],
                            BOTH_WIDTHS(2e-4, 2e-7) * sqrt(sigma[i][i] * sigma[j][j]));
-                free(above);
-            }
-            free(row);
         }
         CHECK_NEAR(log_determinant, dense_cholesky(sigma), BOTH_WIDTHS(0.01, 1e-5));
         double expected[RANK], along[RANK];
@@ -190,7 +195,7 @@ static void the_covariance_of_the_rows_left_is_theirs(void)
         (double)(EITS_ERROR_MIN_NOISE * ctx->reference.v0_rms * ctx->reference.gain);
     for (int i = 0; i < RANK; ++i) {
         for (int j = 0; j <= i; ++j) {
-            double sigma = least * least * noise[i][j], size = 0, found = 0;
+            double sigma = least * least * noise[i][j];
             for (int k = 0; k < RANK; ++k) {
                 for (int l = 0; l < RANK; ++l) {
                     const int at = k > l ? k * (k + 1) / 2 + l : l * (l + 1) / 2 + k;
@@ -199,13 +204,8 @@ static void the_covariance_of_the_rows_left_is_theirs(void)
                               (double)b.drift[at]);
                 }
             }
-            for (int k = 0; k <= j; ++k)
-                found += (double)ctx->evidence.factor[STRIDE * i + k] *
-                         (double)ctx->evidence.factor[STRIDE * j + k];
-            for (int k = 0; k <= i; ++k)
-                size += (double)ctx->evidence.factor[STRIDE * i + k] *
-                        (double)ctx->evidence.factor[STRIDE * i + k];
-            CHECK_NEAR(found, sigma, 0.01 * size + BOTH_WIDTHS(1e-9, 1e-12));
+            CHECK_NEAR(factored(ctx, i, j), sigma,
+                       0.01 * factored(ctx, i, i) + BOTH_WIDTHS(1e-9, 1e-12));
         }
     }
     dense_bench_close(&b.b);

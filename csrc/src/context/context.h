@@ -155,12 +155,12 @@ enum { EITS_EVIDENCE_COLUMNS = 64 };
 
 /* Memory of the test of touches. Written by evidence. */
 typedef struct eits_evidence {
-    eits_real *factor; /* rank x stride: L, Sigma = L L' */
-    /* EITS_EVIDENCE_COLUMNS x stride: L^-1 times what each parameter moves the data by */
+    eits_real *factor; /* rank x stride: R in the rows of a triangle, Sigma = R'R */
+    /* EITS_EVIDENCE_COLUMNS x stride: R'^-1 times what each parameter moves the data by */
     eits_real *column;
-    eits_real *data;       /* stride: L^-1 y */
-    eits_real *left;       /* stride: L^-1 of what the touches leave of y */
-    eits_real *gain_drift; /* stride: L^-1 of the projection's direction, of length 1 */
+    eits_real *data;       /* stride: R'^-1 y */
+    eits_real *left;       /* stride: R'^-1 of what the touches leave of y */
+    eits_real *gain_drift; /* stride: R'^-1 of the projection's direction, of length 1 */
     uint32_t drifts;       /* 1: it is in force */
     uint32_t columns_made; /* since the test of this frame began */
 } eits_evidence;

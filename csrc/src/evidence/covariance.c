@@ -1,4 +1,4 @@
-/* The covariance of what the model cannot explain, and its Cholesky factor.
+/* The covariance of what the model cannot explain, and its Cholesky factor R, Sigma = R'R.
  *
  *     Sigma_ij = sigma^2 |P_i|^2 [i = j] + share |d|^2 (P E P')_ij (+ (P D P')_ij)
  *
@@ -44,6 +44,7 @@ static eits_real data_energy(const eits_context *ctx)
     return left < 0 ? 0 : left; /* of a frame that only drifts, rounding is left, of either sign */
 }
 
+/* Row i of R: its columns from first_of(i) on, zeros before i. */
 static eits_real *row_of_factor(const eits_context *ctx, uint32_t i)
 {
     return ctx->evidence.factor + EITS_STRIDE(ctx->model->rank) * i;
@@ -63,19 +64,20 @@ static eits_real error_at(const eits_context *ctx, shares of, uint32_t i, uint32
     return eits_fma(of.errors, (eits_real)u->errors[at], of.drift * (eits_real)u->drift[at]);
 }
 
-/* Sigma's rows up to their diagonals, zeros behind, where F is 1 or diagonal. */
+/* Sigma's rows from their diagonals on, where F is 1 or diagonal. */
 static void covariance(const eits_context *ctx, shares of)
 {
+    const size_t stride = EITS_STRIDE(ctx->model->rank);
     const eits_real *weight =
         ctx->whitening.form == EITS_WHITENING_DIAGONAL ? ctx->whitening.map : NULL;
     for (uint32_t i = 0; i < ctx->model->rank; ++i) {
-        eits_real *row = row_of_factor(ctx, i);
-        eits_zero(row, EITS_STRIDE(ctx->model->rank));
+        eits_real *column = ctx->evidence.factor + i;
         for (uint32_t j = 0; j <= i; ++j)
-            row[j] = error_at(ctx, of, i, j);
-        row[i] = eits_fma(of.noise, (eits_real)ctx->model->row_form.energy[i], row[i]);
+            column[stride * j] = error_at(ctx, of, i, j);
+        column[stride * i] =
+            eits_fma(of.noise, (eits_real)ctx->model->row_form.energy[i], column[stride * i]);
         for (uint32_t j = 0; weight != NULL && j <= i; ++j)
-            row[j] *= weight[i] * weight[j];
+            column[stride * j] *= weight[i] * weight[j];
     }
 }
 
@@ -97,37 +99,40 @@ static uint64_t covariance_of_rest(const eits_context *ctx, const eits_scratch *
     }
     for (uint32_t i = 0; i < rank; ++i) {
         eits_real *row = row_of_factor(ctx, i);
-        eits_zero(row, stride);
-        for (uint32_t j = 0; j <= i; ++j)
+        for (uint32_t j = i; j < rank; ++j)
             row[j] = dot_of_row(ctx, j, product + stride * i, row_of(ctx, ctx->whitening.map, j));
     }
     for (uint32_t k = 0; k < rank; ++k) {
         macs += eits_noise_direction(ctx, k, row_of_errors);
         for (uint32_t i = 0; i < rank; ++i)
-            eits_axpy(ctx->kernels, row_of_factor(ctx, i), of.noise * row_of_errors[i],
-                      row_of_errors, i + 1u);
+            add_row(ctx, i, row_of_factor(ctx, i), of.noise * row_of_errors[i], row_of_errors);
     }
     return macs + (uint64_t)rank * rank * rank / 2u;
 }
 
-/* Cholesky's factor of the rows, each from those above it. Returns log det Sigma; NaN where that is
- * out of range (volts or errors at the ends of it). */
-static eits_real factor(const eits_context *ctx)
+/* Sigma = R'R in the rows' place, each row taken from all below it at once (axpy over whole
+ * vectors, as in frame/whitening.c). Returns log det Sigma; NaN where that is out of range (volts
+ * or errors at the ends of it). */
+static eits_real factor(const eits_context *ctx, eits_real *diagonal)
 {
+    const uint32_t rank = ctx->model->rank;
     eits_real log_determinant = 0;
-    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
+    for (uint32_t i = 0; i < rank; ++i)
+        diagonal[i] = row_of_factor(ctx, i)[i];
+    for (uint32_t i = 0; i < rank; ++i) {
         eits_real *row = row_of_factor(ctx, i);
-        const eits_real diagonal = row[i];
-        for (uint32_t j = 0; j < i; ++j) {
-            const eits_real *above = row_of_factor(ctx, j);
-            row[j] = (row[j] - eits_dot(ctx->kernels, row, above, j)) / above[j];
-        }
-        const eits_real left = diagonal - eits_dot(ctx->kernels, row, row, i),
-                        min = EITS_MIN_PIVOT * diagonal, pivot = left > min ? left : min;
+        const eits_real min = EITS_MIN_PIVOT * diagonal[i], pivot = row[i] > min ? row[i] : min,
+                        root = eits_sqrt(pivot), inverse = 1 / root;
         if (!(pivot > 0) || !eits_is_finite(pivot))
             return R(NAN);
-        row[i] = eits_sqrt(pivot);
         log_determinant += eits_log(pivot);
+        eits_zero(row + first_of(i), i - first_of(i));
+        eits_zero(row + rank, EITS_STRIDE(rank) - rank);
+        row[i] = root;
+        for (uint32_t j = i + 1; j < rank; ++j)
+            row[j] *= inverse;
+        for (uint32_t j = i + 1; j < rank; ++j)
+            add_row(ctx, j, row_of_factor(ctx, j), -row[j], row);
     }
     return log_determinant;
 }
@@ -144,7 +149,7 @@ int eits_factor_covariance(eits_context *ctx, const eits_scratch *scratch, int d
         *macs += covariance_of_rest(ctx, scratch, of);
     else
         covariance(ctx, of);
-    *log_determinant = factor(ctx);
+    *log_determinant = factor(ctx, scratch->row[2]);
     *macs += (uint64_t)rank * rank * rank / 6u;
     if (!eits_is_finite(*log_determinant))
         return 0;
@@ -165,8 +170,9 @@ uint64_t eits_whiten_errors(const eits_context *ctx, eits_real *v)
 {
     const uint32_t rank = ctx->model->rank;
     for (uint32_t i = 0; i < rank; ++i) {
-        const eits_real *row = row_of_factor(ctx, i);
-        v[i] = (v[i] - eits_dot(ctx->kernels, row, v, i)) / row[i];
+        const eits_real *row = row_of_factor(ctx, i), known = v[i] / row[i];
+        add_row(ctx, i, v, -known, row);
+        v[i] = known;
     }
     if (ctx->evidence.drifts)
         eits_axpy(ctx->kernels, v, -eits_dot(ctx->kernels, ctx->evidence.gain_drift, v, rank),

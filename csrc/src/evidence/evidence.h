@@ -7,7 +7,7 @@
  * N the noise, E and D the model's own errors (eits_uncertainty), |d| the folded data's size: an
  * uneven sheet or a finger that is no disc errs in proportion to what it answers. With
  *
- *     F = min |L^-1 (y - answers)|^2 + priors of radii and shapes,    Sigma = L L'
+ *     F = min |R'^-1 (y - answers)|^2 + priors of radii and shapes,    Sigma = R'R
  *
  * minus twice the log-likelihood of the best n discs, a disc is kept where F rises by more than a
  * threshold without it: a likelihood-ratio test. */
@@ -33,12 +33,12 @@ typedef struct eits_answer {
 
 /* covariance.c */
 
-/* L for this frame, in evidence.factor; 0 where there is none: the model does not say what it may
+/* R for this frame, in evidence.factor; 0 where there is none: the model does not say what it may
  * be wrong by, or nobody wants to know. *log_determinant is that of Sigma; `drift`: with D. */
 int eits_factor_covariance(eits_context *ctx, const eits_scratch *scratch, int drift,
                            eits_real *log_determinant, uint64_t *macs);
 
-/* v = L^-1 v (stride numbers), the gain's drift taken out. */
+/* v = R'^-1 v (stride numbers), the gain's drift taken out. */
 uint64_t eits_whiten_errors(const eits_context *ctx, eits_real *v);
 
 /* shape.c */
@@ -46,7 +46,7 @@ uint64_t eits_whiten_errors(const eits_context *ctx, eits_real *v);
 /* How many parameters each of `count` discs gets. */
 uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count);
 
-/* evidence.column of disc k of the answer, L^-1 applied, each times the disc's change; and
+/* evidence.column of disc k of the answer, R'^-1 applied, each times the disc's change; and
  * evidence.left less what the disc answers. */
 uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
                             const eits_answer *answer, uint32_t k);

@@ -1,10 +1,10 @@
 /* F, its linearisation about discs, and the discs that make it least.
  *
- * With columns C = L^-1 dy/dparameter, what is left b = L^-1 (y - answers) and prior precisions H,
- * F about the discs is |b - C s|^2 + (t + s)'H (t + s) for a step s from parameters that are t off
- * their prior's middle: A = C'C + H, s = A^-1 (C'b - H t). One inverse of A (at most 64 x 64) tells
- * the step, what F would be without each disc (a Schur complement), and how well each place is
- * known. */
+ * With columns C = R'^-1 dy/dparameter, what is left b = R'^-1 (y - answers) and prior precisions
+ * H, F about the discs is |b - C s|^2 + (t + s)'H (t + s) for a step s from parameters that are t
+ * off their prior's middle: A = C'C + H, s = A^-1 (C'b - H t). One inverse of A (at most 64 x 64)
+ * tells the step, what F would be without each disc (a Schur complement), and how well each place
+ * is known. */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"

@@ -7,7 +7,7 @@
  * are made of the same and of a radius that is not known.
  *
  * Costs of one disc: six products over its covered pixels, its fields, two products with P, and
- * eight with L^-1. */
+ * eight with R'^-1. */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
