@@ -57,11 +57,11 @@ def test_the_rate_of_the_emulated_board(cortex_m7: Path) -> None:
         104,
         80,
         10_400,
-        "acquisition",
+        "solve",
     )
-    assert rate.rate_hz == pytest.approx(1e6 / 10_400, rel=0.01)
+    assert 1e6 / rate.solve_us_worst < rate.rate_hz < 1e6 / 10_400
     assert (
-        4000 < rate.solve_us_p50 <= rate.solve_us_worst < 10_400 and 1000 < rate.stack_used < 16384
+        4000 < rate.solve_us_p50 <= rate.solve_us_worst < 12_500 and 1000 < rate.stack_used < 16384
     )
 
 

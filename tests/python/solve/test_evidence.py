@@ -96,9 +96,9 @@ def agree(results: dict[str, Reconstruction], loose: float = 0.0) -> int:
             assert (ours.confidence is None) == (other.confidence is None)
             if other.confidence is not None:
                 # with rows left out C knows their noise but for a hundredth of the regularisation
-                assert ours.confidence == pytest.approx(other.confidence, rel=max(rel, 1e-4))
+                assert ours.confidence == pytest.approx(other.confidence, rel=rel)
                 here = np.array([covariance_mm2(touch) for touch in (ours, other)], dtype=float)
-                assert np.abs(here[0] - here[1]).max() <= 2 * max(rel, 1e-4) * here.max()
+                assert np.abs(here[0] - here[1]).max() <= 2 * rel * here.max()
     return len(expected.touches)
 
 
