@@ -1,67 +1,140 @@
 /* What the test's numbers mean: how sure of a touch, and of its place; nothing where there was no
- * test. */
+ * test; and which frames are said to be crowded for it. */
 #include "check.h"
+#include "dense.h"
+#include "small_model.h"
 
 #include "evidence/constants.h"
 #include "evidence/evidence.h"
 
 #include <math.h>
+#include <string.h>
 
-static eits_fit rated(double rise, uint32_t tested, const eits_real *place_mm2)
+static eits_context *ctx;
+
+static eits_fit rated(double rise, uint32_t tested, const eits_real *place_mm2, double x, double y)
 {
     eits_fit f = {.count = 1, .tested = tested, .rise = {(eits_real)rise}};
     for (int i = 0; i < 3; ++i)
         f.place_mm2[0][i] = place_mm2[i];
-    eits_rate_touches(&f);
+    f.apart_mm[0][0] = (eits_real)x;
+    f.apart_mm[0][1] = (eits_real)y;
+    eits_rate_touches(ctx, &f);
     return f;
 }
 
+static const eits_real PLACE[3] = {R(0.5), R(-0.25), R(0.75)};
+
 static void probability_is_logistic_in_the_logarithm_of_the_rise(void)
 {
-    const eits_real place[3] = {R(0.5), R(-0.25), R(0.75)};
-    const double half = (double)EITS_CONFIDENCE_HALF, power = EITS_CONFIDENCE_STEPS / 2.0;
+    const double half = (double)EITS_CONFIDENCE_HALF;
     double before = -1;
     for (double rise = 0.125; rise < 1e6; rise *= 1.25) {
-        const double got = (double)rated(rise, 1, place).confidence[0];
-        CHECK_NEAR(got, 1 / (1 + exp(-power * log(rise / half))), 1e-5);
+        const double got = (double)rated(rise, 1, PLACE, 0, 0).confidence[0];
+        CHECK_NEAR(got, 1 / (1 + exp(-log(rise / half))), 1e-5);
         CHECK(got >= before && got <= 1);
         before = got;
     }
     const double odd[] = {0, -1, NAN};
     for (int k = 0; k < 3; ++k)
-        CHECK(rated(odd[k], 1, place).confidence[0] == 0);
-    CHECK(rated(1e38, 1, place).confidence[0] <= 1);
+        CHECK(rated(odd[k], 1, PLACE, 0, 0).confidence[0] == 0);
+    CHECK(rated(1e38, 1, PLACE, 0, 0).confidence[0] <= 1);
 }
 
-static void places_get_the_factor_and_the_least_there_is(void)
+static void places_get_factor_floor_distance_and_what_the_test_would_move(void)
 {
-    const eits_real place[3] = {R(0.5), R(-0.25), R(0.75)};
-    const eits_fit f = rated(100, 1, place);
-    for (int i = 0; i < 3; ++i)
-        CHECK_NEAR(f.place_mm2[0][i],
-                   (double)(EITS_PLACE_FACTOR * place[i] + (i == 1 ? 0 : EITS_PLACE_MIN_MM2)),
-                   1e-6);
-    CHECK(f.place_mm2[0][0] * f.place_mm2[0][2] > f.place_mm2[0][1] * f.place_mm2[0][1]);
+    const double reach = (double)EITS_MAX_MOVE * (double)ctx->model->pixel_mm;
+    const double apart[][2] = {{0, 0}, {0.5, -1}, {1e6, 0.25}};
+    for (int k = 0; k < 3; ++k) {
+        ctx->reference.distance = (eits_real)(0.125 * k);
+        const double x = fmin(apart[k][0], reach), y = apart[k][1],
+                     least =
+                         (double)EITS_PLACE_MIN_MM2 + (double)EITS_PLACE_DISTANCE_MM2 * 0.125 * k,
+                     add[3] = {x * x + least, x * y, y * y + least};
+        const eits_fit f = rated(100, 1, PLACE, apart[k][0], apart[k][1]);
+        for (int i = 0; i < 3; ++i)
+            CHECK_NEAR(f.place_mm2[0][i], (double)EITS_PLACE_FACTOR * (double)PLACE[i] + add[i],
+                       1e-5);
+        CHECK(f.place_mm2[0][0] * f.place_mm2[0][2] > f.place_mm2[0][1] * f.place_mm2[0][1]);
+    }
+    ctx->reference.distance = 0;
 }
 
 static void what_is_not_known_is_zero(void)
 {
-    const eits_real place[3] = {R(0.5), 0, R(0.5)};
-    const eits_fit not_tested = rated(100, 0, place);
+    const eits_fit not_tested = rated(100, 0, PLACE, 0, 0);
     CHECK(not_tested.confidence[0] == 0 && not_tested.place_mm2[0][0] == 0);
     const eits_real bad[][3] = {{R(NAN), 0, 1}, {1, R(INFINITY), 1}, {0, 0, 1}, {1, 0, -1}};
-    for (int k = 0; k < 4; ++k) {
-        const eits_fit f = rated(100, 1, bad[k]);
+    for (int k = 0; k < 5; ++k) {
+        const eits_fit f =
+            k < 4 ? rated(100, 1, bad[k], 0, 0) : rated(100, 1, PLACE, (double)NAN, 0);
         for (int i = 0; i < 3; ++i)
             CHECK(f.place_mm2[0][i] == 0);
         CHECK(f.confidence[0] > 0);
     }
 }
 
+static uint32_t said(const eits_fit *f)
+{
+    ctx->info.diagnostics = 0;
+    eits_check_count(ctx, f);
+    return ctx->info.diagnostics;
+}
+
+static void crowded_where_one_may_be_two_or_none(void)
+{
+    eits_fit f = {.count = 2, .tested = 1, .confidence = {R(0.99), R(0.99)}, .pair = {-3, -3}};
+    CHECK_EQUAL(said(&f), 0);
+    f.pair[1] = EITS_PAIR_ODDS + R(0.01);
+    CHECK_EQUAL(said(&f), EITS_DIAGNOSTIC_CROWDED);
+    f.tested = 0;
+    CHECK_EQUAL(said(&f), 0);
+    f.tested = 1;
+    f.pair[1] = EITS_PAIR_ODDS - R(0.01);
+    CHECK_EQUAL(said(&f), 0);
+    f.confidence[0] = EITS_MIN_CONFIDENCE - R(0.01);
+    CHECK_EQUAL(said(&f), EITS_DIAGNOSTIC_CROWDED);
+    ctx->options.diagnostics = 0;
+    CHECK_EQUAL(said(&f), 0);
+}
+
+/* The score of pair.c by hand: a bulge along x, and a dipole along it or across. */
+static void pairs_bulge_where_their_dipole_does_not(void)
+{
+    enum { N = EITS_SHAPE_PARAMETERS };
+    eits_answer answer = {.count = 1, .parameters = N};
+    answer.disc[0].radius_mm = answer.radius_mm[0] = 8;
+    eits_likelihood likelihood = {.count = N};
+    eits_scratch scratch = ctx->scratch;
+    eits_real square[N * N] = {0};
+    scratch.square = square;
+    for (int i = 0; i < N; ++i)
+        square[i * N + i] = R(0.01);
+    likelihood.step[4] = R(0.2);
+    answer.shape[0][0] = R(0.1);
+    double score[2];
+    for (int k = 0; k < 2; ++k) {
+        likelihood.step[6] = k == 0 ? R(-0.06) : R(0.06);
+        score[k] = (double)eits_pair_score(&scratch, &answer, &likelihood, 0);
+        const double hand = (double)EITS_PAIR_OFFSET + (double)EITS_PAIR_BULGE * 3 +
+                            (double)EITS_PAIR_DIPOLE * (k == 0 ? -0.6 : 0.6) +
+                            (double)EITS_PAIR_BOTH * 0.3 * 0.06;
+        CHECK_NEAR(score[k], hand, 1e-4);
+    }
+    CHECK(score[0] > score[1]);
+    answer.parameters = EITS_PLACE_PARAMETERS;
+    CHECK(eits_pair_score(&scratch, &answer, &likelihood, 0) == -1);
+}
+
 int main(void)
 {
+    static dense_bench bench;
+    ctx = dense_bench_open(&bench, (small_spec){.rank = 13, .side = 6, .shape = SMALL_WHITENED}, 0);
     probability_is_logistic_in_the_logarithm_of_the_rise();
-    places_get_the_factor_and_the_least_there_is();
+    places_get_factor_floor_distance_and_what_the_test_would_move();
     what_is_not_known_is_zero();
+    pairs_bulge_where_their_dipole_does_not();
+    crowded_where_one_may_be_two_or_none();
+    dense_bench_close(&bench);
     return checks_report("evidence_confidence");
 }

@@ -154,9 +154,8 @@ typedef struct eits_touch {
     eits_real explained;
     /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
     eits_real force_n;
-    /* probability that it is one touch, neither none nor a part of one; 0 where that is not known:
-     * the model does not say what it may be wrong by, rows are left out of the frame, or the touch
-     * is held */
+    /* probability that there is a touch, and no second one of the same; 0 where that is not known:
+     * the model does not say what it may be wrong by, or the touch is held */
     eits_real confidence;
     /* covariance of the centre as this frame shows it, mm^2; 0 where it is not known */
     eits_real x_variance_mm2;

@@ -36,12 +36,13 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     if (may_have_touches(ctx)) {
         eits_fit_touches(ctx, scratch, &f);
         eits_test_touches(ctx, scratch, &f);
-        eits_rate_touches(&f);
+        eits_rate_touches(ctx, &f);
         ctx->info.unexplained = f.total > 0 ? eits_fit_left(ctx, &f) / f.total : 0;
     }
     const uint32_t finite = eits_report_touches(ctx, &f, found);
     ctx->info.touch_macs = f.macs;
     eits_check_crowd(ctx, found, finite);
+    eits_check_count(ctx, &f);
     /* Judged by what this frame shows; tracking may hide some of it and add others. */
     const uint32_t reported = eits_track(ctx, found, finite);
     ctx->info.touches = reported;

@@ -22,8 +22,10 @@ typedef struct verdict {
     eits_real evidence; /* F + threshold n + log det Sigma */
     eits_real rise[EITS_MAX_TOUCHES];
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
-    int changed; /* 1: discs were dropped or merged */
-    int clear;   /* 1: by the linearisation without shapes alone */
+    eits_real best_mm[EITS_MAX_TOUCHES][2]; /* where the linearisation has the disc */
+    eits_real pair[EITS_MAX_TOUCHES];       /* log odds that it is two (pair.c) */
+    int changed;                            /* 1: discs were dropped or merged */
+    int clear;                              /* 1: by the linearisation without shapes alone */
 } verdict;
 
 /* How much worse the data fit than Sigma says; at least 1. */
@@ -105,6 +107,12 @@ static uint32_t weakest_of(const eits_scratch *scratch, const eits_likelihood *l
     return weakest;
 }
 
+static void pairs_of(const eits_scratch *scratch, const eits_likelihood *likelihood, verdict *v)
+{
+    for (uint32_t k = 0; k < v->answer.count; ++k)
+        v->pair[k] = eits_pair_score(scratch, &v->answer, likelihood, k);
+}
+
 /* How well each place is known: the inverse's blocks, times what the data fit worse. */
 static void places_of(const eits_context *ctx, const eits_scratch *scratch,
                       const eits_likelihood *likelihood, verdict *v)
@@ -118,7 +126,10 @@ static void places_of(const eits_context *ctx, const eits_scratch *scratch,
         v->place_mm2[k][0] = unit * x[0];
         v->place_mm2[k][1] = unit * x[1];
         v->place_mm2[k][2] = unit * y[1];
+        v->best_mm[k][0] = eits_fma(pixel, likelihood->step[k * p + 1], v->answer.disc[k].x_mm);
+        v->best_mm[k][1] = eits_fma(pixel, likelihood->step[k * p + 2], v->answer.disc[k].y_mm);
     }
+    pairs_of(scratch, likelihood, v);
 }
 
 /* Linearise, and set what is known of each disc by it. Returns the weakest. */
@@ -232,7 +243,8 @@ static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v
     *macs += eits_refit(ctx, scratch, &v->answer, 0);
 }
 
-/* Whether the discs need no closer look: as discs, which costs least. */
+/* Whether the discs need no closer look: as discs, which costs least. Where discs leave something,
+ * one look at their shapes then tells whether one may be two. */
 static int is_clear(eits_context *ctx, const eits_scratch *scratch, verdict *v, uint64_t *macs)
 {
     eits_likelihood likelihood;
@@ -243,6 +255,11 @@ static int is_clear(eits_context *ctx, const eits_scratch *scratch, verdict *v, 
                !any_may_be_one(v, needed(ctx, v)) &&
                excess(ctx, v->answer.misfit, v->answer.count) < EITS_FITS_AS_DISCS;
     v->answer.parameters = all;
+    if (v->clear && all > EITS_PLACE_PARAMETERS &&
+        v->answer.misfit > EITS_PAIR_MISFIT * (eits_real)ctx->model->rank) {
+        *macs += eits_linearise(ctx, scratch, &v->answer, &likelihood);
+        pairs_of(scratch, &likelihood, v);
+    }
     return v->clear;
 }
 
@@ -289,6 +306,10 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
     for (uint32_t k = 0; k < v.answer.count; ++k) {
         f->rise[k] = v.rise[k] / unit;
         memcpy(f->place_mm2[k], v.place_mm2[k], sizeof f->place_mm2[k]);
+        const eits_disc *reported = v.changed ? &v.answer.disc[k] : &f->disc[k];
+        f->apart_mm[k][0] = v.best_mm[k][0] - reported->x_mm;
+        f->apart_mm[k][1] = v.best_mm[k][1] - reported->y_mm;
+        f->pair[k] = v.pair[k];
     }
     if (!v.changed)
         return;

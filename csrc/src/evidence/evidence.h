@@ -85,10 +85,20 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
  * that stays. */
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
+/* pair.c */
+
+/* Logarithm of the odds that disc k is two touches side by side, by the shape that the
+ * linearisation gives it; -1 where that has none. */
+eits_real eits_pair_score(const eits_scratch *scratch, const eits_answer *answer,
+                          const eits_likelihood *likelihood, uint32_t k);
+
 /* confidence.c */
 
 /* What the test's numbers have meant on scenes with a truth: f->confidence, and f->place_mm2 as
- * wide as places err. Of discs that were tested. */
-void eits_rate_touches(eits_fit *f);
+ * wide as places err; zeros where discs were not tested. */
+void eits_rate_touches(const eits_context *ctx, eits_fit *f);
+
+/* Sets CROWDED where a disc may be two touches, or none. */
+void eits_check_count(eits_context *ctx, const eits_fit *f);
 
 #endif

@@ -16,6 +16,10 @@ typedef struct eits_fit {
     eits_real rise[EITS_MAX_TOUCHES];
     /* covariance of x and y: xx, xy, yy, mm^2 */
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
+    /* where the test would have the disc, less where it is */
+    eits_real apart_mm[EITS_MAX_TOUCHES][2];
+    /* logarithm of the odds that the disc is two touches (evidence/pair.c) */
+    eits_real pair[EITS_MAX_TOUCHES];
     /* probability that the disc is one touch (evidence/confidence.c) */
     eits_real confidence[EITS_MAX_TOUCHES];
     const eits_real *data; /* stride: what the discs are to explain */

@@ -102,9 +102,8 @@ class Touch:
     explained: float
     # how hard it presses, N; 0 where the model is not calibrated (force.h)
     force_n: float = 0.0
-    # probability that it is one touch, neither none nor a part of one; 0 where that is not known:
-    # the model does not say what it may be wrong by, rows are left out of the frame, or the touch
-    # is held
+    # probability that there is a touch, and no second one of the same; 0 where that is not known:
+    # the model does not say what it may be wrong by, or the touch is held
     confidence: float | None = None
     # covariance of the centre as this frame shows it, mm^2; 0 where it is not known
     x_variance_mm2: float | None = None

@@ -8,7 +8,10 @@ import numpy.typing as npt
 
 from eitskin.core.constants_table import (
     CONFIDENCE_HALF,
-    CONFIDENCE_STEPS,
+    MAX_MOVE,
+    MIN_CONFIDENCE,
+    PAIR_ODDS,
+    PLACE_DISTANCE_MM2,
     PLACE_FACTOR,
     PLACE_MIN_MM2,
 )
@@ -17,9 +20,16 @@ from eitskin.reference.evidence import Tested
 FloatArray = npt.NDArray[np.float64]
 
 
-def rated(tested: Tested) -> tuple[FloatArray, FloatArray]:
-    """For each disc the probability that it is one touch (k,), and the covariance of its place as
-    wide as places err: xx, xy, yy (k, 3), mm^2."""
-    odds = (np.maximum(tested.rise, 0) / CONFIDENCE_HALF) ** (CONFIDENCE_STEPS / 2)
-    least = np.array([PLACE_MIN_MM2, 0, PLACE_MIN_MM2])
-    return odds / (1 + odds), PLACE_FACTOR * tested.place_mm2 + least
+def rated(tested: Tested, distance: float, pixel_mm: float) -> tuple[FloatArray, FloatArray]:
+    """For each disc the probability that it is a touch (k,), and the covariance of its place as
+    wide as places err: xx, xy, yy (k, 3), mm^2; ``distance`` of the reference from the model's."""
+    x, y = np.clip(tested.apart_mm, -MAX_MOVE * pixel_mm, MAX_MOVE * pixel_mm).T
+    least = PLACE_MIN_MM2 + PLACE_DISTANCE_MM2 * distance
+    place = PLACE_FACTOR * tested.place_mm2 + np.column_stack([x * x + least, x * y, y * y + least])
+    return tested.rise / (tested.rise + CONFIDENCE_HALF), place
+
+
+def miscounted(tested: Tested) -> bool:
+    """Whether a disc may be two touches, or none."""
+    sure = tested.rise / (tested.rise + CONFIDENCE_HALF)
+    return bool((tested.pair > PAIR_ODDS).any() or (sure < MIN_CONFIDENCE).any())

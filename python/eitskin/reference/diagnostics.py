@@ -404,11 +404,20 @@ class Examiner:
         if against > STALE_RATIO * lambda_max and against > STALE_NOISE * lambda_noise:
             self.found.names.add("stale reference")
 
-    def crowd(self, touches: tuple[Touch, ...], options: Options, clearness: float) -> None:
+    def crowd(
+        self,
+        touches: tuple[Touch, ...],
+        options: Options,
+        clearness: float,
+        *,
+        doubtful: bool = False,
+    ) -> None:
         """Whether there are more touches than can be told apart, by the score of
         csrc/src/diagnostics/crowded.c; ``found.unexplained`` is known. ``clearness``: max(S'y) over
-        that of noise."""
+        that of noise; ``doubtful``: the test of touches says so."""
         count, left = len(touches), self.found.unexplained
+        if doubtful and "crowded" in self.wanted:
+            self.found.names.add("crowded")
         if not count or "crowded" not in self.wanted or clearness < CROWD_FAINT:
             return
         apart = [

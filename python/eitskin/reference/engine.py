@@ -95,6 +95,7 @@ class ReferenceEngine:
         self._v0: FloatArray | None = None
         self._drift_v0: FloatArray | None = None
         self._gain, self._row_gain = 1.0, np.ones(model.protocol.n_rows)
+        self._distance = 0.0
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._warm: FloatArray | None = None
@@ -161,15 +162,13 @@ class ReferenceEngine:
 
     def _learn_row_gains(self) -> None:
         errors, self._row_gain = self.model.model_errors, np.ones(self.model.protocol.n_rows)
-        if (
-            errors is not None
-            and errors.row_gains
-            and self.options.row_gains
-            and self.model.data_kind != "normalised"
-        ):
-            usable = ~(self._bad | self._without_reference)
-            assert self._drift_v0 is not None
-            self._row_gain = row_gains(self.model, usable, self._gain * self._drift_v0)
+        if errors is None:
+            return
+        usable = ~(self._bad | self._without_reference)
+        assert self._drift_v0 is not None
+        gains, self._distance = row_gains(self.model, usable, self._gain * self._drift_v0)
+        if errors.row_gains and self.options.row_gains and self.model.data_kind != "normalised":
+            self._row_gain = gains
 
     @property
     def _noise_floor_v(self) -> float:
@@ -441,11 +440,11 @@ class ReferenceEngine:
             threshold = self._detection_threshold
             reduced = Reduced(y, self._straight, self.seen, basis, threshold, noise)
             added = partial(self._interplay, basis) if self._couples else None
-            found, self._examiner.found.unexplained, coupled = find_touches(
+            found, self._examiner.found.unexplained, coupled, doubtful = find_touches(
                 self.model, reduced, image, o, added, self._data_errors(basis)
             )
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
-            self._examiner.crowd(found, o, clearness)
+            self._examiner.crowd(found, o, clearness, doubtful=doubtful)
             many = len(found) > 1
             found = self._loaded(self._tracker.step(found, o, lambda_max, lambda_noise))
             if o.second_pass and many and added is not None and o.touch_sweeps > 0:
@@ -530,7 +529,8 @@ class ReferenceEngine:
         dipoles = (
             partial(self._dipoles, basis) if tells and model.data_kind == "difference" else None
         )
-        return DataErrors(error, see @ errors.drift @ see.T, dipoles)
+        drift = see @ errors.drift @ see.T
+        return DataErrors(error, drift, dipoles, self._distance)
 
     def _solve(
         self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None

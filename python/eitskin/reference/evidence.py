@@ -23,6 +23,7 @@ from eitskin.core.constants_table import (
     MIN_FREEDOM,
     MIN_PIVOT,
     MOST_CHANGE,
+    PAIR_MISFIT,
     REFIT_STEPS,
     SETTLED_MISFIT,
     SHAPE_PRECISION,
@@ -31,6 +32,7 @@ from eitskin.core.constants_table import (
     TOUCH_EVIDENCE,
 )
 from eitskin.reference.disc_fit import Disc, Fit
+from eitskin.reference.pair import pair_scores
 from eitskin.reference.split_merge import merged
 
 FloatArray = npt.NDArray[np.float64]
@@ -46,20 +48,25 @@ PRECISION = np.array([FREE_PRECISION] * 3 + [SHAPE_PRECISION] * 3 + [DIPOLE_PREC
 class DataErrors:
     """What a frame's data y (r,) may be wrong by: covariances ``error`` (r, r), of noise and of
     model errors, and ``drift`` (r, r), of a skin that drifts; ``dipoles`` gives what a disc adds to
-    y as a dipole that turns (2, r), None where the model cannot tell."""
+    y as a dipole that turns (2, r), None where the model cannot tell. ``distance``: of the
+    reference from the model's, rms over folds of log(v0 / v_ref)."""
 
     error: FloatArray
     drift: FloatArray
     dipoles: Callable[[Disc], FloatArray] | None
+    distance: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Tested:
     """For each disc that stays, minus twice the logarithm of the ratio of likelihoods without and
-    with it (k,), and the covariance xx, xy, yy of its place (k, 3), mm^2."""
+    with it (k,), the covariance xx, xy, yy of its place (k, 3), mm^2, where the test would have it
+    less where it is (k, 2), mm, and the log odds that it is two touches (k,)."""
 
     rise: FloatArray
     place_mm2: FloatArray
+    apart_mm: FloatArray
+    pair: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +167,7 @@ class Hypothesis:
         self.changed = self.clear = False
         self.columns_made = 0
         self.rise, self.place_mm2 = np.zeros(count), np.zeros((count, 3))
+        self.best_mm, self.pair = np.zeros((count, 2)), np.zeros(count)
 
     @property
     def evidence(self) -> float:
@@ -296,6 +304,9 @@ class Hypothesis:
         self.place_mm2 = unit * np.column_stack(
             [now.inverse[x, x], now.inverse[x, x + 1], now.inverse[x + 1, x + 1]]
         )
+        self.best_mm = np.array([(disc.x_mm, disc.y_mm) for disc in answer.discs])
+        self.best_mm += self.fit.model.grid.pixel_mm * now.step.reshape(count, p)[:, 1:3]
+        self.pair = pair_scores(offsets, now.step, np.diag(now.inverse))
         self.rise = np.array([now.rise(offsets, k) for k in range(count)])
         return int(np.argmin(self.rise)), now
 
@@ -371,6 +382,10 @@ class Hypothesis:
         clear = self.rise[weakest] > CLEAR_AS_DISCS * self.needed() and not self.near_pairs()
         self.clear = clear and excess < FITS_AS_DISCS
         self.answer = replace(self.answer, parameters=parameters)
+        rank = self.fit.model.rank
+        if self.clear and parameters > PLACE and self.answer.misfit > PAIR_MISFIT * rank:
+            now = self.linearise(self.answer)
+            self.pair = pair_scores(self.answer.offsets(), now.step, np.diag(now.inverse))
         return self.clear
 
 
@@ -390,4 +405,10 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
     unit = best.excess(best.answer.misfit, count)
     if best.changed:
         fit.discs = list(best.answer.discs)
-    return Tested(best.rise[:count] / unit, best.place_mm2[:count])
+    reported = np.array([(disc.x_mm, disc.y_mm) for disc in fit.discs]).reshape(-1, 2)
+    return Tested(
+        best.rise[:count] / unit,
+        best.place_mm2[:count],
+        best.best_mm[:count] - reported,
+        best.pair[:count],
+    )

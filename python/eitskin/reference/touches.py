@@ -20,7 +20,7 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import SPLIT_MERGE
 from eitskin.core.results import Options
 from eitskin.model.model import Model
-from eitskin.reference.confidence import rated
+from eitskin.reference.confidence import miscounted, rated
 from eitskin.reference.disc_fit import Disc, Fit, Reduced
 from eitskin.reference.evidence import DataErrors, keep_likely
 from eitskin.reference.split_merge import join, part
@@ -85,10 +85,11 @@ def find_touches(
     options: Options,
     interplay: Interplay | None,
     errors: DataErrors | None = None,
-) -> tuple[tuple[Touch, ...], float, FloatArray]:
+) -> tuple[tuple[Touch, ...], float, FloatArray, bool]:
     """The touches of an ``image`` (n,) of ``frame``, strongest first and without ids or loads, the
     share of |y|^2 that they leave (0 where the image is zero), and the data (r,) that they were
-    fitted to in the end. With ``errors`` those are left out that such errors could have made."""
+    fitted to in the end. With ``errors`` those are left out that such errors could have made, and
+    the last says whether their count may be wrong."""
     fit = Fit(model, frame, options)
     explained, tested = np.zeros(0), None
     if np.abs(image).max() > 0:
@@ -100,17 +101,19 @@ def find_touches(
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
-    if tested is not None:
+    if tested is not None and errors is not None:
+        sure, places = rated(tested, errors.distance, model.grid.pixel_mm)
         found = [
             replace(
                 touch,
-                confidence=float(sure),
+                confidence=float(one),
                 x_variance_mm2=float(xx),
                 xy_covariance_mm2=float(xy),
                 y_variance_mm2=float(yy),
             )
-            for touch, sure, (xx, xy, yy) in zip(found, *rated(tested), strict=True)
+            for touch, one, (xx, xy, yy) in zip(found, sure, places, strict=True)
         ]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
     unexplained = fit.left() / fit.whole if fit.whole > 0 and np.abs(image).max() > 0 else 0.0
-    return tuple(found), unexplained, fit.data
+    doubtful = tested is not None and miscounted(tested)
+    return tuple(found), unexplained, fit.data, doubtful

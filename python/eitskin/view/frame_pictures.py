@@ -9,7 +9,7 @@ from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 from eitskin.scoring.score import FrameScore
-from eitskin.view.pictures import Mark, Panel, draw_panels
+from eitskin.view.pictures import Mark, Panel, draw_panels, found_mark
 
 MAX_PANELS = 36
 
@@ -32,7 +32,7 @@ def true_marks(frames: Frames, number: int) -> tuple[Mark, ...]:
 
 def found_marks(result: Reconstruction) -> tuple[Mark, ...]:
     """What was found."""
-    return tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in result.touches)
+    return tuple(map(found_mark, result.touches))
 
 
 def draw_results(
@@ -59,7 +59,7 @@ def draw_results(
                 f"\nMIoU {scores[number].miou_image:.2f}, touches {scores[number].miou_touches:.2f}"
             )
         panels.append(Panel(heading, result.image, true_marks(frames, number), found_marks(result)))
-    note = "circles: true touches; crosses and dashed circles: found"
+    note = "circles: true touches; crosses and dashed circles: found; ellipses: places, 90 %"
     if len(results) > MAX_PANELS:
         note += f"; the first {MAX_PANELS} of {len(results)} frames"
     draw_panels(

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import missing_extra
 from eitskin.fem.grid import Grid
 from eitskin.fileio import write_beside
@@ -32,6 +33,8 @@ TRUE = "#111111"
 FOUND = "#00796b"
 COLOURS = "RdBu_r"
 DPI = 150
+PLACE_90 = 4.605  # chi-squared of two numbers that 90 % lie below
+Place = tuple[float, float, float]
 STYLE = {
     "font.size": 9.0,
     "text.color": INK,
@@ -48,12 +51,20 @@ STYLE = {
 @dataclass(frozen=True)
 class Mark:
     """A touch in a picture: its centre, its radius where known, its change of conductivity where
-    known."""
+    known, the covariance of its place (xx, xy, yy) where known."""
 
     x_mm: float
     y_mm: float
     radius_mm: float | None = None
     change: float | None = None
+    place_mm2: Place | None = field(default=None, kw_only=True)
+
+
+def found_mark(touch: Touch) -> Mark:
+    """The mark of a touch that was found."""
+    xx, xy, yy = touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2
+    place = None if xx is None or xy is None or yy is None else (xx, xy, yy)
+    return Mark(touch.x_mm, touch.y_mm, touch.radius_mm, place_mm2=place)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +75,8 @@ class Panel:
         title: above it.
         values: (n,) pixel values, or None for none.
         truth: touches that were there: circles, filled with their change where ``fill_truth``.
-        found: touches that were found: crosses, and dashed circles where the radius is known.
+        found: touches that were found: crosses, dashed circles where the radius is known, and
+            ellipses in which the true centre lies with 90 % where that is.
         fill_truth: show the truth as an image would.
     """
 
@@ -245,6 +257,9 @@ def draw_panel(
     for mark in panel.found:
         style: dict[str, Any] = {"markersize": size, "markeredgewidth": width, "path_effects": halo}
         axes.plot(mark.x_mm, mark.y_mm, "x", color=FOUND, zorder=4, **style)
+        if mark.place_mm2 is not None:
+            ellipse = {"linewidth": 0.7 * width, "path_effects": halo}
+            _place_ellipse(axes, mark, mark.place_mm2, edgecolor=FOUND, zorder=4, **ellipse)
         if mark.radius_mm is not None:
             dashes = {"linestyle": (0, (3, 2)), "linewidth": width, "path_effects": halo}
             _circle(
@@ -263,6 +278,18 @@ def _circle(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
     from matplotlib.patches import Circle
 
     axes.add_patch(Circle((mark.x_mm, mark.y_mm), radius_mm, **style))
+
+
+def _place_ellipse(axes: Axes, mark: Mark, place_mm2: Place, **style: Any) -> None:
+    """In which the true centre lies with a probability of 90 %."""
+    from matplotlib.patches import Ellipse
+
+    xx, xy, yy = place_mm2
+    variances, axes_of_it = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
+    short, long = 2 * np.sqrt(PLACE_90 * np.maximum(variances, 0))
+    x, y = axes_of_it[:, 1]
+    turn = math.degrees(math.atan2(y, x))
+    axes.add_patch(Ellipse((mark.x_mm, mark.y_mm), long, short, angle=turn, fill=False, **style))
 
 
 def _draw_electrodes(axes: Axes, skin: Skin, small: bool) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from eitskin.model.model import Model
 from eitskin.scoring.stream_check import ComparedFrame, spread
-from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels
+from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels, found_mark
 
 MAX_PANELS = 36
 MAX_KEPT = 20 * MAX_PANELS
@@ -102,6 +102,6 @@ def _true_marks(model: Model, seen: ComparedFrame) -> tuple[Mark, ...]:
 
 def _found_marks(seen: ComparedFrame) -> tuple[Mark, ...]:
     if seen.frame.touches is not None:
-        return tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in seen.frame.touches.touches)
+        return tuple(map(found_mark, seen.frame.touches.touches))
     places = seen.found_mm
     return () if places is None else tuple(Mark(float(x), float(y)) for x, y in places)

@@ -30,6 +30,10 @@ EXPERIMENTS = {
         "touches counted where the model is wrong: other shapes, uneven sheets, drift, misplaced"
         " electrodes; what fails first"
     ),
+    "belief": (
+        "how sure the core is of each touch and of its place, and when it says that the count is"
+        " uncertain: how often that is true"
+    ),
     "levers": (
         "what was tried to do better, each for itself: what helps for its MACs, and what does not"
     ),

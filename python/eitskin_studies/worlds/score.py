@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FrameError
 from eitskin.scoring.matching import match
 from eitskin.solve.reconstructor import Reconstructor
@@ -102,6 +103,10 @@ class CoreFinder:
 
     def __call__(self, quiet_v: FloatArray, frame_v: FloatArray) -> Sequence[FoundTouch]:
         """Touches of a frame (m,), given the quiet frames (q, m) of its session."""
+        return self.touches_of(quiet_v, frame_v)
+
+    def touches_of(self, quiet_v: FloatArray, frame_v: FloatArray) -> tuple[Touch, ...]:
+        """The same with all that the core says of each."""
         self.diagnostics = ()
         self.solver.tare(quiet_v)
         self.solver.forget()

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FileError, MissingExtraError
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.skin.electrodes import Electrodes
@@ -17,7 +18,7 @@ from eitskin.skin.skin import Skin, paper_skin
 pytest.importorskip("matplotlib")
 
 from eitskin.view import pictures
-from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels
+from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels, found_mark
 
 SKIN = paper_skin()
 GRID = grid_for(SKIN.outline)
@@ -107,3 +108,21 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtraError, match=r"eitskin\[plot\]"):
         pictures.load_matplotlib()
+
+
+def test_a_known_place_is_an_ellipse_of_ninety_percent() -> None:
+    """Turned as the covariance is, and absent where it is not known."""
+    from matplotlib.patches import Ellipse
+
+    matplotlib = pictures.load_matplotlib()
+    numbers = (1, 30.0, 20.0, 9.0, 5.0, 0.5, 0.0, 0.9)
+    for touch, count in ((Touch(*numbers, 2.5, 1.5, 2.5), 1), (Touch(*numbers), 0)):
+        axes = matplotlib.figure.Figure().add_subplot()
+        panel = Panel("", blob(GRID, 30, 20), found=(found_mark(touch),))
+        pictures.draw_panel(axes, SKIN, GRID, panel)
+        ellipses = [one for one in axes.patches if type(one) is Ellipse]
+        assert len(ellipses) == count
+        for one in ellipses:
+            assert one.get_width() == pytest.approx(2 * np.sqrt(4.605 * 4))
+            assert one.get_height() == pytest.approx(2 * np.sqrt(4.605 * 1))
+            assert one.get_angle() % 180 == pytest.approx(45)

@@ -1,0 +1,35 @@
+"""The numpy reference of csrc/src/evidence/pair.c: whether a disc may be two touches."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.constants_table import (
+    PAIR_BOTH,
+    PAIR_BULGE,
+    PAIR_DIPOLE,
+    PAIR_GROWTH,
+    PAIR_GROWTH_2,
+    PAIR_MIN_BULGE,
+    PAIR_MIN_VARIANCE,
+    PAIR_OFFSET,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def pair_scores(offsets: FloatArray, step: FloatArray, variance: FloatArray) -> FloatArray:
+    """Log odds of each disc (k,), from how far its parameters are from their priors' middles
+    ``offsets`` (k, p), the ``step`` (k p,) of the linearisation and the ``variance`` of it (k p,);
+    -1 where discs have no shape."""
+    count, parameters = offsets.shape
+    if parameters < 8:
+        return np.full(count, -1.0)
+    at = (offsets + step.reshape(count, -1))[:, 3:]
+    deviation = np.sqrt(np.maximum(variance.reshape(count, -1)[:, 3:], PAIR_MIN_VARIANCE))
+    bulge, dipole = np.hypot(at[:, 1], at[:, 2]), np.hypot(at[:, 3], at[:, 4])
+    along = (at[:, 1] * at[:, 3] + at[:, 2] * at[:, 4]) / np.maximum(bulge, PAIR_MIN_BULGE)
+    score = PAIR_OFFSET + PAIR_BULGE * bulge / deviation[:, 1]
+    score += PAIR_DIPOLE * along / deviation[:, 3] + PAIR_BOTH * bulge * dipole
+    return np.asarray(score + PAIR_GROWTH * at[:, 0] + PAIR_GROWTH_2 * at[:, 0] ** 2)

@@ -1,0 +1,49 @@
+"""Belief: the calibration curve of ``confidence``, and how many places lie in their ellipses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from eitskin.view.pictures import FOUND, INK, STYLE, load_matplotlib, save_png
+from eitskin_studies.experiments.belief.tables import HIGH, LOW, Sets, coverage, curve
+
+SMALLEST = 1e-3
+
+
+def draw_belief(path: Path, sets: Sets) -> None:
+    """Left the share of touches that are none over what is said of them, both logarithmic; right
+    the coverage of each set's ellipses.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    matplotlib = load_matplotlib()
+    covered = [(name, one) for name, frames in sets.items() if (one := coverage(frames)).count]
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(
+            figsize=(9.6, 0.6 + 0.2 * max(len(covered), 12)), layout="constrained"
+        )
+        left, right = figure.subplots(1, 2, width_ratios=(1, 1.1))
+        left.plot([SMALLEST, 1], [SMALLEST, 1], color=INK, linewidth=0.7, linestyle=":")
+        for part in curve(sets):
+            said, true = 1 - part.said, part.true
+            ends = [max(1 - value, SMALLEST) for value in (true.high, true.low)]
+            left.plot([said, said], ends, color=FOUND, linewidth=1.2)
+            left.plot(said, max(1 - true.mean, SMALLEST), "o", color=FOUND, markersize=4)
+        left.set(
+            xscale="log",
+            yscale="log",
+            xlabel="1 - confidence",
+            ylabel="share of touches that are none",
+            xlim=(SMALLEST, 1),
+            ylim=(SMALLEST, 1),
+        )
+        right.axvspan(100 * LOW, 100 * HIGH, color=FOUND, alpha=0.15, linewidth=0)
+        for place, (_, one) in enumerate(covered):
+            right.plot([100 * one.low, 100 * one.high], [place, place], color=FOUND, linewidth=1.2)
+            right.plot(100 * one.mean, place, "o", color=FOUND, markersize=4)
+        right.set_yticks(range(len(covered)), [name.replace("_", " ") for name, _ in covered])
+        right.invert_yaxis()
+        right.set(xlabel="true places in their 90 % ellipses, %", xlim=(0, 100))
+        save_png(figure, path)
