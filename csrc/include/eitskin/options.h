@@ -129,8 +129,8 @@ typedef struct eits_options {
      * ones and drift, at 30 to 55 dB */
     eits_real regularisation_noise_factor;
     /* 1: where the model says what it may be wrong by, each row's data are multiplied by what makes
-     * its reference the model's, unless the reference says that the instrument and not the sheet
-     * differs */
+     * its reference the model's, unless the reference says that the instrument differs and not the
+     * skin */
     uint32_t row_gains;
     /* 1: where the model says what it may be wrong by, a touch that such errors could have made is
      * not reported, and near ones that could be one touch become one */

@@ -54,7 +54,7 @@
  * shapes become touches; smaller: costs */
 #define EITS_FITS_AS_DISCS R(4.0)
 
-/* excess of what stays up to which no drift of the sheet is thought of. larger: drift becomes
+/* excess of what stays up to which no drift of the skin is thought of. larger: drift becomes
  * touches; smaller: costs */
 #define EITS_FITS R(2.0)
 

@@ -104,8 +104,8 @@ class OptionFields:
     # ones and drift, at 30 to 55 dB
     regularisation_noise_factor: float = 5.0
     # 1: where the model says what it may be wrong by, each row's data are multiplied by what makes
-    # its reference the model's, unless the reference says that the instrument and not the sheet
-    # differs
+    # its reference the model's, unless the reference says that the instrument differs and not the
+    # skin
     row_gains: bool = True
     # 1: where the model says what it may be wrong by, a touch that such errors could have made is
     # not reported, and near ones that could be one touch become one
