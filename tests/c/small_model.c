@@ -408,7 +408,8 @@ small_model small_model_make(small_spec spec)
     return made;
 }
 
-small_model small_model_with_force(const small_model *model, const void *section, uint32_t size)
+small_model small_model_with_section(const small_model *model, const char *tag, const void *section,
+                                     uint32_t size)
 {
     const uint32_t padded = (size + 15u) & ~15u;
     small_model made = {.size = model->size + padded};
@@ -417,7 +418,7 @@ small_model small_model_with_force(const small_model *model, const void *section
     memset(made.blob + model->size, 0, padded);
     memcpy(made.blob + model->size, section, size);
     uint8_t *entry = small_model_entry(&made, "XTRA");
-    memcpy(entry, "LOAD", 4);
+    memcpy(entry, tag, 4);
     small_put_u32(entry + 4, (uint32_t)model->size);
     small_put_u32(entry + 8, size);
     small_put_u32(made.blob + 8, (uint32_t)made.size);

@@ -55,8 +55,10 @@ typedef struct small_model {
 small_model small_model_make(small_spec spec);
 void small_model_free(small_model *model);
 
-/* A copy with a section LOAD in place of the one that readers skip; `model` has float storage. */
-small_model small_model_with_force(const small_model *model, const void *section, uint32_t size);
+/* A copy with an optional section `tag` in place of the one that readers skip; `model` has float
+ * storage. */
+small_model small_model_with_section(const small_model *model, const char *tag, const void *section,
+                                     uint32_t size);
 
 /* Write the checksum again after bytes were changed. */
 void small_model_seal(small_model *model);

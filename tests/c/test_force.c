@@ -32,7 +32,7 @@ static eits_status open_with(const uint8_t *bytes, uint32_t size, eits_model *mo
                              small_model *kept)
 {
     small_model bare = small_model_make(TINY);
-    *kept = small_model_with_force(&bare, bytes, size);
+    *kept = small_model_with_section(&bare, "LOAD", bytes, size);
     small_model_free(&bare);
     return eits_model_open(model, kept->blob, kept->size);
 }
@@ -160,7 +160,7 @@ static void touches_have_forces(void)
     uint8_t bytes[MAX];
     const small_spec spec = {.rank = 24, .side = 12, .shape = SMALL_WAVES};
     small_model bare = small_model_make(spec),
-                made = small_model_with_force(&bare, bytes, section_of(bytes, 2));
+                made = small_model_with_section(&bare, "LOAD", bytes, section_of(bytes, 2));
     small_context c;
     eits_touch touches[EITS_MAX_TOUCHES];
     eits_real frame[SMALL_ROWS];

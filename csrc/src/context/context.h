@@ -29,6 +29,7 @@ typedef struct eits_reference {
      * what rows differ by from their reciprocals */
     eits_real distance, reciprocity;
     uint32_t row_gains; /* 1: in force */
+    uint32_t far;       /* 1: it is the instrument that is far from the model, not the skin */
     eits_real correlation;
     eits_real noise_v;
     eits_real lambda_noise;

@@ -155,7 +155,7 @@ static uint32_t drop_linearly(eits_context *ctx, const eits_scratch *scratch, ve
 {
     uint32_t left = v->answer.count;
     memset(out, 0, EITS_MAX_TOUCHES);
-    while (left > 0) {
+    while (left > ctx->reference.far) {
         const uint32_t k = weakest_of(scratch, likelihood, out, v);
         if (!(v->rise[k] < EITS_TOUCH_EVIDENCE * excess(ctx, likelihood->least, left)))
             break;
@@ -217,7 +217,7 @@ static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v
     eits_likelihood likelihood;
     uint8_t out[EITS_MAX_TOUCHES];
     int fitted = 0, linear = 1;
-    while (v->answer.count > 0) {
+    while (v->answer.count > ctx->reference.far) {
         uint32_t weakest = look(ctx, scratch, v, fitted, &likelihood, macs);
         if (v->rise[weakest] > EITS_CLEAR * needed(ctx, v) && !any_may_be_one(v, needed(ctx, v)))
             return;
@@ -241,6 +241,8 @@ static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v
             return;
     }
     *macs += eits_refit(ctx, scratch, &v->answer, 0);
+    if (v->answer.count > 0) /* on an instrument that is far from the model one stays */
+        (void)look(ctx, scratch, v, 1, &likelihood, macs);
 }
 
 /* Whether the discs need no closer look: as discs, which costs least. Where discs leave something,

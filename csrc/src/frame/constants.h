@@ -19,6 +19,10 @@
  * uneven sheets */
 #define EITS_MAX_DISTANCE R(0.28)
 
+/* the least regularisation on such an instrument [of s_1^2]. larger: fewer details; smaller: the
+ * instrument's errors become touches */
+#define EITS_FAR_REGULARISATION R(1.0)
+
 /* beyond this difference of rows and their reciprocals, row gains are off [of the reference's rms].
  * as MAX_DISTANCE */
 #define EITS_MAX_RECIPROCITY R(0.1)

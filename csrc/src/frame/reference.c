@@ -106,9 +106,10 @@ void eits_learn_row_gains(eits_context *ctx)
     const eits_model *model = ctx->model;
     eits_reference *b = &ctx->reference;
     measure_distance(ctx);
+    b->far = model->uncertainty.errors != NULL && model->data_kind != EITS_DATA_NORMALISED &&
+             (b->distance > EITS_MAX_DISTANCE || b->reciprocity > EITS_MAX_RECIPROCITY);
     b->row_gains = ctx->options.row_gains != 0 && model->uncertainty.row_gains != 0 &&
-                   model->data_kind != EITS_DATA_NORMALISED && b->distance <= EITS_MAX_DISTANCE &&
-                   b->reciprocity <= EITS_MAX_RECIPROCITY;
+                   model->data_kind != EITS_DATA_NORMALISED && !b->far;
     for (uint32_t i = 0; i < model->n_rows; ++i)
         b->row_gain[i] = 1;
     for (uint32_t k = 0; b->row_gains && k < model->n_folded; ++k) {

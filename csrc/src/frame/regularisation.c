@@ -21,8 +21,11 @@
 static eits_real asked_regularisation(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
-    const eits_real asked =
+    const eits_real by_noise =
         b->noise_v > 0 ? ctx->options.regularisation_noise_factor * (b->noise_v / b->v0_rms) : 0;
+    /* an instrument that disagrees has no finer truth to tell than its strongest directions */
+    const eits_real asked =
+        b->far && by_noise < EITS_FAR_REGULARISATION ? EITS_FAR_REGULARISATION : by_noise;
     return asked < EITS_MAX_REGULARISATION ? asked : EITS_MAX_REGULARISATION;
 }
 

@@ -19,6 +19,7 @@ from eitskin.core.constants_table import (
     BASIS_TOLERANCE,
     ERROR_MIN_NOISE,
     ERROR_SHARE,
+    FAR_REGULARISATION,
     FOLD_ROUNDING,
     MAX_OF_NOISE,
     MAX_RATIO,
@@ -95,7 +96,7 @@ class ReferenceEngine:
         self._v0: FloatArray | None = None
         self._drift_v0: FloatArray | None = None
         self._gain, self._row_gain = 1.0, np.ones(model.protocol.n_rows)
-        self._distance = 0.0
+        self._distance, self._far = 0.0, False
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._warm: FloatArray | None = None
@@ -166,7 +167,8 @@ class ReferenceEngine:
             return
         usable = ~(self._bad | self._without_reference)
         assert self._drift_v0 is not None
-        gains, self._distance = row_gains(self.model, usable, self._gain * self._drift_v0)
+        gains, self._distance, far = row_gains(self.model, usable, self._gain * self._drift_v0)
+        self._far = far and self.model.data_kind != "normalised"
         if errors.row_gains and self.options.row_gains and self.model.data_kind != "normalised":
             self._row_gain = gains
 
@@ -387,7 +389,10 @@ class ReferenceEngine:
 
     def _leave_out(self, known: BoolArray) -> None:
         """Whiten again for the folded rows (k,) that are known, and for the noise."""
-        asked = self.options.regularisation_noise_factor * self._noise_v / self._v0_rms
+        asked = max(
+            self.options.regularisation_noise_factor * self._noise_v / self._v0_rms,
+            FAR_REGULARISATION if self._far else 0.0,
+        )
         self._whitening = None if self._form is None else whiten(self._form, known, asked)
         self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
 
@@ -530,7 +535,7 @@ class ReferenceEngine:
             partial(self._dipoles, basis) if tells and model.data_kind == "difference" else None
         )
         drift = see @ errors.drift @ see.T
-        return DataErrors(error, drift, dipoles, self._distance)
+        return DataErrors(error, drift, dipoles, self._distance, int(self._far))
 
     def _solve(
         self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None

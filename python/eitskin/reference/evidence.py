@@ -49,12 +49,14 @@ class DataErrors:
     """What a frame's data y (r,) may be wrong by: covariances ``error`` (r, r), of noise and of
     model errors, and ``drift`` (r, r), of a skin that drifts; ``dipoles`` gives what a disc adds to
     y as a dipole that turns (2, r), None where the model cannot tell. ``distance``: of the
-    reference from the model's, rms over folds of log(v0 / v_ref)."""
+    reference from the model's, rms over folds of log(v0 / v_ref). ``kept``: so many discs stay,
+    whatever the data say of them."""
 
     error: FloatArray
     drift: FloatArray
     dipoles: Callable[[Disc], FloatArray] | None
     distance: float = 0.0
+    kept: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,7 +316,7 @@ class Hypothesis:
         """Which discs stay where whatever the linearisation can do without is left out, one after
         another."""
         offsets, left = self.answer.offsets(), list(range(len(self.answer.discs)))
-        while left:
+        while len(left) > self.errors.kept:
             rises = [now.rise(offsets, k) for k in left]
             weakest = int(np.argmin(rises))
             if not rises[weakest] < TOUCH_EVIDENCE * self.excess(now.least, len(left)):
@@ -353,7 +355,7 @@ class Hypothesis:
     def eliminate(self) -> None:
         """From the discs as they are to those that stay."""
         fitted, linear = False, True
-        while self.answer.discs:
+        while len(self.answer.discs) > self.errors.kept:
             weakest, now = self.look(fitted=fitted)
             if self.rise[weakest] > CLEAR * self.needed() and not self.near_pairs():
                 return
@@ -372,6 +374,8 @@ class Hypothesis:
             if not self.take_simpler(weakest):
                 return
         self.answer = self.refit(self.answer)
+        if self.answer.discs:  # on an instrument that is far from the model one stays
+            self.look(fitted=True)
 
     def is_clear(self) -> bool:
         """Whether the discs need no closer look, as discs: what that costs least."""

@@ -14,11 +14,11 @@ FloatArray = npt.NDArray[np.float64]
 
 def row_gains(
     model: Model, usable: npt.NDArray[np.bool_], v0: FloatArray
-) -> tuple[FloatArray, float]:
+) -> tuple[FloatArray, float, bool]:
     """What each row's data are multiplied by (m,), from a reference ``v0`` (m,) in the model's
-    volts and where it is ``usable`` (m,); all 1 where the instrument and not the skin differs from
-    the model: too far from it, or from reciprocity. And how far: rms over folds of
-    log(v0 / v_ref)."""
+    volts and where it is ``usable`` (m,); how far it is from the model, rms over folds of
+    log(v0 / v_ref); and whether that is the instrument's doing and not the skin's: it is too far,
+    or too far from reciprocity. Then the gains are all 1."""
     fold, expected = model.fold, np.full(len(v0), np.nan)
     paired = fold.second >= 0
     expected[fold.first] = model.v_ref_v
@@ -36,4 +36,4 @@ def row_gains(
     distance, size = np.sqrt(np.mean(logs**2)), np.sqrt(np.mean(mean**2))
     reciprocity = np.sqrt(np.mean(apart**2)) / size if both.any() else 0.0
     fits = distance <= MAX_DISTANCE and reciprocity <= MAX_RECIPROCITY
-    return gains if fits else np.ones_like(gains), float(distance)
+    return gains if fits else np.ones_like(gains), float(distance), not fits

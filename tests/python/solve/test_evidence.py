@@ -177,7 +177,8 @@ def exact() -> tuple[np.ndarray, np.ndarray]:
 def test_row_gains_undo_what_multiplies_rows(engine: str) -> None:
     """A sheet that multiplies each row's voltages, of the reference as of touches: the same touches
     as without; where the reference is further from the model than a sheet makes it, or than
-    reciprocity allows, rows are left as they are."""
+    reciprocity allows, rows are left as they are, the regularisation is the
+    strongest, and one touch stays whatever the model makes of it."""
     quiet_v, frame_v = exact()
     straight = one(engine, quiet_v, frame_v)
     assert straight.touches
@@ -196,6 +197,9 @@ def test_row_gains_undo_what_multiplies_rows(engine: str) -> None:
             for on in (1, 0)
         )
         assert (with_.image == without.image).all()
+        assert with_.info.regularisation == pytest.approx(1.0)
+        tested = one(engine, factors * quiet_v, factors * frame_v)
+        assert 1 <= len(tested.touches) <= max(1, len(with_.touches))
 
 
 def test_all_engines_agree_with_rows_masked_and_lost() -> None:

@@ -1,0 +1,95 @@
+/* The section UNCE: what it says the model may be wrong by, and everything that a reader refuses.
+ */
+#include "base/vec.h"
+#include "check.h"
+#include "small_model.h"
+
+#include <math.h>
+
+enum { RANK = 4, PACKED = RANK * (RANK + 1) / 2, HEAD = 16, SIZE = HEAD + 2 * PACKED * 4 };
+
+static const small_spec WHITENED = {.rank = RANK, .side = 5, .shape = SMALL_WHITENED};
+static const small_spec PLAIN = {.rank = RANK, .side = 5};
+
+/* Two diagonal triangles, i + 1 and 10 (i + 1), and a head. */
+static void section_of(uint8_t *bytes)
+{
+    memset(bytes, 0, SIZE);
+    small_put_u32(bytes, 1);
+    small_put_f32(bytes + 4, 0.04f);
+    small_put_f32(bytes + 8, 0.11f);
+    for (uint32_t i = 0; i < RANK; ++i) {
+        small_put_f32(bytes + HEAD + 4 * (i * (i + 1) / 2 + i), (float)(i + 1));
+        small_put_f32(bytes + HEAD + 4 * (PACKED + i * (i + 1) / 2 + i), 10.0f * (float)(i + 1));
+    }
+}
+
+static eits_status opened(small_spec spec, const uint8_t *bytes, uint32_t size)
+{
+    small_model bare = small_model_make(spec),
+                made = small_model_with_section(&bare, "UNCE", bytes, size);
+    eits_model model;
+    const eits_status status = eits_model_open(&model, made.blob, made.size);
+    small_model_free(&bare);
+    small_model_free(&made);
+    return status;
+}
+
+static void it_is_read_in_place(void)
+{
+    uint8_t bytes[SIZE];
+    section_of(bytes);
+    small_model bare = small_model_make(WHITENED),
+                made = small_model_with_section(&bare, "UNCE", bytes, SIZE);
+    eits_model model;
+    CHECK_EQUAL(eits_model_open(&model, bare.blob, bare.size), EITS_OK);
+    CHECK(model.uncertainty.errors == NULL && model.uncertainty.row_gains == 0);
+    CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_OK);
+    const eits_uncertainty *u = &model.uncertainty;
+    CHECK(u->row_gains == 1 && u->errors_rms == 0.04f && u->shapes_rms == 0.11f);
+    for (uint32_t i = 0; i < RANK; ++i) {
+        for (uint32_t j = 0; j <= i; ++j) {
+            const uint32_t at = i * (i + 1) / 2 + j;
+            CHECK(u->errors[at] == (i == j ? (float)(i + 1) : 0));
+            CHECK(u->drift[at] == (i == j ? 10.0f * (float)(i + 1) : 0));
+        }
+    }
+    small_model_free(&bare);
+    small_model_free(&made);
+}
+
+static void what_is_no_second_moment_is_refused(void)
+{
+    /* where, and what: numbers that are none, variances below 0, shares below 0 or without end */
+    static const struct {
+        uint32_t at;
+        float value;
+    } bad[] = {{HEAD, -1},
+               {HEAD + 4 * PACKED, -1},
+               {HEAD + 4, (float)NAN},
+               {HEAD + 4 * (PACKED + 1), (float)INFINITY},
+               {HEAD + 4 * (PACKED - 1), 2e30f},
+               {4, -0.1f},
+               {8, (float)NAN}};
+    uint8_t bytes[SIZE + 4];
+    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; ++k) {
+        section_of(bytes);
+        small_put_f32(bytes + bad[k].at, bad[k].value);
+        CHECK_EQUAL(opened(WHITENED, bytes, SIZE), EITS_E_MODEL_VALUE);
+    }
+    section_of(bytes);
+    small_put_f32(bytes + HEAD + 4, -0.5f); /* a covariance may be below 0 */
+    CHECK_EQUAL(opened(WHITENED, bytes, SIZE), EITS_OK);
+    CHECK_EQUAL(opened(WHITENED, bytes, SIZE - 4), EITS_E_MODEL_SECTION);
+    memset(bytes + SIZE, 0, 4);
+    CHECK_EQUAL(opened(WHITENED, bytes, SIZE + 4), EITS_E_MODEL_SECTION);
+    /* without section WHIT there is no noise to weigh the errors against */
+    CHECK_EQUAL(opened(PLAIN, bytes, SIZE), EITS_E_MODEL_VALUE);
+}
+
+int main(void)
+{
+    it_is_read_in_place();
+    what_is_no_second_moment_is_refused();
+    return checks_report("uncertainty");
+}
