@@ -33,7 +33,8 @@ static void calibrated(unsigned k, const small_model *bare)
     }
     for (uint32_t i = 0; i < terms; ++i)
         small_put_f32(load + HEAD + 4 * (2 * POINTS + i), i == 0 ? 1.0f : 0.1f);
-    small_model made = small_model_with_section(bare, "LOAD", load, HEAD + 4 * (2 * POINTS + terms));
+    small_model made =
+        small_model_with_section(bare, "LOAD", load, HEAD + 4 * (2 * POINTS + terms));
     keep("load", k, made.blob, made.size);
     small_model_free(&made);
 }
