@@ -15,7 +15,7 @@ SCENE = """
 name = "one"
 frames = {frames}
 quiet_frames = 8
-elements = 900
+elements = 4000
 
 [[touch]]
 radius_mm = 9.0
