@@ -176,7 +176,7 @@ def test_a_model_that_nothing_was_measured_with(
 
 
 def test_boards_are_told_the_settings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    scene = write_scene(tmp_path / "one.toml", frames=2)
+    scene = write_scene(tmp_path / "one.toml", frames=2, elements=900)
     assert main(["stream", "--device", f"sim:{scene}", "--accuracy", "0.87", "--json"]) == 0
     out, err = capsys.readouterr()
     assert "on the F767 (an estimate)" in err
@@ -203,7 +203,7 @@ def test_boards_refuse(refused: Refused, tmp_path: Path) -> None:
 def test_a_recording_takes_no_budget_but_keeps_what_it_chose(
     refused: Refused, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    scene, run = write_scene(tmp_path / "one.toml", frames=2), tmp_path / "run.eits"
+    scene, run = write_scene(tmp_path / "one.toml", frames=2, elements=900), tmp_path / "run.eits"
     assert main(["record", "--device", f"sim:{scene}", "-o", str(run), "--accuracy", "0.87"]) == 0
     assert main(["replay", str(run), "--check"]) == 0
     assert main(["replay", str(run), "--json"]) == 0
