@@ -135,6 +135,8 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
     (void)size;
     memcpy(&c, payload, sizeof c);
     fw_answer checked = check_scan(instrument, &c);
+    if (instrument->board->frames_given)
+        return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, sample_rate_hz), 0);
     if (checked.status != EITS_REPLY_OK)
         return checked;
     const fw_scan_settings settings = {c.excitation_millihz, c.sample_rate_hz, c.samples,

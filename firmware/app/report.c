@@ -39,18 +39,19 @@ void fw_send_info(fw_instrument *instrument, uint32_t request)
                              .electrodes = FW_ELECTRODES,
                              .bank_bytes = fw_store_room(&board->store),
                              .data_bytes = FW_DATA_BYTES,
-                             .excitation_millihz =
-                                 (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning),
-                             .sample_rate_hz = s->sample_rate_hz,
-                             .samples = (uint16_t)s->samples,
-                             .settle_us = (uint16_t)s->settle_us,
-                             .slot_us = fw_slot_us(s),
                              .check_every = (uint16_t)s->check_every,
                              .streaming = instrument->stream.what,
                              .every = instrument->stream.every,
                              .frame_period_us = s->frame_period_us,
-                             .faults = instrument->faults.raised,
-                             .volts_per_code_nv = fw_volts_per_code_nv(&board->capture)};
+                             .faults = instrument->faults.raised};
+    if (!board->frames_given) {
+        info.excitation_millihz = (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning);
+        info.sample_rate_hz = s->sample_rate_hz;
+        info.samples = (uint16_t)s->samples;
+        info.settle_us = (uint16_t)s->settle_us;
+        info.slot_us = fw_slot_us(s);
+        info.volts_per_code_nv = fw_volts_per_code_nv(&board->capture);
+    }
     copy_text(info.board, sizeof info.board - 1, board->name);
     copy_text(info.serial, sizeof info.serial, board->serial);
     report_model(instrument, &info);

@@ -1,5 +1,6 @@
 /* The simulated board by itself: what it measures are the frames that it is shown, in their order,
  * on a clock that runs only for whoever wants frames. */
+#include "app/scan_control.h"
 #include "bench.h"
 #include "check.h"
 #include "simulated.h"
@@ -62,14 +63,16 @@ static void stream(rig *r, uint16_t what, uint32_t frames)
     send(r, EITS_PACKET_STREAM, &c, sizeof c);
 }
 
-static void start(rig *r, uint32_t period_us)
+static void start_given(rig *r, uint32_t period_us, bool frames_given)
 {
     memset(r, 0, sizeof *r);
     memset(r->bank, 0xFF, sizeof r->bank);
     fake_put_model(&source.board, 0, 1, source.model.blob, source.model.size);
     memcpy(r->bank[0], source.board.bank[0], BANK);
     CHECK_EQUAL(eits_link_decoder_init(&r->decoder, r->decoding, sizeof r->decoding), EITS_OK);
-    const sim_setup setup = {.serial = "5",
+    const sim_setup setup = {.name = "simulated",
+                             .serial = "5",
+                             .frames_given = frames_given,
                              .frame_period_us = period_us,
                              .banks = {r->bank[0], r->bank[1]},
                              .bank_bytes = BANK,
@@ -77,6 +80,11 @@ static void start(rig *r, uint32_t period_us)
                              .workspace_bytes = WORKSPACE};
     sim_init(&r->sim, &setup);
     collect(r);
+}
+
+static void start(rig *r, uint32_t period_us)
+{
+    start_given(r, period_us, false);
 }
 
 static void show(rig *r, double rate_hz)
@@ -174,6 +182,51 @@ static void test_two_boards(void)
     }
 }
 
+/* Another instrument's numbers reach the host bit for bit; what is not finite is no voltage.
+ * Nothing is said of a scan, and none can be set. Where frames stay away that is a fault, which
+ * goes. */
+static void test_frames_given(void)
+{
+    float given[ROWS];
+    start_given(&a, 20000, true);
+    CHECK_EQUAL(a.sim.instrument.engine.open, true);
+    stream(&a, EITS_STREAM_RAW, 0);
+    for (uint32_t i = 0; i < ROWS; ++i)
+        given[i] = 1e3f * volts[i] + 1e-7f;
+    sim_give_frame(&a.sim, given, 21000, 22000);
+    given[3] = INFINITY;
+    sim_give_frame(&a.sim, given, 23000, 22000);
+    collect(&a);
+    CHECK_EQUAL(a.raws, 2);
+    CHECK_EQUAL(a.head.time_us, 44000);
+    CHECK_EQUAL(a.sim.instrument.settings.frame_period_us, 22000);
+    for (uint32_t i = 0; i < ROWS; ++i)
+        CHECK(i == 3 ? isnan(a.raw[i]) : fabsf(a.raw[i]) == fabsf(given[i]));
+    const uint32_t stalled = 1u << EITS_FAULT_SCAN_STALLED;
+    sim_let_pass(&a.sim, 1000000);
+    CHECK((a.sim.instrument.faults.raised & stalled) != 0);
+    sim_give_frame(&a.sim, given, 20000, 22000);
+    CHECK((a.sim.instrument.faults.raised & stalled) == 0);
+    const eits_command_scan scan = {.request = 900,
+                                    .excitation_millihz = 50000000,
+                                    .sample_rate_hz = 1000000,
+                                    .samples = 80,
+                                    .settle_us = 16,
+                                    .check_every = 1};
+    send(&a, EITS_PACKET_SCAN, &scan, sizeof scan);
+    CHECK_EQUAL(a.sim.instrument.reply.status, EITS_REPLY_RANGE);
+    collect(&a);
+    const uint32_t raws = a.raws;
+    sim_give_frame(&a.sim, given, 20000, 22000);
+    collect(&a);
+    CHECK_EQUAL(a.raws, raws + 1);
+    fw_engine_close(&a.sim.instrument.engine); /* without a model there is nothing to give to */
+    fw_stop_scan(&a.sim.instrument);
+    sim_give_frame(&a.sim, given, 20000, 22000);
+    collect(&a);
+    CHECK_EQUAL(a.raws, raws + 1);
+}
+
 int main(void)
 {
     bench_start(&source, &SKIN_ADJACENT);
@@ -184,6 +237,7 @@ int main(void)
     test_frames_in_order();
     test_time_and_restart();
     test_two_boards();
+    test_frames_given();
     bench_stop(&source);
     return checks_report("simulated");
 }

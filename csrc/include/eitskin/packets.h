@@ -230,7 +230,8 @@ typedef struct eits_packet_info {
     uint16_t samples;
     /* settling time */
     uint16_t settle_us;
-    /* from one measurement to the next */
+    /* from one measurement to the next; 0, as all of the scan: the frames are another
+     * instrument's */
     uint32_t slot_us;
     /* every n-th frame is scanned fully; 1: all; 0: none */
     uint16_t check_every;

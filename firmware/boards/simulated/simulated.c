@@ -5,6 +5,7 @@
 #include "app/sincos.h"
 #include "boards/parts/nor_model.h"
 
+#include <math.h>
 #include <string.h>
 
 enum {
@@ -300,7 +301,7 @@ void sim_init(sim_board *sim, const sim_setup *setup)
     memset(sim, 0, sizeof *sim);
     for (uint32_t k = 0; k < FW_BANKS; ++k)
         sim->bank[k] = setup->banks[k];
-    sim->board = (fw_board){.name = "simulated",
+    sim->board = (fw_board){.name = setup->name,
                             .serial = setup->serial,
                             .mclk_hz = MCLK_HZ,
                             .frame_period_us = setup->frame_period_us,
@@ -311,6 +312,7 @@ void sim_init(sim_board *sim, const sim_setup *setup)
                             .store = {&STORE, sim, setup->bank_bytes},
                             .system = &SYSTEM,
                             .system_ctx = sim,
+                            .frames_given = setup->frames_given,
                             .workspace = setup->workspace,
                             .workspace_bytes = setup->workspace_bytes};
     sim_start(sim);
@@ -384,4 +386,38 @@ void sim_scan_frame(sim_board *sim)
             wait_idle(sim);
         step(sim);
     }
+}
+
+void sim_give_frame(sim_board *sim, const float *volts, uint32_t passed_us, uint32_t period_us)
+{
+    fw_instrument *instrument = &sim->instrument;
+    fw_scan *scan = &instrument->scan;
+    sim->now_us += passed_us;
+    instrument->settings.frame_period_us = sim->board.frame_period_us = period_us;
+    if (!scan->running) {
+        step(sim); /* an upload, or no model */
+        return;
+    }
+    fw_frame *frame = &scan->frames[scan->filled % 2u];
+    *frame = (fw_frame){.number = scan->next_number++,
+                        .time_us = (uint32_t)sim->now_us,
+                        .end_us = (uint32_t)sim->now_us,
+                        .z = frame->z,
+                        .volts = frame->volts,
+                        .quality = frame->quality};
+    for (uint32_t i = 0; i < instrument->engine.model.n_rows; ++i) {
+        const bool usable = isfinite(volts[i]);
+        frame->z[i] = (fw_iq){usable ? volts[i] : 0, 0};
+        frame->quality[i] = usable ? 0 : EITS_QUALITY_UNSETTLED;
+    }
+    ++scan->bursts;
+    ++scan->frames_scanned;
+    ++scan->filled;
+    step(sim);
+}
+
+void sim_let_pass(sim_board *sim, uint32_t passed_us)
+{
+    sim->now_us += passed_us;
+    step(sim);
 }

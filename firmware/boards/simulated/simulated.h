@@ -8,7 +8,8 @@
  * begins.
  *
  * Time is counted, not waited for: it passes only in sim_scan_frame, and nothing that the processor
- * does takes any. All is in the caller's memory, so that one process can have many boards. */
+ * does takes any. All is in the caller's memory, so that one process can have many boards.
+ * A board may also be given the frames of another instrument, whole: see sim_give_frame. */
 #ifndef SIMULATED_H
 #define SIMULATED_H
 
@@ -56,7 +57,9 @@ typedef struct sim_board {
 
 /* The caller's memory is used as long as the board is. */
 typedef struct sim_setup {
+    const char *name; /* at most 15 characters; used as long as the board is, as serial */
     const char *serial;
+    bool frames_given;        /* by sim_give_frame, not by sim_show */
     uint32_t frame_period_us; /* of the first scan */
     uint8_t *banks[FW_BANKS]; /* aligned to 16 */
     uint32_t bank_bytes;
@@ -99,5 +102,13 @@ bool sim_scene_over(const sim_board *sim);
 
 /* Where frames are wanted: scan until the application has had one more. */
 void sim_scan_frame(sim_board *sim);
+
+/* Where frames are given: the application gets one, n_rows volts of the model's protocol, as they
+ * are but for those that are not finite, which it cannot use. The frame began passed_us after the
+ * last one, and frames come about period_us apart. Nothing where there is no model. */
+void sim_give_frame(sim_board *sim, const float *volts, uint32_t passed_us, uint32_t period_us);
+
+/* Where frames are given: none has come for passed_us more, and the application may miss them. */
+void sim_let_pass(sim_board *sim, uint32_t passed_us);
 
 #endif

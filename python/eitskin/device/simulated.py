@@ -32,27 +32,38 @@ def _load() -> Any:
     return _board
 
 
-class SimBoard:
-    """One board before ``frames``, switched on, with what its two ``banks`` hold.
+class HostBoard:
+    """The firmware's application on this host, switched on, with what its two ``banks`` hold.
+
+    ``name`` and ``serial`` are what INFO says; ``period_us`` of its first frames; ``frames_given``:
+    by another instrument.
 
     Raises:
         UsageError: the firmware is not built for this host.
     """
 
-    def __init__(self, frames: BoardFrames, banks: list[bytes]) -> None:
-        module, scene = _load(), frames.scene
+    def __init__(
+        self,
+        name: str,
+        serial: str,
+        banks: list[bytes],
+        *,
+        period_us: int,
+        frames_given: bool = False,
+    ) -> None:
+        module = _load()
         self._ffi, self._lib = module.ffi, module.lib
-        self.frames, self._shown_crc = frames, -1
         self._banks = [aligned(len(bank)) for bank in banks]
         for cells, bank in zip(self._banks, banks, strict=True):
             cells[:] = np.frombuffer(bank, dtype=np.uint8)
         self._workspace = aligned(WORKSPACE_BYTES)
         self._memory = aligned(self._lib.sim_board_bytes())
-        serial = zlib.crc32((scene.text or repr(scene)).encode())  # the same for the same scene
-        self._serial = self._ffi.new("char[]", f"{serial:08X}".encode())
+        self._name = self._ffi.new("char[]", name.encode())
+        self._serial = self._ffi.new("char[]", serial.encode())
         self._sim = self._ffi.cast("sim_board *", self._ffi.from_buffer(self._memory))
         setup = self._ffi.new("sim_setup *")
-        setup.serial, setup.frame_period_us = self._serial, max(round(1e6 / scene.rate_hz), 1)
+        setup.name, setup.serial = self._name, self._serial
+        setup.frames_given, setup.frame_period_us = frames_given, period_us
         setup.banks = [self._pointer(cells, "uint8_t *") for cells in self._banks]
         setup.bank_bytes = len(banks[0])
         setup.workspace = self._pointer(self._workspace, "void *")
@@ -60,6 +71,7 @@ class SimBoard:
         self._lib.sim_init(self._sim, setup)
         self._output = self._ffi.new("uint8_t[]", OUTPUT_BYTES)
         self._bytes, self._crc = self._ffi.new("uint32_t *"), self._ffi.new("uint32_t *")
+        self._model_crc = -1
 
     def _pointer(self, array: Any, kind: str) -> Any:
         return self._ffi.cast(kind, self._ffi.from_buffer(array))
@@ -89,6 +101,50 @@ class SimBoard:
         """Whether a stream or a tare waits for frames."""
         return bool(self._lib.sim_wants_frame(self._sim))
 
+    def new_model(self) -> Any | None:
+        """The model in use, decoded, where it is another than at the last call; else None."""
+        blob = self._lib.sim_model(self._sim, self._bytes, self._crc)
+        if blob == self._ffi.NULL or self._crc[0] == self._model_crc:
+            return None
+        from eitskin.model.eitm import decode_model
+
+        model = decode_model(bytes(self._ffi.buffer(blob, self._bytes[0])), "the board's model")
+        self._model_crc = self._crc[0]
+        return model
+
+
+class GivenBoard(HostBoard):
+    """A board that is given the frames of another instrument, of which INFO says no more than
+    ``name``, ``serial`` and how often they come."""
+
+    def __init__(self, name: str, serial: str, banks: list[bytes], *, period_us: int) -> None:
+        super().__init__(name, serial, banks, period_us=period_us, frames_given=True)
+
+    def give(self, voltage_v: Any, passed_us: int, period_us: int) -> None:
+        """One frame, in the rows of the model in use; NaN is a row that cannot be used. It began
+        ``passed_us`` after the last one, and they come about every ``period_us``."""
+        volts = np.ascontiguousarray(voltage_v, dtype=np.float32)
+        self._lib.sim_give_frame(self._sim, self._pointer(volts, "float *"), passed_us, period_us)
+
+    def let_pass(self, passed_us: int) -> None:
+        """No frame has come for ``passed_us`` more."""
+        self._lib.sim_let_pass(self._sim, passed_us)
+
+
+class SimBoard(HostBoard):
+    """One board before ``frames``, switched on, with what its two ``banks`` hold.
+
+    Raises:
+        UsageError: the firmware is not built for this host.
+    """
+
+    def __init__(self, frames: BoardFrames, banks: list[bytes]) -> None:
+        scene = frames.scene
+        serial = zlib.crc32((scene.text or repr(scene)).encode())  # the same for the same scene
+        period_us = max(round(1e6 / scene.rate_hz), 1)
+        super().__init__("simulated", f"{serial:08X}", banks, period_us=period_us)
+        self.frames = frames
+
     @property
     def ended(self) -> bool:
         """Whether the scene is over when the next scan begins."""
@@ -112,17 +168,18 @@ class SimBoard:
 
     def _show_skin(self) -> None:
         """Put the frames for the model in use before the board, where it is another than before."""
-        blob = self._lib.sim_model(self._sim, self._bytes, self._crc)
-        if self._crc[0] == self._shown_crc:
+        model = self.new_model()
+        if model is None:
             return
-        from eitskin.model.eitm import decode_model
-
-        model = decode_model(bytes(self._ffi.buffer(blob, self._bytes[0])), "the board's model")
         scene = self.frames.scene
-        self._volts = np.ascontiguousarray(self.frames.voltage_v(model.protocol), np.float32)
+        try:
+            voltage_v = self.frames.voltage_v(model.protocol)
+        except BaseException:
+            self._model_crc = -1  # asked again, it says so again
+            raise
+        self._volts = np.ascontiguousarray(voltage_v, np.float32)
         volts = self._pointer(self._volts, "float *")
         self._lib.sim_show(self._sim, volts, scene.quiet_frames, scene.frames, scene.rate_hz)
-        self._shown_crc = self._crc[0]
 
 
 class SimTransport:

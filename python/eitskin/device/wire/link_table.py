@@ -272,7 +272,7 @@ class InfoPacket(Payload):
     samples: int
     # settling time
     settle_us: int
-    # from one measurement to the next
+    # from one measurement to the next; 0, as all of the scan: the frames are another instrument's
     slot_us: int
     # every n-th frame is scanned fully; 1: all; 0: none
     check_every: int
