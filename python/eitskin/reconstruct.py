@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from eitskin.core.results import NEWTONS_PER_GRAM, LearnedReference, Reconstruct
 from eitskin.errors import ConfigError, EitskinError, FrameError, UsageError
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import Frames, load_frames
+from eitskin.live.message import frame_table, head, known
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.solve.batch import Batch, check_threads
@@ -359,22 +360,10 @@ def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
 
 
 def to_json(outcome: ReconstructOutcome) -> dict[str, Any]:
-    """Everything that the text says, and more, for programs."""
-    listed = []
-    for number in sorted({*outcome.results, *outcome.refused}):
-        entry: dict[str, Any] = {"frame": number, "name": outcome.frames.frame_name[number]}
-        if number in outcome.refused:
-            entry["refused"] = outcome.refused[number]
-        else:
-            result = outcome.results[number]
-            entry["touches"] = [asdict(touch) for touch in result.touches]
-            entry["info"] = result.info.as_dict()
-        if number in outcome.scores:
-            score = outcome.scores[number]
-            entry["miou_image"], entry["miou_touches"] = score.miou_image, score.miou_touches
-            entry["position_errors_mm"] = list(score.matching.distances_mm)
-        listed.append(entry)
-    whole: dict[str, Any] = {
+    """Everything that the text says, and more, for programs: a message of type "reconstruction"
+    (docs/reference/message.md)."""
+    listed = [_entry(outcome, k) for k in sorted({*outcome.results, *outcome.refused})]
+    whole = head("reconstruction") | {
         "model": outcome.model_name,
         "engine": outcome.engine,
         "frames": listed,
@@ -384,5 +373,29 @@ def to_json(outcome: ReconstructOutcome) -> dict[str, Any]:
         whole["settings"] = settings | {"mask_threshold": outcome.point.threshold}
     if outcome.scores:
         facts = summary(outcome.scores)
-        whole["summary"] = {k: None if value != value else value for k, value in facts.items()}
+        whole["summary"] = {key: known(value) for key, value in facts.items()}
     return whole
+
+
+def _entry(outcome: ReconstructOutcome, number: int) -> dict[str, Any]:
+    """A frame's message."""
+    frames, result = outcome.frames, outcome.results.get(number)
+    time_s = None if frames.time_s is None else float(frames.time_s[number])
+    if result is None:
+        entry = frame_table(number, time_s=time_s, refused=outcome.refused[number])
+    else:
+        info = result.info
+        entry = frame_table(
+            number,
+            time_s=time_s,
+            touches=result.touches,
+            diagnostics=info.diagnostics_by_name,
+            found=info.found,
+            info=info.as_dict(),
+        )
+    entry["name"] = frames.frame_name[number]
+    if number in outcome.scores:
+        score = outcome.scores[number]
+        entry["miou_image"], entry["miou_touches"] = score.miou_image, score.miou_touches
+        entry["position_errors_mm"] = list(score.matching.distances_mm)
+    return entry

@@ -14,13 +14,9 @@ from eitskin.cli.device_options import (
     add_device,
     add_scan,
     add_stream,
-    check_recording,
-    check_scan,
-    chosen_every,
-    open_named,
-    prepare,
-    read_every,
     read_mode,
+    say,
+    session_settings,
 )
 from eitskin.errors import UsageError
 
@@ -54,40 +50,21 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Record, then say how much."""
-    from eitskin.device.known_model import find_model
-    from eitskin.device.live import LiveSummary, finish, follow
-    from eitskin.device.wire.link_table import Stream
-    from eitskin.scoring.scene_truth import truth_of, until_over
+    from eitskin.live.session import Session
 
-    what, (every, frames) = read_mode(options.mode), read_every(options)
-    check_scan(options)
+    settings = session_settings(options, read_mode(options.mode), record=options.output)
     if options.seconds is not None and not 0 < options.seconds <= 1e6:
         raise UsageError(f"--seconds {options.seconds:g} is out of range; use above 0 to 1000000")
-    check_recording(options.output, options.overwrite)
-    summary = LiveSummary()
-    with open_named(options) as device:
-        if device.transport.replays:
-            raise UsageError(f"{device.transport.name} is a recording already; copy the file")
-        known = find_model(device.board, options.model, device.transport.name)
-        needed = bool(what & (Stream.IMAGE | Stream.TOUCHES))
-        truth = truth_of(options.device, options.sign or "increase")
-        recorder = prepare(
-            options, device, known, needs_reference=needed, record=options.output, truth=truth
-        )
-        assert recorder is not None
-        with recorder:
-            items = follow(device, what, every=chosen_every(device, what, every), frames=frames)
-            try:
-                _count(
-                    _until(until_over(items, None if frames else truth), options.seconds),
-                    summary,
-                    frames,
-                )
-            except KeyboardInterrupt:
-                print("eitskin: stopped", file=sys.stderr)
-            finally:
-                items.close()
-        finish(summary, device)
+    with Session(options.device, settings, say=say) as session:
+        items = session.items()
+        try:
+            _count(_until(items, options.seconds), session.summary, settings.frames)
+        except KeyboardInterrupt:
+            print("eitskin: stopped", file=sys.stderr)
+        finally:
+            items.close()
+        summary, recorder = session.finish(), session.recorder
+    assert recorder is not None
     if options.json:
         facts = {
             "recording": str(options.output),

@@ -6,14 +6,11 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import read_mode, whole
-from eitskin.errors import EitskinError, FrameError, UsageError, VerificationError
-
-if TYPE_CHECKING:
-    from eitskin.scoring.scene_truth import SceneTruth
+from eitskin.cli.device_options import read_mode, say, whole
+from eitskin.errors import FrameError, UsageError, VerificationError
 
 
 def add_parser(subparsers: Any) -> None:
@@ -61,45 +58,18 @@ def run(options: argparse.Namespace) -> int:
 
 def _show(options: argparse.Namespace) -> None:
     from eitskin.cli.live_output import check_picture, show
-    from eitskin.device.known_model import find_model, need_model
-    from eitskin.device.live import replayed
-    from eitskin.device.open import open_device
-    from eitskin.device.wire.link_table import Stream
+    from eitskin.live.session import Session, SessionSettings
 
-    what = read_mode(options.mode or "touches")
-    check_picture(options.picture, what)
-    with open_device(f"file:{options.recording}") as device:
-        name = device.transport.name
-        info, path = device.board, options.model
-        known = (
-            need_model(info, path, name, "a picture")
-            if options.picture is not None
-            else find_model(info, path, name)
-        )
-        items = replayed(device, what, frames=options.first or 0)
-        show(
-            options,
-            items,
-            device,
-            known,
-            _truth(options.recording) if what & (Stream.IMAGE | Stream.TOUCHES) else None,
-        )
-
-
-def _truth(path: Path) -> SceneTruth | None:
-    """Of the scene that the recorded board saw, where that is still to be found."""
-    from eitskin.device.recordings.recording import read_head, recorded_options
-    from eitskin.scoring.matching import match
-    from eitskin.scoring.scene_truth import truth_of
-
-    solver = recorded_options(path)
-    try:
-        match([], [])  # scipy, which every comparison with the truth needs
-        return truth_of(
-            str(read_head(path).get("url", "")), "increase" if solver is None else solver.sign
-        )
-    except EitskinError:
-        return None
+    mode = read_mode(options.mode or "touches")
+    check_picture(options.picture, mode)
+    settings = SessionSettings(
+        mode=mode,
+        frames=options.first or 0,
+        model=options.model,
+        model_for="" if options.picture is None else "a picture",
+    )
+    with Session(f"file:{options.recording}", settings, say=say) as session:
+        show(options, session)
 
 
 def _export(options: argparse.Namespace) -> None:

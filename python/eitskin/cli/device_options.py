@@ -13,12 +13,9 @@ from eitskin.errors import FileError, UsageError
 
 if TYPE_CHECKING:
     from eitskin.device.client import Device
-    from eitskin.device.known_model import KnownModel
-    from eitskin.device.recordings.recording import Recorder
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.link_table import Stream
-    from eitskin.scoring.scene_truth import SceneTruth
-    from eitskin.tuning.front import Target
+    from eitskin.live.session import SessionSettings
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in), serial:/dev/ttyACM0, sim:SCENE (simulated),"
@@ -171,22 +168,6 @@ def read_every(options: argparse.Namespace) -> tuple[int, int]:
     )
 
 
-def chosen_every(device: Device, what: Stream, every: int) -> int:
-    """``every``, or where that is 0 the least that the line carries, said on stderr where that is
-    not every frame."""
-    from eitskin.device.bandwidth import carried_every
-
-    if every:
-        return every
-    carried = carried_every(device, what)
-    if carried > 1:
-        kinds = ",".join(kind for kind in KINDS if what & type(what)[kind.upper()])
-        say(
-            f"the line carries one frame in {carried} of {kinds}; name another number with  --every"
-        )
-    return carried
-
-
 def whole(name: str, value: int | None, low: int, high: int) -> int:
     """``value`` (0 for None) if it lies within.
 
@@ -268,21 +249,6 @@ def read_ignored(text: str | None) -> int | None:
     return left
 
 
-def check_scan(options: argparse.Namespace) -> None:
-    """Refuse what scan, solver and reference cannot be, before a device is opened.
-
-    Raises:
-        UsageError: a number is out of range.
-    """
-    from eitskin.device.settings import check_tare_frames
-
-    read_scan(options)
-    read_solver(options)
-    named_target(options, "f767")
-    if options.tare is not None:
-        check_tare_frames(options.tare)
-
-
 def check_recording(path: Path | None, overwrite: bool) -> None:
     """Refuse a recording that could not be written, before a device is opened.
 
@@ -322,106 +288,33 @@ def say(text: str) -> None:
     print(f"eitskin: {text}", file=sys.stderr, flush=True)
 
 
-def prepare(
-    options: argparse.Namespace,
-    device: Device,
-    known: KnownModel | None,
-    *,
-    needs_reference: bool,
-    record: Path | None = None,
-    truth: SceneTruth | None = None,
-) -> Recorder | None:
-    """Scan, solver and reference as the options say; then what is to be touched begins, and
-    ``truth`` learns when. Recording begins before the reference is taken; the recorder is the
-    caller's to close.
+def session_settings(
+    options: argparse.Namespace, mode: Stream, *, record: Path | None = None, model_for: str = ""
+) -> SessionSettings:
+    """What ``add_device``, ``add_stream`` and ``add_scan`` name, checked before a device is opened.
 
     Raises:
-        EitskinError: a setting cannot be, the board refuses it, or the recording cannot be written.
+        UsageError: a number is out of range.
+        FileError: the recording could not be written.
     """
-    from eitskin.device.events import Events
-    from eitskin.device.live import begin_scene, set_up, take_reference
-    from eitskin.device.recordings.recording import Recorder
+    from eitskin.device.settings import check_tare_frames
+    from eitskin.live.session import SessionSettings
 
-    if device.transport.replays:
-        _refuse_settings(options, device.transport.name)
-        return None
-    target = named_target(options, "f767")
-    settings = (
-        read_solver(options) if target is None else _wished_solver(options, target, device, known)
+    every, frames = read_every(options)
+    check_recording(record, options.overwrite)
+    return SessionSettings(
+        mode=mode,
+        every=every,
+        frames=frames,
+        model=options.model,
+        firmware=options.firmware,
+        model_for=model_for,
+        scan=read_scan(options),
+        solver=read_solver(options),
+        target=named_target(options, "f767"),
+        tare=None if options.tare is None else check_tare_frames(options.tare),
+        record=record,
     )
-    solver = set_up(device, read_scan(options), settings, known)
-    recorder = None if record is None else Recorder(record, device, solver, overwrite=True)
-    try:
-        simulated = device.transport.synchronous
-        if (
-            options.tare is not None
-            or simulated
-            or record is not None
-            or (needs_reference and not device.board.tared)
-        ):
-            frames = TARE_FRAMES if options.tare is None else options.tare
-            if not simulated:
-                say(f"leave the skin untouched: taking the reference from {frames} frames")
-            take_reference(device, frames, streamed=record is not None)
-            if not simulated:
-                say("touch it")
-        began_us, meanwhile = begin_scene(device)
-        if truth is not None and began_us is not None:
-            truth.begin(began_us)
-        events = Events()
-        for item in meanwhile:
-            for text in events.lines(item):
-                say(text)
-    except BaseException:
-        if recorder is not None:
-            recorder.close()
-        raise
-    return recorder
-
-
-def _wished_solver(
-    options: argparse.Namespace, target: Target, device: Device, known: KnownModel | None
-) -> SolverSettings:
-    """The settings of the measured point that ``--budget`` and ``--accuracy`` choose for the
-    board's model.
-
-    Raises:
-        UsageError: no point does what is asked for.
-        DeviceError: the board's model is not known here.
-    """
-    from dataclasses import replace
-
-    from eitskin.device.known_model import need_model
-    from eitskin.device.settings import SolverSettings
-    from eitskin.tuning.for_model import chosen_point, settings_text
-    from eitskin.tuning.front import board_takes
-
-    if known is None:
-        known = need_model(device.board, options.model, device.transport.name, "a budget")
-    named = read_solver(options)
-    point = chosen_point(target, known.model, named.applied(known.model), board_takes())
-    say(settings_text(point, "f767"))
-    kept = {
-        name: value
-        for name, value in point.configuration.solver_settings.items()
-        if name in board_takes()
-    }
-    own = {name: getattr(named, name) for name in ("sign", "warm_start", "diagnostics", "track")}
-    return replace(SolverSettings(**kept), **own)
-
-
-def _refuse_settings(options: argparse.Namespace, name: str) -> None:
-    """A recording takes no settings."""
-    settings: dict[str, Any] = {**read_scan(options).named, **read_solver(options).named}
-    settings |= {
-        name: True for name in ("budget", "accuracy") if getattr(options, name) is not None
-    }
-    if settings or options.tare is not None:
-        what = next(iter(settings), "tare").replace("_", "-")
-        raise UsageError(
-            f"{name} is a recording, {what} cannot be set any more; leave the options of scan,"
-            " solver and tare out"
-        )
 
 
 def print_table(facts: dict[str, Any]) -> None:

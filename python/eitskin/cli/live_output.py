@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.device_options import say
 from eitskin.errors import EitskinError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    from eitskin.device.client import Device
-    from eitskin.device.known_model import KnownModel
-    from eitskin.device.link import LinkEvent
-    from eitskin.device.live import LiveFrame, LiveSummary
     from eitskin.device.wire.link_table import Stream
-    from eitskin.device.wire.packets import Fault
-    from eitskin.scoring.scene_truth import SceneTruth
-    from eitskin.scoring.stream_check import Watcher
+    from eitskin.live.session import Session
 
 
 def check_picture(path: Path | None, what: Stream) -> None:
@@ -42,73 +33,59 @@ def check_picture(path: Path | None, what: Stream) -> None:
     load_matplotlib()
 
 
-def show(
-    options: argparse.Namespace,
-    items: Generator[LiveFrame | Fault | LinkEvent, None, None],
-    device: Device,
-    known: KnownModel | None,
-    truth: SceneTruth | None,
-) -> LiveSummary:
-    """Print every frame and all news of ``items``, draw ``--picture``, print the summary; Ctrl-C
+def show(options: argparse.Namespace, session: Session) -> None:
+    """Print every frame and all news of ``session``, draw ``--picture``, print the summary; Ctrl-C
     ends it in good order.
 
     Raises:
         EitskinError: what ended the stream, after everything up to then was summed up.
     """
-    from eitskin.device.events import Events
-    from eitskin.device.live import LiveFrame, LiveSummary, finish
-    from eitskin.device.wire.packets import Fault
-    from eitskin.scoring.stream_check import Watcher, line, table
+    from eitskin.live.frame import Notice
+    from eitskin.live.message import encoded
+    from eitskin.scoring.stream_check import line
     from eitskin.view.stream_picture import Album, draw_stream
 
-    summary, watcher, album, events = LiveSummary(), Watcher(known, truth), Album(), Events()
-    broken: EitskinError | None = None
+    album, broken = Album(), None
+    frames = session.frames()
     try:
-        for item in items:
-            for text in events.lines(item):
-                print(f"eitskin: {text}", file=sys.stderr, flush=True)
-            if isinstance(item, LiveFrame):
-                summary.add(item)
-                seen = watcher.see(item)
-                if options.picture is not None:
-                    album.add(seen)
-                print(json.dumps(table(seen)) if options.json else line(seen), flush=True)
-            elif isinstance(item, Fault):
-                summary.faults += item.raised
+        for item in frames:
+            if isinstance(item, Notice):
+                say(item.text)
+                continue
+            if options.picture is not None:
+                album.add(item.compared)
+            print(encoded(item.message()) if options.json else line(item.compared), flush=True)
     except KeyboardInterrupt:
-        print("eitskin: stopped", file=sys.stderr)
+        say("stopped")
     except EitskinError as error:
         broken = error
-        summary.link = device.counters.as_dict()
+        session.summary.link = session.device.counters.as_dict()
     finally:
-        items.close()  # the board gets its stop before it is asked what it counted
+        frames.close()  # the board gets its stop before it is asked what it counted
     if broken is None:
-        finish(summary, device)
-    if options.picture is not None and album.count and known is not None:
-        draw_stream(
-            options.picture,
-            known.model,
-            album,
-            title=f"{device.board.board} {device.transport.url}",
-        )
-    if summary.frames or broken is None:
-        _print_summary(summary, watcher, options)
+        session.finish()
+    if options.picture is not None and album.count and session.known is not None:
+        board, url = session.device.board.board, session.device.transport.url
+        draw_stream(options.picture, session.known.model, album, title=f"{board} {url}")
+    if session.summary.frames or broken is None:
+        _print_summary(options, session)
     if broken is not None:
         raise broken
-    return summary
 
 
-def _print_summary(summary: LiveSummary, watcher: Watcher, options: argparse.Namespace) -> None:
-    scored = watcher.score.frames > 0
+def _print_summary(options: argparse.Namespace, session: Session) -> None:
+    from eitskin.live.message import encoded, summary_message
+
+    summary, score = session.summary, session.score
     drawn = str(options.picture) if options.picture is not None and summary.frames else None
     if options.json:
         facts: dict[str, Any] = summary.as_dict()
-        facts["truth"] = watcher.score.as_dict() if scored else None
-        print(json.dumps({"summary": facts | ({} if drawn is None else {"picture": drawn})}))
+        facts["truth"] = score.as_dict() if score.frames else None
+        print(encoded(summary_message(facts | ({} if drawn is None else {"picture": drawn}))))
         return
     lines = summary.lines()
-    if scored:
-        lines.append(watcher.score.text())
+    if score.frames:
+        lines.append(score.text())
     if drawn is not None:
         lines.append(f"picture: {drawn}")
     print("\n".join(lines))

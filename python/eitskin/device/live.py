@@ -3,17 +3,15 @@ everything that came of it."""
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
-
-import numpy as np
 
 from eitskin.core.results import Options
 from eitskin.device.client import Device
 from eitskin.device.known_model import NAMES_IT, KnownModel
 from eitskin.device.link import LinkEvent
+from eitskin.device.sample import Sample
 from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
 from eitskin.device.wire.explain import status_text
 from eitskin.device.wire.link_table import Stream, StreamCommand
@@ -71,7 +69,7 @@ class LiveSummary:
     faults: int = 0
     first_us: int = 0
     last_us: int = 0
-    solve_us: array[int] = field(default_factory=lambda: array("L"))
+    solve_us: Sample = field(default_factory=Sample)
     link: dict[str, int] = field(default_factory=dict)
     board: BoardStats | None = None
 
@@ -83,7 +81,7 @@ class LiveSummary:
         self.last_us = frame.time_us
         if frame.solved is not None:
             self.refused += frame.solved.status != 0
-            self.solve_us.append(frame.solved.solve_us + frame.solved.touch_us)
+            self.solve_us.add(frame.solved.solve_us + frame.solved.touch_us)
 
     @property
     def rate_hz(self) -> float | None:
@@ -95,10 +93,9 @@ class LiveSummary:
     def solve_quantiles_us(self) -> tuple[float, float] | None:
         """Median and 99th percentile; None where nothing was solved, or the board tells no times (a
         simulated one)."""
-        if not self.solve_us or not max(self.solve_us):
+        if self.solve_us.largest <= 0:
             return None
-        p50, p99 = np.percentile(np.asarray(self.solve_us), [50, 99])
-        return float(p50), float(p99)
+        return self.solve_us.quantile(0.5), self.solve_us.quantile(0.99)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -211,18 +208,20 @@ def follow(
 
 
 def put_together(
-    items: Iterator[Any], what: Stream
+    items: Iterator[Any], what: Stream, clock: Clock | None = None
 ) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
-    """Frames out of a stream's packets; ``items`` is closed with it."""
+    """Frames out of a stream's packets, timed by ``clock``; ``items`` is closed with it."""
     try:
-        yield from _put_together(items, what)
+        yield from _put_together(items, what, clock or Clock())
     finally:
         if isinstance(items, Generator):
             items.close()
 
 
-def _put_together(items: Iterator[Any], what: Stream) -> Iterator[LiveFrame | Fault | LinkEvent]:
-    clock, wanted = _Clock(), bin(what).count("1")
+def _put_together(
+    items: Iterator[Any], what: Stream, clock: Clock
+) -> Iterator[LiveFrame | Fault | LinkEvent]:
+    wanted = bin(what).count("1")
     parts: dict[str, Any] = {}
     number: int | None = None
     for item in items:
@@ -266,7 +265,7 @@ def replayed(
 _KINDS = {RawFrame: "raw", SolvedImage: "image", SolvedTouches: "touches"}
 
 
-class _Clock:
+class Clock:
     """The board's clock, which wraps after 71 minutes, as one that does not."""
 
     def __init__(self) -> None:
@@ -282,7 +281,7 @@ class _Clock:
         return self._elapsed_us
 
 
-def _frame(clock: _Clock, parts: dict[str, Any]) -> LiveFrame:
+def _frame(clock: Clock, parts: dict[str, Any]) -> LiveFrame:
     first = next(iter(parts.values()))
     board_us = first.time_us if isinstance(first, RawFrame) else first.solved.time_us
     return LiveFrame(first.frame, clock.elapsed_us(board_us), board_us, **parts)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame
-from eitskin.device.wire.packets import Fault
+from eitskin.device.sample import Sample
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.random_touches import TrueTouch
@@ -20,7 +17,6 @@ from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.skin.skin import size_to_paper
 
 FloatArray = npt.NDArray[np.float64]
-Live: TypeAlias = Generator[LiveFrame | Fault | LinkEvent, None, None]
 WRAP_US = 2**32
 LOOKED_FOR = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 
@@ -68,18 +64,6 @@ class SceneTruth:
         return match([(t.x_mm, t.y_mm) for t in true], found_mm, self.gate_mm)
 
 
-def until_over(items: Iterator[LiveFrame | Fault | LinkEvent], truth: SceneTruth | None) -> Live:
-    """``items`` until the scene is over; an emulated board would hold its last frame for ever."""
-    try:
-        for item in items:
-            if truth is not None and isinstance(item, LiveFrame) and truth.over(item.board_us):
-                return
-            yield item
-    finally:
-        if isinstance(items, Generator):
-            items.close()
-
-
 def truth_of(url: str, sign: str = "increase") -> SceneTruth | None:
     """The truth of a simulated or emulated board's scene; None for any other device. Raises as
     ``scene_of``."""
@@ -99,14 +83,14 @@ def scene_of(url: str) -> Scene | None:
 
 @dataclass
 class TruthScore:
-    """Matchings of many frames, added up: touches found and not, false ones, and every position
-    error in mm."""
+    """Matchings of many frames, added up: touches found and not, false ones, and position
+    errors in mm."""
 
     frames: int = 0
     found: int = 0
     missed: int = 0
     false_touches: int = 0
-    errors_mm: list[float] = field(default_factory=list)
+    errors_mm: Sample = field(default_factory=Sample)
 
     def add(self, matching: Matching) -> None:
         """One frame's."""
@@ -114,18 +98,19 @@ class TruthScore:
         self.found += matching.hits
         self.missed += matching.misses
         self.false_touches += matching.false_touches
-        self.errors_mm += matching.distances_mm
+        for distance in matching.distances_mm:
+            self.errors_mm.add(distance)
 
     def as_dict(self) -> dict[str, float | int | None]:
         """For JSON; None for an error where nothing was found."""
-        some = bool(self.errors_mm)
+        some = self.errors_mm.count > 0
         return {
             "frames": self.frames,
             "true": self.found + self.missed,
             "found": self.found,
             "false": self.false_touches,
-            "position_median_mm": float(np.median(self.errors_mm)) if some else None,
-            "position_worst_mm": max(self.errors_mm) if some else None,
+            "position_median_mm": self.errors_mm.quantile(0.5) if some else None,
+            "position_worst_mm": self.errors_mm.largest if some else None,
         }
 
     def text(self) -> str:
@@ -135,7 +120,7 @@ class TruthScore:
             f"against the scene's truth: {facts['found']} of {facts['true']} touches found,"
             f" {facts['false']} false"
         )
-        if self.errors_mm:
+        if self.errors_mm.count:
             line += (
                 f"; position error median {facts['position_median_mm']:.2f} mm, worst"
                 f" {facts['position_worst_mm']:.2f} mm"

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -165,64 +164,6 @@ def _raw_text(frame: LiveFrame) -> str:
         text += f", {len(volts) - len(usable)} not usable"
     said = Counter(quality_text(int(quality)) for quality in frame.raw.quality if quality)
     return text + "".join(f", {count} {what}" for what, count in said.items())
-
-
-def table(seen: ComparedFrame) -> dict[str, Any]:
-    """A frame as JSON values; what is not finite becomes null."""
-    frame = seen.frame
-    facts: dict[str, Any] = {
-        "frame": frame.number,
-        "time_s": frame.time_us / 1e6,
-        "board_us": frame.board_us,
-    }
-    if frame.refused:
-        facts["refused"] = frame.refused
-    if frame.touches is not None:
-        facts["touches"] = [
-            asdict(t) | _error_entry(seen, k) for k, t in enumerate(frame.touches.touches)
-        ]
-    if frame.image is not None:
-        facts["image_s_per_m"] = frame.image.image.tolist()
-    if seen.view is not None:
-        facts |= {"peak_s_per_m": seen.view.peak, "peak_mm": list(seen.view.peak_mm)}
-        if seen.view.places_mm is not None:
-            listed = ({"x_mm": x, "y_mm": y} for x, y in seen.view.places_mm.tolist())
-            errors = frame.touches is None
-            facts["places"] = [
-                one | (_error_entry(seen, k) if errors else {}) for k, one in enumerate(listed)
-            ]
-    if frame.raw is not None:
-        volts = frame.raw.voltage_v.tolist()
-        facts |= {
-            "voltage_v": [v if np.isfinite(v) else None for v in volts],
-            "quality": frame.raw.quality.tolist(),
-        }
-        facts |= {"scan_us": frame.raw.scan_us, "quiet": frame.raw.quiet}
-    if frame.solved is not None:
-        facts["info"] = {
-            key: value if _finite(value) else None for key, value in frame.solved.as_dict().items()
-        }
-    if seen.true is not None:
-        facts["true"] = [true_table(t) for t in seen.true]
-    return facts
-
-
-def true_table(touch: TrueTouch) -> dict[str, float]:
-    """A true touch as JSON values."""
-    return {
-        "x_mm": touch.x_mm,
-        "y_mm": touch.y_mm,
-        "radius_mm": touch.radius_mm,
-        "contrast": touch.contrast,
-    }
-
-
-def _error_entry(seen: ComparedFrame, number: int) -> dict[str, float | None]:
-    return {} if seen.errors_mm is None else {"error_mm": seen.errors_mm.get(number)}
-
-
-def _finite(value: Any) -> bool:
-    return not isinstance(value, float) or bool(np.isfinite(value))
 
 
 def spread(frames: Sequence[ComparedFrame], most: int) -> list[ComparedFrame]:

@@ -26,6 +26,8 @@ ORDER = (
     {"scoring"},
     {"tuning", "demo"},
     {"view"},
+    {"live"},
+    {"sinks"},
     {"reconstruct"},
     {"cli"},
 )

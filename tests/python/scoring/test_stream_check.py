@@ -15,9 +15,10 @@ from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.link_table import Quality
 from eitskin.device.wire.packets import RawFrame, Solved, SolvedImage, SolvedTouches
+from eitskin.live.frame import Frame
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scoring.scene_truth import SceneTruth
-from eitskin.scoring.stream_check import Watcher, line, spread, table
+from eitskin.scoring.stream_check import Watcher, line, spread
 from small_models import prebuilt
 
 SOLVED = Solved(
@@ -58,7 +59,7 @@ def test_touches_are_paired_with_the_true_ones() -> None:
     assert text.count("off by") == 2 and "#1 (30.0, -24.0) mm" in text
     assert "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text
     assert text.endswith(" ms")
-    facts = table(seen)
+    facts = Frame(seen.frame, seen).message()
     assert [touch["error_mm"] for touch in facts["touches"]] == [
         pytest.approx(1.0),
         pytest.approx(3.0),
@@ -102,7 +103,11 @@ def test_a_moving_touch_is_where_it_is_at_the_boards_time() -> None:
 def test_a_refused_frame_says_why_and_is_not_scored() -> None:
     look = watcher()
     seen = look.see(touches(status=-5))
-    assert "refused: " in line(seen) and "refused" in table(seen) and look.score.frames == 0
+    assert (
+        "refused: " in line(seen)
+        and Frame(seen.frame, seen).message()["refused"]
+        and look.score.frames == 0
+    )
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -130,7 +135,7 @@ def test_raw_rows_that_are_missing_become_null() -> None:
     seen = Watcher(None, None).see(
         LiveFrame(3, 250_000, 9, raw=RawFrame(3, 9, 20_800, 0, volts, quality))
     )
-    facts = json.loads(json.dumps(table(seen), allow_nan=False))
+    facts = json.loads(json.dumps(Frame(seen.frame, seen).message(), allow_nan=False))
     assert facts["voltage_v"][2] is None
     assert facts["voltage_v"][0] == 1.0
     assert facts["time_s"] == 0.25

@@ -1,0 +1,34 @@
+"""A bounded memory of many numbers: quantiles of a stream that may go on for ever."""
+
+from __future__ import annotations
+
+import random
+from array import array
+
+import numpy as np
+
+SIZE = 4096
+
+
+class Sample:
+    """Of all numbers that are added at most ``size``, each with the same chance (reservoir
+    sampling, Vitter's algorithm R, the same draws in every run): up to then all of them.
+    ``count`` and ``largest`` are of all."""
+
+    def __init__(self, size: int = SIZE) -> None:
+        self._size, self._draws = size, random.Random(0)
+        self.values = array("d")
+        self.count, self.largest = 0, float("-inf")
+
+    def add(self, value: float) -> None:
+        """One more."""
+        self.count += 1
+        self.largest = max(self.largest, value)
+        if len(self.values) < self._size:
+            self.values.append(value)
+        elif (place := self._draws.randrange(self.count)) < self._size:
+            self.values[place] = value
+
+    def quantile(self, fraction: float) -> float:
+        """As numpy's; NaN where nothing was added."""
+        return float(np.quantile(self.values, fraction)) if self.values else float("nan")

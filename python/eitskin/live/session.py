@@ -1,0 +1,379 @@
+"""A session with a board: open it, set it up, take its reference, begin its scene, follow it.
+
+``eitskin stream``, ``record`` and ``replay``, ``eitskin.stream()`` and the page all follow boards
+through this.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Generator
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+from eitskin.device.bandwidth import carried_every
+from eitskin.device.client import Device
+from eitskin.device.events import Events
+from eitskin.device.known_model import KnownModel, find_model, need_model
+from eitskin.device.link import LinkEvent, Reconnect
+from eitskin.device.live import (
+    Clock,
+    LiveFrame,
+    LiveSummary,
+    begin_scene,
+    finish,
+    put_together,
+    replayed,
+    set_up,
+    take_reference,
+)
+from eitskin.device.open import open_device
+from eitskin.device.settings import ScanSettings, SolverSettings
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import Fault
+from eitskin.errors import EitskinError, UsageError
+from eitskin.live.frame import Frame, Notice
+from eitskin.scoring.scene_truth import SceneTruth, TruthScore, truth_of
+from eitskin.scoring.stream_check import Watcher
+
+if TYPE_CHECKING:
+    from eitskin.core.results import Options
+    from eitskin.device.recordings.recording import Recorder
+    from eitskin.tuning.front import Target
+
+TARE_FRAMES = 16
+KINDS = ("raw", "image", "touches")
+Item: TypeAlias = LiveFrame | Fault | LinkEvent
+Say: TypeAlias = Callable[[str], None]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class SessionSettings:
+    """What a session is to be; what is not named stays as the board has it.
+
+    Attributes:
+        mode: what is streamed.
+        every: every n-th frame; 0: as many as the line carries.
+        frames: stop after so many; 0: go on until the scene or the recording ends.
+        model: a file, where the board's model is not the prebuilt one.
+        firmware: of an emulated board.
+        model_for: what cannot do without the board's model, such as "a picture"; "": nothing.
+        tare: take the reference from so many frames; None: from 16 where that is needed.
+        target: a budget or an accuracy that chooses the solver's settings.
+        record: a new recording of every packet; an existing file is written over.
+    """
+
+    mode: Stream = Stream.TOUCHES
+    every: int = 0
+    frames: int = 0
+    model: Path | None = None
+    firmware: Path | None = None
+    model_for: str = ""
+    scan: ScanSettings = field(default_factory=ScanSettings)
+    solver: SolverSettings = field(default_factory=SolverSettings)
+    target: Target | None = None
+    tare: int | None = None
+    record: Path | None = None
+
+
+class Session:
+    """A board, set up and followed. Use it in ``with``: that opens it, takes the reference and
+    begins the scene. ``say`` gets lines for whoever looks on.
+
+    ``ask``, ``tare`` and ``stop`` may be called from any thread; all else belongs to the one that
+    iterates.
+
+    Attributes:
+        device, known, truth: the board, its model and its scene's truth, where the host has those.
+        solver: the solver's options as set; None where the board's model is not known here.
+        summary, score: what the frames amounted to so far.
+        recorder: where every packet is recorded.
+
+    Raises:
+        EitskinError: as ``open_device``; a setting cannot be, the board refuses it, or a recording
+            cannot be written.
+    """
+
+    def __init__(
+        self,
+        url: str = "auto",
+        settings: SessionSettings | None = None,
+        *,
+        say: Say = lambda text: None,
+        reconnect: Reconnect | None = None,
+    ) -> None:
+        self.url, self.settings, self._say = url, settings or SessionSettings(), say
+        self._reconnect = reconnect
+        self.known: KnownModel | None = None
+        self.truth: SceneTruth | None = None
+        self.solver: Options | None = None
+        self.recorder: Recorder | None = None
+        self.summary, self.score = LiveSummary(), TruthScore()
+        self._asked: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._stopping = threading.Event()
+
+    def __enter__(self) -> Session:
+        self.device = self._open()
+        try:
+            self._set_up()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the board and the recording; may be called twice."""
+        if self.recorder is not None:
+            self.recorder.close()
+        self.device.close()
+
+    @property
+    def name(self) -> str:
+        """The board, in a word or two."""
+        return self.device.transport.name
+
+    @property
+    def replays(self) -> bool:
+        """It is a recording: nothing can be asked of it."""
+        return self.device.transport.replays
+
+    # ---- from any thread ----
+
+    def stop(self) -> None:
+        """End after the frame that comes next."""
+        self._stopping.set()
+
+    def ask(self, action: Callable[[Device], T]) -> Future[T]:
+        """Let ``action`` talk to the board between two frames; the stream stops meanwhile."""
+        answer: Future[T] = Future()
+
+        def run() -> None:
+            if not answer.set_running_or_notify_cancel():
+                return
+            try:
+                answer.set_result(action(self.device))
+            except BaseException as error:
+                answer.set_exception(error)
+
+        self._asked.put(run)
+        return answer
+
+    def tare(self, frames: int = TARE_FRAMES) -> Future[None]:
+        """Take the reference again, from frames of the untouched skin."""
+        return self.ask(lambda device: device.tare(frames))
+
+    # ---- what comes ----
+
+    def items(self) -> Generator[Item, None, None]:
+        """Frames, faults and events of the link as they come, until the scene, the recording or the
+        number of frames is over."""
+        clock, count = Clock(), 0
+        while True:
+            again = False
+            inner = self._follow(clock, count)
+            try:
+                for item in inner:
+                    if isinstance(item, LiveFrame):
+                        if self._over(item):
+                            return
+                        count += 1
+                    yield item
+                    if self._stopping.is_set():
+                        return
+                    if not self._asked.empty():
+                        if self.replays:
+                            self._carry_out()
+                        else:
+                            again = True
+                            break
+            finally:
+                inner.close()  # the board gets its stop before anything is asked of it
+            if not again or (self.settings.frames and count >= self.settings.frames):
+                return
+            self._carry_out()
+
+    def frames(self) -> Generator[Frame | Notice, None, None]:
+        """The same as frames beside the truth and notices of what is new with them, summed up in
+        ``summary`` and ``score``."""
+        watcher, events, last = Watcher(self.known, self.truth), Events(), None
+        watcher.score = self.score
+        items = self.items()
+        try:
+            for item in items:
+                now_s = None if self.replays else time.time()
+                arrived_ns = time.monotonic_ns()
+                if isinstance(item, LiveFrame):
+                    last = item.time_us / 1e6
+                notices = [Notice(_kind(item), text, last, now_s) for text in events.lines(item)]
+                yield from notices
+                if isinstance(item, LiveFrame):
+                    self.summary.add(item)
+                    yield Frame(item, watcher.see(item), self.known, now_s, arrived_ns)
+                elif isinstance(item, Fault):
+                    self.summary.faults += item.raised
+        finally:
+            items.close()
+
+    def finish(self) -> LiveSummary:
+        """The summary, with what the link and the board counted."""
+        return finish(self.summary, self.device)
+
+    # ---- steps ----
+
+    def _open(self) -> Device:
+        from eitskin.model.eitm import load_model
+
+        how = self.settings
+        blob = load_model(how.model)[1] if how.model is not None else None
+        if how.firmware is not None and not self.url.startswith("emu:"):
+            raise UsageError(
+                f"--firmware {how.firmware}: only emu: runs an image; a board is given one with"
+                "  eitskin flash --image"
+            )
+        return open_device(self.url, model=blob, image=how.firmware, reconnect=self._reconnect)
+
+    def _set_up(self) -> None:
+        how, board = self.settings, self.device.board
+        if how.model_for:
+            self.known = need_model(board, how.model, self.name, how.model_for)
+        else:
+            self.known = find_model(board, how.model, self.name)
+        if self.replays:
+            self._refuse_settings()
+            self.truth = _recorded_truth(self.url) if self._solves else None
+            return
+        self.truth = truth_of(self.url, how.solver.sign or "increase")
+        self.solver = set_up(self.device, how.scan, self._solver_settings(), self.known)
+        if how.record is not None:
+            from eitskin.device.recordings.recording import Recorder
+
+            self.recorder = Recorder(how.record, self.device, self.solver, overwrite=True)
+        self._take_reference()
+        began_us, meanwhile = begin_scene(self.device)
+        if self.truth is not None and began_us is not None:
+            self.truth.begin(began_us)
+        events = Events()
+        for item in meanwhile:
+            for text in events.lines(item):
+                self._say(text)
+        self._every = how.every or self._carried()
+
+    @property
+    def _solves(self) -> bool:
+        return bool(self.settings.mode & (Stream.IMAGE | Stream.TOUCHES))
+
+    def _take_reference(self) -> None:
+        how, simulated = self.settings, self.device.transport.synchronous
+        recorded = self.recorder is not None
+        needed = self._solves and not self.device.board.tared
+        if how.tare is None and not (simulated or recorded or needed):
+            return
+        frames = TARE_FRAMES if how.tare is None else how.tare
+        if not simulated:
+            self._say(f"leave the skin untouched: taking the reference from {frames} frames")
+        take_reference(self.device, frames, streamed=recorded)
+        if not simulated:
+            self._say("touch it")
+
+    def _solver_settings(self) -> SolverSettings:
+        """As named; with a target those of the measured point that it chooses."""
+        named, target = self.settings.solver, self.settings.target
+        if target is None:
+            return named
+        from eitskin.tuning.for_model import chosen_point, settings_text
+        from eitskin.tuning.front import board_takes
+
+        known = self.known
+        if known is None:
+            known = need_model(self.device.board, self.settings.model, self.name, "a budget")
+        point = chosen_point(target, known.model, named.applied(known.model), board_takes())
+        self._say(settings_text(point, target.board))
+        kept = {
+            name: value
+            for name, value in point.configuration.solver_settings.items()
+            if name in board_takes()
+        }
+        own = {key: getattr(named, key) for key in ("sign", "warm_start", "diagnostics", "track")}
+        return replace(SolverSettings(**kept), **own)
+
+    def _refuse_settings(self) -> None:
+        """A recording takes no settings."""
+        how = self.settings
+        named: dict[str, Any] = {**how.scan.named, **how.solver.named}
+        if how.target is not None:
+            named["budget or accuracy"] = True
+        if named or how.tare is not None:
+            what = next(iter(named), "tare").replace("_", "-")
+            raise UsageError(
+                f"{self.name} is a recording, {what} cannot be set any more; leave the options of"
+                " scan, solver and tare out"
+            )
+        if how.record is not None:
+            raise UsageError(f"{self.name} is a recording already; copy the file")
+
+    def _carried(self) -> int:
+        """Every how manieth frame the line carries."""
+        mode = self.settings.mode
+        carried = carried_every(self.device, mode)
+        if carried > 1:
+            kinds = ",".join(kind for kind in KINDS if mode & Stream[kind.upper()])
+            self._say(
+                f"the line carries one frame in {carried} of {kinds}; name another number with"
+                "  --every"
+            )
+        return carried
+
+    def _follow(self, clock: Clock, count: int) -> Generator[Item, None, None]:
+        how = self.settings
+        if self.replays:
+            return replayed(self.device, how.mode, every=how.every or 1, frames=how.frames)
+        frames = max(how.frames - count, 1) if how.frames else 0
+        stream = self.device.stream(how.mode, every=self._every, frames=frames)
+        return put_together(stream, how.mode, clock)
+
+    def _over(self, frame: LiveFrame) -> bool:
+        """The scene has ended; an emulated board would hold its last frame for ever."""
+        if self.settings.frames or self.truth is None:
+            return False
+        return self.truth.over(frame.board_us)
+
+    def _carry_out(self) -> None:
+        with suppress(queue.Empty):
+            while True:
+                self._asked.get_nowait()()
+
+
+def _kind(item: Item) -> str:
+    if isinstance(item, LinkEvent):
+        return "link"
+    return "fault" if isinstance(item, Fault) else "diagnostic"
+
+
+def _recorded_truth(url: str) -> SceneTruth | None:
+    """Of the scene that the recorded board saw, where that is still to be found."""
+    from eitskin.device.recordings.recording import read_head, recorded_options
+    from eitskin.scoring.matching import match
+
+    path = url.partition(":")[2]
+    solver = recorded_options(path)
+    try:
+        match([], [])  # scipy, which every comparison with the truth needs
+        was = str(read_head(path).get("url", ""))
+        return truth_of(was, "increase" if solver is None else solver.sign)
+    except EitskinError:
+        return None
