@@ -47,10 +47,11 @@ changed_since() {
         -type d \( -name __pycache__ -o -name build -o -name '*.egg-info' \) -prune -o -newer "$1" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
 }
 
-# pip_install ARGUMENTS...: pip, with a plain line for each package and for what is compiled.
+# pip_install ARGUMENTS...: pip, with a plain line for each package and for what is compiled. Python compiles each module when
+# it is first imported: most of them never are.
 pip_install() {
     {
-        "$venv/bin/python" -m pip install --progress-bar off --disable-pip-version-check "$@" &&
+        "$venv/bin/python" -m pip install --no-compile --progress-bar off --disable-pip-version-check "$@" &&
             touch "$venv/pip-done"
     } | while read -r word name rest; do
         case "$word $name $rest" in

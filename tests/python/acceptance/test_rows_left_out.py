@@ -29,6 +29,8 @@ from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt
 
 SCENES = 160
+# scripts/test has the first 48, scripts/test --all all of them
+some_and_all = pytest.mark.parametrize("count", [48, SCENES])
 # what an electrode costs differs from set to set: .024 here, .028 on the training set, .031 on a
 # third
 SEED = 78
@@ -53,10 +55,11 @@ class Case:
 
 
 @cache
-def cases() -> tuple[Case, ...]:
-    """Every scene, simulated nonlinearly."""
+def cases(count: int) -> tuple[Case, ...]:
+    """The first ``count`` scenes, simulated nonlinearly."""
     skin, mesh_cache, made = paper_skin(), MeshCache(), []
-    for k, scene in enumerate(random_touches(skin.outline, SEED, SCENES, "faults").scenes):
+    scenes = random_touches(skin.outline, SEED, SCENES, "faults").scenes
+    for k, scene in enumerate(scenes[:count]):
         electrode = k % ELECTRODES
         touches = [
             {
@@ -148,10 +151,10 @@ def left_out_rows() -> LeftOutRows:
 NONE_OUT = np.zeros(208, dtype=np.bool_)
 
 
-def scores(left_out_rows: LeftOutRows, electrodes: int) -> FloatArray:
+def scores(left_out_rows: LeftOutRows, electrodes: int, count: int) -> FloatArray:
     """Mean scores of image and discs with so many electrodes out, the first of them truly off."""
     found = []
-    for case in cases():
+    for case in cases(count):
         out = (
             rows_of(*((case.electrode + 5 * k) % ELECTRODES for k in range(electrodes)))
             if electrodes
@@ -163,16 +166,19 @@ def scores(left_out_rows: LeftOutRows, electrodes: int) -> FloatArray:
     return np.asarray(np.mean(found, axis=0))
 
 
-def test_a_detached_electrode(left_out_rows: LeftOutRows) -> None:
-    whole, damaged = scores(left_out_rows, 0), scores(left_out_rows, 1)
+@some_and_all
+def test_a_detached_electrode(left_out_rows: LeftOutRows, count: int) -> None:
+    whole, damaged = scores(left_out_rows, 0, count), scores(left_out_rows, 1, count)
     loss = whole - damaged
     print(f"whole {whole}, an electrode off {damaged}, loss {loss}")
-    assert whole[0] >= 0.84 and whole[1] >= 0.88
-    assert loss.max() <= MAX_LOSS
+    slack = 0.0 if count == SCENES else 0.01  # a mean of fewer scenes says less
+    assert whole[0] >= 0.84 - slack and whole[1] >= 0.88
+    assert loss.max() <= MAX_LOSS + slack
 
 
-def test_each_further_electrode_costs_a_little(left_out_rows: LeftOutRows) -> None:
-    found = np.array([scores(left_out_rows, electrodes) for electrodes in range(4)])
+@some_and_all
+def test_each_further_electrode_costs_a_little(left_out_rows: LeftOutRows, count: int) -> None:
+    found = np.array([scores(left_out_rows, electrodes, count) for electrodes in range(4)])
     print(found)
     steps = -np.diff(found, axis=0)
     assert (steps > 0).all()
@@ -180,28 +186,29 @@ def test_each_further_electrode_costs_a_little(left_out_rows: LeftOutRows) -> No
     assert (found[3] >= (0.70, 0.78)).all()
 
 
-def test_a_few_lost_rows_cost_next_to_nothing(left_out_rows: LeftOutRows) -> None:
+@some_and_all
+def test_a_few_lost_rows_cost_next_to_nothing(left_out_rows: LeftOutRows, count: int) -> None:
     """Both of a reciprocal pair: one alone stands for both."""
     fold, generator = prebuilt()[0].fold, np.random.default_rng(SEED)
-    whole = scores(left_out_rows, 0)
-    for count, most in ((1, 0.004), (10, 0.008), (20, 0.012)):
+    whole = scores(left_out_rows, 0, count)
+    for rows, most in ((1, 0.004), (10, 0.008), (20, 0.012)):
         found = []
-        for case in cases():
-            lost = generator.choice(len(fold.first), count, replace=False)
+        for case in cases(count):
+            lost = generator.choice(len(fold.first), rows, replace=False)
             out = NONE_OUT.copy()
             out[fold.first[lost]] = out[fold.second[lost]] = True
             found.append(left_out_rows.score(case, case.whole_v, out))
         mean = np.mean(found, axis=0)
         loss = whole - mean
-        print(count, mean, loss)
-        assert loss.max() <= most, count
+        print(rows, mean, loss)
+        assert loss.max() <= most, rows
 
 
 def test_no_touch_is_seen_where_there_is_none(left_out_rows: LeftOutRows) -> None:
     """Quiet frames after the reference, an electrode's rows lost: as few pass the gate as with all
     rows."""
     seen = {0: 0, 1: 0}
-    for case in cases()[:64]:
+    for case in cases(48):
         left_out_rows.reconstructor.tare(case.quiet_v[: QUIET - 4])
         for electrodes in seen:
             out = rows_of(case.electrode) if electrodes else NONE_OUT
