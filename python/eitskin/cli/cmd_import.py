@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add the command."""
     parser = subparsers.add_parser(
         "import",
-        help="turn a CSV, NPZ or MAT file of measured voltages into a frames file",
+        help="turn a text, NPY, NPZ or MAT file of measured voltages into a frames file",
         description=(
-            "Turn a CSV, NPZ or MAT file of measured voltages into a frames file, in the protocol's"
-            " order, signed, in volts. Run  eitskin doctor SOURCE  first to learn which options it"
-            " needs."
+            "Turn a text, NPY, NPZ or MAT file of measured voltages into a frames file, in the"
+            " protocol's order, signed, in volts. Run  eitskin doctor SOURCE  first to learn which"
+            " options it needs."
         ),
     )
-    option(parser, "source", "CSV or other text table, NPZ, MAT, or a frames file to repair", Path)
+    option(parser, "source", "CSV or other text, NPY, NPZ, MAT, or a frames file to repair", Path)
     option(parser, "-o --output OUT.npz", "frames file to write", Path, required=True)
     option(parser, "--json", "say what was written as JSON")
     add_import_options(parser)
@@ -47,7 +48,10 @@ def run(options: argparse.Namespace) -> int:
         "touches": 0 if frames.touch_frame is None else len(frames.touch_frame),
         "masks": frames.truth_mask is not None,
         "unit": frames.meta["unit"],
+        "notes": list(frames.meta.get("notes", ())),
     }
+    for note in said["notes"]:
+        print(f"eitskin: {options.source}: {note}", file=sys.stderr)
     if options.json:
         print(json.dumps(said))
         return 0

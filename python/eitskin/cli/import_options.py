@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from eitskin.skin.protocol import Protocol
     from eitskin.skin.skin import Skin
 
+PAIRS = ("real-imag", "magnitude-degrees", "magnitude-radians")
 ORDERS = ("fixed", "rotating", "fixed-all", "rotating-all", "table")
 
 
@@ -159,20 +160,29 @@ def _add_protocol(group: Any) -> None:
 def _add_place(group: Any) -> None:
     option(group, "--voltage KEY", "NPZ, MAT: array of the frames")
     option(group, "--reference KEY", "NPZ, MAT: array of the quiet frame or frames")
-    option(group, "--columns LIST", "text: columns of the voltages, from 0 or by name: 2 or 1:209")
+    option(
+        group, "--columns LIST", "text: the voltages' columns, from 0: 2, 1:209, 0:416:2, or names"
+    )
     option(group, "--reference-columns LIST", "text: columns of the quiet frames")
     option(group, "--reference-frames LIST", "which of the frames are the quiet ones, as in 0:20")
     option(group, "--names KEY", "NPZ, MAT: array of the frames' names")
     option(group, "--time KEY", "array or column of the frames' times in s")
-    layouts = ("auto", "frames-in-rows", "channels-in-rows")
-    option(group, "--layout", "needed only where both sides fit", choices=layouts, default="auto")
+    option(group, "--time-scale FACTOR", "times the source's times gives seconds", default=1.0)
+    sides = ("auto", "rows", "columns")
+    option(group, "--frames-in", "needed only where both fit", choices=sides, default="auto")
     parts = ("real", "imag", "abs", "in-phase")
-    option(
-        group, "--complex-part", "of complex numbers; in text, of column pairs re,im", choices=parts
-    )
+    option(group, "--complex-part", "of complex numbers; in text, of column pairs", choices=parts)
+    option(group, "--pairs", "what column pairs are; else as the header says", choices=PAIRS)
     option(group, "--scale FACTOR", "times the source's numbers gives volts; 1 for volts", float)
-    option(group, "--delimiter WORD", "comma, semicolon, tab, bar, space, a character; else found")
+    option(
+        group,
+        "--delimiter WORD",
+        "comma, semicolon, tab, bar, space, a character, or decimals:N (none; each number has N"
+        " decimals); else found",
+    )
+    option(group, "--label WORD", "text: frames are the lines that begin with it; else found")
     option(group, "--header-rows N", "rows before the numbers; else found", int)
+    option(group, "--skip-bad-lines", "leave lines of another length than most out")
 
 
 def _add_repairs(group: Any) -> None:

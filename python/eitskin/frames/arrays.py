@@ -1,8 +1,9 @@
-"""Named arrays of .npz and .mat files, and picking one of them with an error that lists what is
+"""Named arrays of .npz, .npy and .mat files, and picking one with an error that lists what is
 there."""
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,21 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eitskin.errors import FileError, FrameError, missing_extra
+from eitskin.fileio import read_bytes
 from eitskin.frames.frames import read_npz
 
 LISTED = 40
 
 
 def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
-    """All arrays of an .npz or .mat file by name; a MATLAB struct's fields as "struct.field".
+    """All arrays of a file by name: of an .npz, of an .npy its one array as "array", of a .mat a
+    struct's fields as "struct.field".
 
     Raises:
         FileError: it cannot be read.
         MissingExtraError: a .mat file without scipy.
     """
-    return (
-        read_npz(path, "file of arrays") if Path(path).suffix.lower() == ".npz" else _read_mat(path)
-    )
+    suffix = Path(path).suffix.lower()
+    if suffix == ".npz":
+        return read_npz(path, "file of arrays")
+    return {"array": _read_npy(path)} if suffix == ".npy" else _read_mat(path)
 
 
 def pick(arrays: Mapping[str, NDArray[Any]], key: str, option: str, where: str) -> NDArray[Any]:
@@ -44,6 +48,17 @@ def listing(arrays: Mapping[str, NDArray[Any]]) -> str:
     """Names and shapes on one line."""
     shown = [f"{name} {array.shape}" for name, array in sorted(arrays.items())][:LISTED]
     return ", ".join(shown) + (" ..." if len(arrays) > LISTED else "") if shown else "no arrays"
+
+
+def _read_npy(path: str | Path) -> NDArray[Any]:
+    content = read_bytes(path, "array")
+    try:
+        return np.asarray(np.lib.format.read_array(io.BytesIO(content), allow_pickle=False))
+    except Exception:  # of a damaged file numpy raises whatever its parser meets
+        raise FileError(
+            f"{path}: not a readable .npy file of numbers: damaged, cut short, or of objects; save"
+            " it with numpy.save"
+        ) from None
 
 
 def _read_mat(path: str | Path) -> dict[str, NDArray[Any]]:

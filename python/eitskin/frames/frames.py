@@ -25,6 +25,7 @@ IntArray = NDArray[np.int64]
 
 FORMAT = "eitskin-frames"
 VERSION = 1
+FOREIGN = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".npy", ".mat")  # that import reads
 TOUCH_FIELDS = ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign")
 
 
@@ -232,8 +233,14 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
         FileError: the file cannot be read.
         FrameError: it is no frames file, a newer one, or a field is missing, unknown or wrong.
     """
-    arrays = read_npz(path, "frames file")
     where = str(path)
+    if Path(path).suffix.lower() in FOREIGN and Path(path).exists():
+        raise FrameError(
+            f"{where}: no frames file; make one of it:  eitskin import {where} -o"
+            f" {Path(path).with_suffix('.npz')}  with the options that  eitskin doctor {where} "
+            " finds"
+        )
+    arrays = read_npz(path, "frames file")
     if "format" not in arrays or str(arrays["format"]) != FORMAT:
         raise FrameError(
             f"{where}: not an eitskin frames file (its arrays:"

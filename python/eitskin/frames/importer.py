@@ -142,6 +142,7 @@ def import_frames(
         "frame_name": names,
         "meta": (
             _meta(path, options, base, skin)
+            | ({"notes": list(raw.notes)} if raw.notes else {})
             | ({} if raw.reference is not None else {"assumed": ASSUMED_QUIET})
         ),
         "allow_nonfinite": lenient,

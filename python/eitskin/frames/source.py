@@ -1,10 +1,10 @@
-"""A measured source, CSV, NPZ or MAT, read into frames of channels that still stand in the source's
-own order."""
+"""A measured source, text, NPY, NPZ or MAT, read into frames of channels that still stand in
+its own order."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.arrays import listing, pick, read_arrays
 from eitskin.frames.frames import FORMAT
+from eitskin.frames.lines import LineFormat
+from eitskin.frames.pairs import PAIRS, Paired, all_magnitudes, paired, refuse_parts, to_complex
 from eitskin.frames.tables import TextTable, chosen, read_table
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
-ARRAY_SUFFIXES = (".npz", ".mat")
-LAYOUTS = ("auto", "frames-in-rows", "channels-in-rows")
+TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+ARRAY_SUFFIXES = (".npz", ".npy", ".mat")
+FRAMES_IN = ("auto", "rows", "columns")
 COMPLEX_PARTS = ("real", "imag", "abs", "in-phase")
 
 
@@ -30,10 +32,12 @@ class SourceOptions:
     """Where in a source the frames are.
 
     NPZ and MAT: ``voltage``, ``reference``, ``names``, ``time``, ``protocol_table`` name arrays.
-    Text: ``columns`` and ``reference_columns`` choose columns ("2", "0,2", "1:209", header names),
-    ``time`` one column. ``reference_frames`` chooses quiet frames among the frames. ``scale`` turns
-    the source's numbers into volts (None: unknown, taken as 1). ``complex_part``: what to keep of
-    complex numbers; in text, columns then come in pairs re, im.
+    Text: ``columns`` and ``reference_columns`` choose columns ("2", "0,2", "1:209", "0:416:2",
+    header names), ``time`` one column, whose numbers times ``time_scale`` are seconds.
+    ``reference_frames`` chooses quiet frames among the frames. ``scale`` turns the source's numbers
+    into volts (None: unknown, taken as 1). ``frames_in`` says which side of a table frames are.
+    ``complex_part``: what to keep of complex numbers; in text, columns then come in ``pairs``, one
+    of PAIRS (None: as the header says). ``delimiter``, ``label`` as in ``lines.LineFormat``.
     """
 
     voltage: str | None = None
@@ -45,11 +49,28 @@ class SourceOptions:
     time: str | None = None
     protocol_table: str | None = None
     table_base: int = 0
-    layout: str = "auto"
+    frames_in: str = "auto"
     complex_part: str | None = None
     scale: float | None = None
     delimiter: str | None = None
     header_rows: int | None = None
+    label: str | None = None
+    skip_bad_lines: bool = False
+    pairs: str | None = None
+    time_scale: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class ReadText:
+    """How the lines of a text with frames in rows were read: their form, the cells of each, which
+    of them are the channels' (in pairs the first and the second ones), which is the time."""
+
+    form: LineFormat
+    header_rows: int
+    cells: int
+    columns: tuple[int, ...]
+    pairs: str | None
+    time: int | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +79,7 @@ class RawFrames:
     where none was named.
 
     ``table`` (rows, 4) where the source has one, ``arrays`` everything an NPZ or MAT file holds.
+    ``notes``: what a user should know. ``text``: how text was read.
     """
 
     voltage: FloatArray
@@ -66,6 +88,8 @@ class RawFrames:
     time_s: FloatArray | None = None
     table: IntArray | None = None
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    text: ReadText | None = None
 
 
 def is_frames_file(path: str | Path) -> bool:
@@ -138,8 +162,9 @@ def refuse_nonfinite(raw: RawFrames, where: str) -> None:
 
 def _check_words(options: SourceOptions) -> None:
     for name, value, known in (
-        ("layout", options.layout, LAYOUTS),
+        ("frames-in", options.frames_in, FRAMES_IN),
         ("complex-part", options.complex_part, (None, *COMPLEX_PARTS)),
+        ("pairs", options.pairs, (None, *PAIRS)),
     ):
         if value not in known:
             raise UsageError(
@@ -147,6 +172,12 @@ def _check_words(options: SourceOptions) -> None:
             )
     if options.scale is not None and not (np.isfinite(options.scale) and options.scale != 0):
         raise UsageError(f"--scale {options.scale:g}: must be finite and not 0")
+    if not (np.isfinite(options.time_scale) and options.time_scale > 0):
+        raise UsageError(f"--time-scale {options.time_scale:g}: must be finite and above 0")
+    if options.pairs is not None and options.complex_part is None:
+        raise UsageError(
+            f"--pairs {options.pairs} goes with --complex-part, which says what to keep of them"
+        )
 
 
 def _refuse(options: SourceOptions, names: Iterable[str], kind: str) -> None:
@@ -159,7 +190,13 @@ def _from_text(
     path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
 ) -> RawFrames:
     _refuse(options, ("voltage", "reference", "names", "protocol_table"), "text")
-    table = read_table(path, options.delimiter, options.header_rows)
+    table = read_table(
+        path,
+        options.delimiter,
+        options.header_rows,
+        options.label,
+        skip_bad_lines=options.skip_bad_lines,
+    )
     quiet = _columns(table, options.reference_columns, "--reference-columns")
     time = _columns(table, options.time, "--time")
     columns = _columns(table, options.columns, "--columns")
@@ -167,14 +204,13 @@ def _from_text(
         columns = tuple(
             k for k in range(table.n_columns) if k not in (quiet or ()) and k not in (time or ())
         )
+    notes = list(table.notes)
     where = f"{path}: {len(table.cells)} rows, {len(columns)} chosen columns"
-    values = _paired(table.numbers(columns), options.complex_part, "--columns")
-    reference = (
-        None
-        if quiet is None
-        else _paired(table.numbers(quiet), options.complex_part, "--reference-columns")
-    )
-    in_rows = _frames_in_rows(values.shape, row_counts, options.layout, where, asked)
+    values, pairs = _numbers(table, columns, options, "--columns", notes)
+    reference = None
+    if quiet is not None:
+        reference, _ = _numbers(table, quiet, options, "--reference-columns", notes)
+    in_rows = _frames_in_rows(values.shape, row_counts, options.frames_in, where, asked)
     if in_rows and quiet is not None:
         raise UsageError(
             "--reference-columns needs channels in rows; where frames are rows use"
@@ -187,15 +223,60 @@ def _from_text(
     names: tuple[str, ...] = ()
     if not in_rows and table.header and options.complex_part is None:
         names = tuple(table.header[k] for k in columns)
-    times = None if time is None else table.numbers(time)[:, 0]
-    return _finish(values, reference, names, times, None, {}, options)
+    read = None
+    if in_rows:
+        order = columns if pairs is None else _interleaved(columns, pairs)
+        how = None if pairs is None else pairs.how
+        at = None if time is None else time[0]
+        read = ReadText(table.form, table.header_rows, table.n_columns, order, how, at)
+    times = None if time is None else table.numbers(time)[:, 0] * options.time_scale
+    if times is not None and np.iscomplexobj(times):
+        raise FrameError(f"{path}: --time {options.time}: the times are complex numbers")
+    raw = _finish(values, reference, names, times, None, {}, options)
+    return replace(raw, notes=tuple(dict.fromkeys(notes)), text=read)
+
+
+def _numbers(
+    table: TextTable,
+    columns: tuple[int, ...],
+    options: SourceOptions,
+    option: str,
+    notes: list[str],
+) -> tuple[NDArray[Any], Paired | None]:
+    """The chosen columns as numbers, pairs as complex ones, and how they were pairs."""
+    values = table.numbers(columns)
+    names = tuple(table.header[k] for k in columns) if table.header else ()
+    if options.complex_part is None:
+        refuse_parts(names, option)
+        if all_magnitudes(names):
+            notes.append(
+                "the header calls the columns magnitudes; --sign magnitude gives them signs"
+            )
+        return values, None
+    if np.iscomplexobj(values):
+        return values, None
+    pairs = paired(names, values, options.pairs, option)
+    return to_complex(values, pairs), pairs
+
+
+def _interleaved(columns: tuple[int, ...], pairs: Paired) -> tuple[int, ...]:
+    """The columns of ``pairs``, first and second by turns."""
+    both = zip(pairs.first, pairs.second, strict=True)
+    return tuple(columns[k] for pair in both for k in pair)
 
 
 def _from_arrays(
     path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
 ) -> RawFrames:
-    _refuse(options, ("columns", "reference_columns", "delimiter", "header_rows"), "NPZ or MAT")
+    kind = Path(path).suffix[1:].upper()
+    _refuse(
+        options,
+        ("columns", "reference_columns", "delimiter", "header_rows", "label", "pairs"),
+        kind,
+    )
     arrays, where = read_arrays(path), str(path)
+    if options.voltage is None and list(arrays) == ["array"]:
+        options = replace(options, voltage="array")
     if options.voltage is None:
         raise UsageError(
             f"{where}: say with --voltage KEY which array holds the frames; it holds"
@@ -207,14 +288,16 @@ def _from_arrays(
         table = electrode_table(given, options.table_base, f"{where}: {options.protocol_table}")
         row_counts, asked = (len(table),), f"its table {options.protocol_table}"
     voltage, in_rows = _frames_of(
-        arrays, options.voltage, "--voltage", row_counts, options.layout, where, asked
+        arrays, options.voltage, "--voltage", row_counts, options.frames_in, where, asked
     )
     reference = None
     if options.reference is not None:
-        layout = options.layout if in_rows is None else LAYOUTS[1] if in_rows else LAYOUTS[2]
+        frames_in = (
+            options.frames_in if in_rows is None else FRAMES_IN[1] if in_rows else FRAMES_IN[2]
+        )
         counts = (voltage.shape[1],)
         reference, _ = _frames_of(
-            arrays, options.reference, "--reference", counts, layout, where, "the frames"
+            arrays, options.reference, "--reference", counts, frames_in, where, "the frames"
         )
     names: tuple[str, ...] = ()
     if options.names is not None:
@@ -261,6 +344,11 @@ def _finish(
         phase = _common_phase(voltage[:1] if reference is None else reference)
         voltage = _part(voltage, options.complex_part, phase)
         reference = None if reference is None else _part(reference, options.complex_part, phase)
+    elif options.complex_part is not None:
+        raise UsageError(
+            f"--complex-part {options.complex_part}: the numbers are real; leave it out, and where"
+            " they are magnitudes say --sign magnitude"
+        )
     factor = 1.0 if options.scale is None else options.scale
     return RawFrames(
         voltage=np.asarray(voltage, dtype=np.float64) * factor,
@@ -289,25 +377,12 @@ def _part(values: NDArray[Any], part: str, phase: float) -> FloatArray:
     )
 
 
-def _paired(values: NDArray[Any], complex_part: str | None, option: str) -> NDArray[Any]:
-    """Columns (rows, 2c) re, im as complex (rows, c), where a complex part is asked for and the
-    cells are real."""
-    if complex_part is None or np.iscomplexobj(values):
-        return values
-    if values.shape[1] % 2:
-        raise UsageError(
-            f"{option}: with --complex-part columns come in pairs re,im; {values.shape[1]} are"
-            " named"
-        )
-    return np.asarray(values[:, 0::2] + 1j * values[:, 1::2])
-
-
 def _frames_of(
     arrays: Mapping[str, NDArray[Any]],
     key: str,
     option: str,
     row_counts: tuple[int, ...],
-    layout: str,
+    frames_in: str,
     where: str,
     asked: str,
 ) -> tuple[NDArray[Any], bool | None]:
@@ -323,25 +398,23 @@ def _frames_of(
         raise FrameError(
             f"{where}: must be (frames, channels) or (channels,); {_wanted(row_counts, asked)}"
         )
-    in_rows = _frames_in_rows(values.shape, row_counts, layout, where, asked)
+    in_rows = _frames_in_rows(values.shape, row_counts, frames_in, where, asked)
     return values if in_rows else values.T, in_rows
 
 
 def _frames_in_rows(
-    shape: tuple[int, ...], row_counts: tuple[int, ...], layout: str, where: str, asked: str
+    shape: tuple[int, ...], row_counts: tuple[int, ...], frames_in: str, where: str, asked: str
 ) -> bool:
     rows, columns = (side in row_counts for side in shape)
-    if layout == "auto":
+    if frames_in == "auto":
         if rows and columns:
-            raise UsageError(
-                f"{where}: both sides fit; say --layout frames-in-rows or channels-in-rows"
-            )
+            raise UsageError(f"{where}: both sides fit; say --frames-in rows or columns")
         if rows or columns:
             return columns
         raise FrameError(f"{where}: {_wanted(row_counts, asked)}")
-    in_rows = layout == "frames-in-rows"
+    in_rows = frames_in == "rows"
     if not (columns if in_rows else rows):
-        raise FrameError(f"{where}: with --layout {layout} {_wanted(row_counts, asked)}")
+        raise FrameError(f"{where}: with --frames-in {frames_in} {_wanted(row_counts, asked)}")
     return in_rows
 
 

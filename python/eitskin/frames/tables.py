@@ -1,8 +1,9 @@
-"""Text tables of numbers as instruments write them: delimiter, header, decimal comma found, bad
-cells named."""
+"""Text tables of numbers as instruments write them: delimiter, header, label, decimal comma found,
+bad cells named."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,21 +14,24 @@ from numpy.typing import NDArray
 
 from eitskin.errors import FrameError, UsageError
 from eitskin.fileio import read_bytes
+from eitskin.frames.lines import DELIMITERS, LineFormat, LineReader, Row, own_labels, parse_cell
 
-DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": None}
-COMMENT = ("#", "%")
 SNIFFED_LINES = 50
+LONGEST = 200  # of a list in a message, in characters
 
 
 @dataclass(frozen=True)
 class TextTable:
     """A table still as text: ``cells`` in rows of equal length, each row's ``line`` (from 1),
-    ``header`` names."""
+    ``header`` names, the ``form`` of its lines, ``notes`` on lines that were left out."""
 
     path: str
     cells: tuple[tuple[str, ...], ...]
     line: tuple[int, ...]
     header: tuple[str, ...]
+    form: LineFormat
+    header_rows: int = 0
+    notes: tuple[str, ...] = ()
 
     @property
     def n_columns(self) -> int:
@@ -59,78 +63,115 @@ class TextTable:
 
 
 def read_table(
-    path: str | Path, delimiter: str | None = None, header_rows: int | None = None
+    path: str | Path,
+    delimiter: str | None = None,
+    header_rows: int | None = None,
+    label: str | None = None,
+    *,
+    skip_bad_lines: bool = False,
 ) -> TextTable:
-    """Read a text table. ``delimiter``: a name of DELIMITERS or a character; None finds it, as it
-    does ``header_rows``.
+    """Read a text table. ``delimiter`` and ``label`` as in ``LineFormat``; None finds them, as it
+    does ``header_rows``. ``skip_bad_lines`` leaves lines of another length than most out.
 
     Empty lines and lines that begin with # or % are passed over.
 
     Raises:
         FileError: the file cannot be read.
-        UsageError: the delimiter is not one.
+        UsageError: the delimiter is not one, or there are several labels.
         FrameError: it is no text, holds no rows, or its rows differ in length.
     """
     content = read_bytes(path, "table")
     if b"\0" in content[:4096]:
         raise FrameError(f"{path}: not a text table (it holds zero bytes); save it as CSV in UTF-8")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1)]
-    lines = [
-        (number, line)
-        for number, line in lines
-        if line.strip() and not line.lstrip().startswith(COMMENT)
-    ]
-    if not lines:
-        raise FrameError(f"{path}: the table has no rows")
-    separator = (
-        _sniffed([line for _, line in lines]) if delimiter is None else _separator(delimiter)
-    )
-    rows = [(number, _split(line, separator)) for number, line in lines]
-    if all(len(cells) > 1 and not cells[-1] for _, cells in rows):
-        rows = [(number, cells[:-1]) for number, cells in rows]  # every line ends in a delimiter
-    skip = _header_length([cells for _, cells in rows]) if header_rows is None else header_rows
-    body = rows[skip:]
+    lines = list(enumerate(decoded(content).splitlines(), 1))
+    form = _found_form([line for _, line in lines], delimiter, label, str(path))
+    reader = LineReader(form)
+    rows = [row for number, line in lines for row in reader.feed(number, line)] + reader.finish()
+    if not rows:
+        said = "" if form.label is None else f" that begin with {form.label!r}"
+        raise FrameError(f"{path}: the table has no rows{said}")
+    notes = []
+    if reader.passed_over:
+        notes.append(f"{reader.passed_over} lines without the label {form.label!r} passed over")
+    skip = _header_length([row.cells for row in rows]) if header_rows is None else header_rows
+    body = _without_ends(rows[skip:])
     if not body:
         raise FrameError(
             f"{path}: no rows of numbers after {skip} header row(s); check the delimiter"
         )
-    width = len(body[0][1])
-    for number, cells in body:
-        if len(cells) != width:
+    if skip_bad_lines:
+        body = _even(body, notes)
+    width = len(body[0].cells)
+    for row in body:
+        if len(row.cells) != width:
             raise FrameError(
-                f"{path}: line {number} has {len(cells)} cells, line {body[0][0]} has {width};"
-                " repair it"
+                f"{path}: line {row.line} has {len(row.cells)} cells, line {body[0].line} has"
+                f" {width}; repair it, or leave such lines out with --skip-bad-lines"
             )
-    header = rows[skip - 1][1] if skip and len(rows[skip - 1][1]) == width else ()
+    names = rows[skip - 1].cells if skip else ()
+    if len(names) == width + 1 and not names[-1]:
+        names = names[:-1]
     return TextTable(
-        str(path), tuple(cells for _, cells in body), tuple(number for number, _ in body), header
+        str(path),
+        tuple(row.cells for row in body),
+        tuple(row.line for row in body),
+        names if len(names) == width else (),
+        form,
+        skip,
+        tuple(notes),
     )
 
 
-def parse_cell(cell: str) -> complex | None:
-    """The number in ``cell`` (real, complex with i or j, decimal comma), or None."""
-    for text in (
-        cell,
-        cell.replace(",", ".") if cell.count(",") == 1 and "." not in cell else cell,
-    ):
-        try:
-            return float(text)
-        except ValueError:
-            pass
-        try:
-            return complex(text.replace(" ", "").replace("i", "j"))
-        except ValueError:
-            pass
-    return None
+def decoded(content: bytes) -> str:
+    """Text as instruments write it: UTF-8, else Latin-1."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+def _found_form(
+    lines: Sequence[str], delimiter: str | None, label: str | None, where: str
+) -> LineFormat:
+    """The form of ``lines``; what is None is found."""
+    plain = LineFormat("comma" if delimiter is None else delimiter)
+    lines = [line for line in lines if not plain.passed_over(line)]
+    if label is None and (found := own_labels(lines)):
+        if len(found) > 1:
+            counted = ", ".join(f"{name!r} ({count})" for name, count in found.items())
+            raise UsageError(
+                f"{where}: lines begin with {_cut(counted)}; say with --label which are the frames"
+            )
+        label = next(iter(found))
+    if label is not None:
+        lines = [
+            rest for line in lines if (rest := LineFormat(plain.delimiter, label).labelled(line))
+        ]
+    return LineFormat(_sniffed(lines) if delimiter is None else delimiter, label)
+
+
+def _without_ends(rows: list[Row]) -> list[Row]:
+    """Without the last cell where every line ends in a delimiter."""
+    if rows and all(len(row.cells) > 1 and not row.cells[-1] for row in rows):
+        return [Row(row.line, row.cells[:-1]) for row in rows]
+    return rows
+
+
+def _even(rows: list[Row], notes: list[str]) -> list[Row]:
+    """The rows of the length that most have; what is left out is noted."""
+    width = Counter(len(row.cells) for row in rows).most_common(1)[0][0]
+    bad = [row for row in rows if len(row.cells) != width]
+    if bad:
+        notes.append(
+            f"{len(bad)} lines left out that have not {width} cells, first line {bad[0].line} with"
+            f" {len(bad[0].cells)}"
+        )
+    return [row for row in rows if len(row.cells) == width]
 
 
 def chosen(spec: str, count: int, names: Sequence[str], option: str) -> tuple[int, ...]:
-    """The indices that ``spec`` names among ``count``: "2", "0,2", "1:209", "3:" or names from a
-    header, by commas.
+    """The indices that ``spec`` names among ``count``: "2", "0,2", "1:209", "0:416:2", "3:" or
+    names from a header, by commas.
 
     Raises:
         UsageError: a name is not there or an index is out of range; ``option`` is named.
@@ -140,50 +181,46 @@ def chosen(spec: str, count: int, names: Sequence[str], option: str) -> tuple[in
         if part in names:
             indices.append(list(names).index(part))
             continue
-        first, colon, last = part.partition(":")
+        first, *others = part.split(":")
+        last, step_text = [*others, "", ""][:2]
         try:
-            start = int(first) if first or not colon else 0
-            stop = (int(last) if last else count) if colon else start + 1
+            if len(others) > 2:
+                raise ValueError
+            start = int(first) if first or not others else 0
+            stop = (int(last) if last else count) if others else start + 1
+            step = int(step_text) if step_text else 1
         except ValueError:
-            known = f"; names are {', '.join(names)}" if names else ""
+            known = f"; names are {_cut(', '.join(names))}" if names else ""
             raise UsageError(
-                f"{option} {spec}: {part!r} is no number, range a:b or header name{known}"
+                f"{option} {_cut(spec)}: {part!r} is no number, range a:b or a:b:step, or header"
+                f" name{known}"
             ) from None
-        if not 0 <= start < stop <= count:
-            raise UsageError(f"{option} {spec}: {part} is out of range; there are 0 to {count - 1}")
-        indices.extend(range(start, stop))
+        if not 0 <= start < stop <= count or step < 1:
+            raise UsageError(
+                f"{option} {_cut(spec)}: {part} is out of range; there are 0 to {count - 1}"
+            )
+        indices.extend(range(start, stop, step))
     return tuple(indices)
 
 
-def _separator(delimiter: str) -> str | None:
-    if delimiter in DELIMITERS:
-        return DELIMITERS[delimiter]
-    if len(delimiter) == 1:
-        return None if delimiter == " " else delimiter
-    raise UsageError(
-        f"delimiter {delimiter!r}: use one character or one of {', '.join(DELIMITERS)}"
-    )
+def _cut(text: str) -> str:
+    """``text`` for a message, not longer than a line or two."""
+    return text if len(text) <= LONGEST else f"{text[:LONGEST].rstrip(', ')}, ..."
 
 
-def _split(line: str, separator: str | None) -> tuple[str, ...]:
-    if separator is None:
-        return tuple(line.split())
-    return tuple(cell.strip().strip('"').strip() for cell in line.split(separator))
-
-
-def _sniffed(lines: Sequence[str]) -> str | None:
-    """The separator under which the most cells are numbers, then the most cells."""
+def _sniffed(lines: Sequence[str]) -> str:
+    """The delimiter under which the most cells are numbers, then the most cells."""
     sample = lines[-SNIFFED_LINES:]
 
-    def score(separator: str | None) -> tuple[float, float]:
-        rows = [_split(line, separator) for line in sample]
+    def score(delimiter: str) -> tuple[float, float]:
+        rows = [LineFormat(delimiter).split(line) for line in sample]
         cells = [cell for row in rows for cell in row]
         even = sum(len(row) == len(rows[-1]) for row in rows) / len(rows)
         return round(
             even * sum(parse_cell(cell) is not None for cell in cells) / max(len(cells), 1), 6
         ), len(cells)
 
-    return max(DELIMITERS.values(), key=score)
+    return max(DELIMITERS, key=score) if sample else "comma"
 
 
 def _header_length(rows: Sequence[Sequence[str]]) -> int:

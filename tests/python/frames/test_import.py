@@ -233,13 +233,15 @@ def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> 
     assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
     pairs = np.column_stack([quiet[0].real, quiet[0].imag, voltage[0].real, voltage[0].imag])
     np.savetxt(tmp_path / "z.csv", pairs, delimiter=",", fmt="%.17g")
-    columns = SourceOptions(columns="2,3", reference_columns="0,1", complex_part=part)
+    columns = SourceOptions(
+        columns="2,3", reference_columns="0,1", complex_part=part, pairs="real-imag"
+    )
     got = taken(tmp_path / "z.csv", source=columns)
     assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
     assert got.meta["unit"] == "unknown, taken as V"
     with pytest.raises(UsageError, match="numbers are complex; say with --complex-part"):
         taken(tmp_path / "z.npz")
-    with pytest.raises(UsageError, match="pairs re,im; 1 are named"):
+    with pytest.raises(UsageError, match="columns come in pairs; 1 are named"):
         taken(tmp_path / "z.csv", source=replace(columns, columns="2"))
 
 
@@ -349,9 +351,9 @@ def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path: Path) -> None:
         (ImportOptions(source=KEYS, sign="maybe"), adjacent(16), "--sign maybe"),
         (ImportOptions(source=replace(KEYS, scale=0.0)), adjacent(16), "--scale 0"),
         (
-            ImportOptions(source=replace(KEYS, layout="channels-in-rows")),
+            ImportOptions(source=replace(KEYS, frames_in="columns")),
             adjacent(16),
-            "--layout channels-in-rows a",
+            "--frames-in columns a",
         ),
         (
             ImportOptions(source=replace(KEYS, reference_frames="0")),
@@ -380,7 +382,7 @@ def test_foreign_and_square_sources(tmp_path: Path) -> None:
     with pytest.raises(EitskinError, match="no such table"):
         import_frames(tmp_path / "absent.csv", ImportOptions(), adjacent(16), None)
     np.savez(tmp_path / "square.npz", v=np.ones((40, 40)), r=np.ones(40), words=np.array(["a"]))
-    with pytest.raises(UsageError, match="both sides fit; say --layout"):
+    with pytest.raises(UsageError, match="both sides fit; say --frames-in rows or columns"):
         taken(tmp_path / "square.npz", adjacent(8))
     with pytest.raises(FrameError, match="holds <U1, no numbers"):
         words = ImportOptions(source=replace(KEYS, voltage="words"))

@@ -116,7 +116,7 @@ def test_mended_raw_exports_are_clean(shared_data: Path, name: str, part: str | 
     source = (
         MENDED.source
         if part is None
-        else SourceOptions("2,3", None, "2,3", "0,1", complex_part=part)
+        else SourceOptions("2,3", None, "2,3", "0,1", complex_part=part, pairs="real-imag")
     )
     source = replace(source, voltage=None)
     frames = import_frames(shared_data / name, replace(MENDED, source=source), adjacent(16), KIT4)

@@ -73,7 +73,8 @@ def test_column_choices() -> None:
         with pytest.raises(UsageError, match="out of range; there are 0 to 3"):
             chosen(bad, 4, names, "--columns")
     with pytest.raises(
-        UsageError, match="'d' is no number, range a:b or header name; names are time, a, b, c"
+        UsageError,
+        match="'d' is no number, range a:b or a:b:step, or header name; names are time, a, b, c",
     ):
         chosen("d", 4, names, "--columns")
 

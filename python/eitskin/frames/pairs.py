@@ -1,0 +1,163 @@
+"""Complex numbers in pairs of columns: real and imaginary parts, or magnitudes and phases.
+
+A header that says which is believed; where nothing says it, nothing is assumed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eitskin.errors import UsageError
+
+PAIRS = ("real-imag", "magnitude-degrees", "magnitude-radians")
+WORDS = {
+    "magnitude": "mag magn magnitude magnitudes abs ampl amplitude amplitudes modulus",
+    "phase": "phase phases phi arg argument angle theta",
+    "real": "re real",
+    "imag": "im imag imaginary",
+}
+KIND = {word: kind for kind, words in WORDS.items() for word in words.split()}
+UNITS = {"deg": "degrees", "degs": "degrees", "degree": "degrees", "degrees": "degrees"}
+UNITS |= {"°": "degrees", "rad": "radians", "rads": "radians", "radian": "radians"}
+UNITS["radians"] = "radians"
+HALVES = {"real": "real-imag", "imag": "real-imag", "magnitude": "polar", "phase": "polar"}
+MOST_RADIANS = 12.6  # two turns
+A_PART = {"imag": "an imaginary part", "phase": "a phase"}
+
+
+@dataclass(frozen=True)
+class Paired:
+    """Which of the chosen columns are first of a pair (real, magnitude) and which second, by
+    place; ``how`` is one of PAIRS."""
+
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    how: str
+
+
+def kind_of(name: str) -> str | None:
+    """What a header's ``name`` says its column is: "magnitude", "phase", "real", "imag" or None."""
+    kinds = {KIND[word] for word in _words(name) if word in KIND}
+    return kinds.pop() if len(kinds) == 1 else None
+
+
+def refuse_parts(names: Sequence[str], option: str) -> None:
+    """Refuse columns that the header calls phases or imaginary parts, where no complex part is
+    asked for.
+
+    Raises:
+        UsageError: naming the first.
+    """
+    for name in names:
+        kind = kind_of(name)
+        if kind in A_PART:
+            raise UsageError(
+                f"{option}: column {name!r} is {A_PART[kind]}, no voltage of its own; choose the"
+                " others only, or the pairs with  --complex-part in-phase"
+            )
+
+
+def all_magnitudes(names: Sequence[str]) -> bool:
+    """Whether the header calls every one of ``names`` a magnitude."""
+    return bool(names) and all(kind_of(name) == "magnitude" for name in names)
+
+
+def paired(names: Sequence[str], values: NDArray[Any], how: str | None, option: str) -> Paired:
+    """How the columns of ``values`` (rows, c), with these ``names`` (empty: no header), are pairs.
+
+    Raises:
+        UsageError: they are none, header and ``how`` disagree, or nothing says what they are.
+    """
+    count = values.shape[1]
+    if count % 2:
+        raise UsageError(f"{option}: with --complex-part columns come in pairs; {count} are named")
+    kinds = [kind_of(name) for name in names] if names else [None] * count
+    said = {HALVES[kind] for kind in kinds if kind is not None}
+    if len(said) > 1 or (said and None in kinds):
+        if how is None:
+            raise UsageError(
+                f"{option}: the header does not say of every column what it is"
+                f" ({_some(names)}); say --pairs {' | '.join(PAIRS)}"
+            )
+        said = set()
+    if not said:
+        return _by_place(values, how, option)
+    halves = ("real", "imag") if said == {"real-imag"} else ("magnitude", "phase")
+    first, second = (tuple(k for k, kind in enumerate(kinds) if kind == half) for half in halves)
+    if len(first) != len(second):
+        raise UsageError(
+            f"{option}: {len(first)} columns of {halves[0]}s and {len(second)} of {halves[1]}s"
+            " make no pairs; choose as many of each"
+        )
+    told = "real-imag" if said == {"real-imag"} else _polar([names[k] for k in second], how, option)
+    if how is not None and how != told:
+        raise UsageError(
+            f"--pairs {how}: the header says {told} ({_some(names)}); leave --pairs out, or the"
+            " header with --header-rows"
+        )
+    return _checked(values, Paired(first, second, told), option)
+
+
+def _checked(values: NDArray[Any], pairs: Paired, option: str) -> Paired:
+    """``pairs``, unless the numbers cannot be such."""
+    if pairs.how == "real-imag":
+        return pairs
+    if (values[:, list(pairs.first)] < 0).any():
+        raise UsageError(
+            f"{option}: a magnitude is below 0, so these are no pairs of magnitude and phase; say"
+            " --pairs real-imag, or choose other columns"
+        )
+    largest = np.nanmax(np.abs(values[:, list(pairs.second)]), initial=0.0)
+    if pairs.how == "magnitude-radians" and largest > MOST_RADIANS:
+        raise UsageError(
+            f"{option}: a phase of {largest:g} is no number of radians; say --pairs"
+            " magnitude-degrees"
+        )
+    return pairs
+
+
+def to_complex(values: NDArray[Any], pairs: Paired) -> NDArray[np.complex128]:
+    """Columns (rows, c) as complex (rows, c / 2)."""
+    first, second = values[:, list(pairs.first)], values[:, list(pairs.second)]
+    if pairs.how == "real-imag":
+        return np.asarray(first + 1j * second)
+    angle = np.deg2rad(second) if pairs.how == "magnitude-degrees" else second
+    return np.asarray(first * np.exp(1j * angle))
+
+
+def _by_place(values: NDArray[Any], how: str | None, option: str) -> Paired:
+    if how is None and (values[:, 0::2] < 0).any():
+        how = "real-imag"  # no magnitude is below 0
+    if how is None:
+        raise UsageError(
+            f"{option}: nothing says whether the pairs are real and imaginary parts or magnitudes"
+            f" and phases; say --pairs {' | '.join(PAIRS)}"
+        )
+    places = range(values.shape[1])
+    return _checked(values, Paired(tuple(places[0::2]), tuple(places[1::2]), how), option)
+
+
+def _polar(phases: Sequence[str], how: str | None, option: str) -> str:
+    units = {UNITS[word] for name in phases for word in _words(name) if word in UNITS}
+    if len(units) == 1:
+        return f"magnitude-{units.pop()}"
+    if how is not None and how != "real-imag":
+        return how
+    raise UsageError(
+        f"{option}: the header says magnitude and phase ({_some(phases)}), but not the phase's"
+        " unit; say --pairs magnitude-degrees or --pairs magnitude-radians"
+    )
+
+
+def _words(name: str) -> list[str]:
+    return re.findall(r"[a-z]+|°", name.lower())
+
+
+def _some(names: Sequence[str], most: int = 4) -> str:
+    return ", ".join(names[:most]) + (", ..." if len(names) > most else "")
