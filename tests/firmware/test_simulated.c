@@ -93,7 +93,11 @@ static void show(rig *r, double rate_hz)
     CHECK(sim_model(&r->sim, &bytes, &crc) == r->bank[0]);
     CHECK_EQUAL(bytes, source.model.size);
     CHECK_EQUAL(crc, source.model.crc);
-    sim_show(&r->sim, volts, UNTOUCHED, FRAMES, rate_hz);
+    float largest_v = 0;
+    for (uint32_t k = 0; k < (UNTOUCHED + FRAMES) * ROWS; ++k)
+        largest_v = fmaxf(largest_v, fabsf(volts[k]));
+    sim_show(&r->sim, largest_v, UNTOUCHED, FRAMES, rate_hz);
+    sim_put(&r->sim, volts, 0, UNTOUCHED + FRAMES);
 }
 
 /* Which of the frames it was, by the scale that each has; -1: none of them. */
@@ -113,7 +117,7 @@ static int shown(const rig *r)
 static int scan(rig *r)
 {
     const uint32_t before = r->raws;
-    sim_scan_frame(&r->sim);
+    CHECK(sim_scan_frame(&r->sim));
     collect(r);
     CHECK_EQUAL(r->raws, before + 1);
     return shown(r);
@@ -151,7 +155,7 @@ static void test_time_and_restart(void)
 {
     stream(&a, 0, 0);
     const uint64_t us = a.sim.now_us;
-    sim_scan_frame(&a.sim);
+    CHECK(sim_scan_frame(&a.sim));
     CHECK(!sim_wants_frame(&a.sim));
     CHECK_EQUAL(a.sim.now_us, us);
     const eits_command_plain reset = {.request = 500};
@@ -179,6 +183,34 @@ static void test_two_boards(void)
         CHECK_EQUAL(scan(&a), UNTOUCHED + (number < FRAMES ? number : FRAMES - 1));
         CHECK_EQUAL(scan(&b), k % UNTOUCHED);
         CHECK_EQUAL(a.head.time_us, b.head.time_us);
+    }
+}
+
+/* Frames that are put before the board one at a time give the same packets as all at once; where
+ * one is missing time stands still. */
+static void test_frames_by_and_by(void)
+{
+    start(&a, 50000);
+    start(&b, 50000);
+    stream(&a, EITS_STREAM_RAW, 0);
+    stream(&b, EITS_STREAM_RAW, 0);
+    show(&a, 20.0);
+    show(&b, 20.0);
+    sim_put(&b.sim, volts, 0, 0);
+    for (uint32_t k = 0; k < UNTOUCHED + FRAMES; ++k) {
+        if (k == UNTOUCHED) {
+            sim_begin_scene(&a.sim);
+            sim_begin_scene(&b.sim);
+        }
+        CHECK_EQUAL(scan(&a), k);
+        const uint64_t us = b.sim.now_us;
+        CHECK(!sim_scan_frame(&b.sim));
+        CHECK_EQUAL(sim_frame_wanted(&b.sim), k);
+        CHECK(b.sim.now_us == us || k == 0);
+        sim_put(&b.sim, volts + (size_t)k * ROWS, k, 1);
+        CHECK_EQUAL(scan(&b), k);
+        CHECK_EQUAL(a.head.time_us, b.head.time_us);
+        CHECK(memcmp(a.raw, b.raw, sizeof a.raw) == 0);
     }
 }
 
@@ -237,6 +269,7 @@ int main(void)
     test_frames_in_order();
     test_time_and_restart();
     test_two_boards();
+    test_frames_by_and_by();
     test_frames_given();
     bench_stop(&source);
     return checks_report("simulated");

@@ -83,8 +83,8 @@ void sim_begin_scene(sim_board *sim)
     sim->scene.begins_with_scan = true;
 }
 
-/* A scan may begin at at_us: its voltages. */
-static void choose_frame(sim_board *sim, uint64_t at_us)
+/* A scan may begin at at_us: its voltages; false where they have not been put before the board. */
+static bool choose_frame(sim_board *sim, uint64_t at_us)
 {
     sim_scene *scene = &sim->scene;
     const fw_tare *tare = &sim->instrument.tare;
@@ -97,7 +97,12 @@ static void choose_frame(sim_board *sim, uint64_t at_us)
         const uint32_t number = frame_number(scene, at_us);
         frame = scene->untouched + (number < scene->frames ? number : scene->frames - 1u);
     }
-    scene->shown = scene->volts + (size_t)frame * sim->instrument.engine.model.n_rows;
+    scene->wanted = frame;
+    if (frame < scene->first || frame - scene->first >= scene->count)
+        return false;
+    const size_t place = (size_t)(frame - scene->first) * sim->instrument.engine.model.n_rows;
+    scene->shown = scene->volts + place;
+    return true;
 }
 
 static void scan_has_begun(sim_board *sim)
@@ -172,8 +177,8 @@ static void convert(sim_board *sim, float volts)
     }
 }
 
-/* To the end of the next burst, which the application gets. */
-static void next_burst(sim_board *sim)
+/* To the end of the next burst, which the application gets; false where its frame is missing. */
+static bool next_burst(sim_board *sim)
 {
     const fw_scan *scan = &sim->instrument.scan;
     sim_converter *converter = &sim->converter;
@@ -182,8 +187,8 @@ static void next_burst(sim_board *sim)
     const bool between = scan->frame == NULL;
     const uint32_t frames = scan->frames_scanned;
     const uint64_t start_us = converter->slot_us;
-    if (between)
-        choose_frame(sim, start_us);
+    if (between && !choose_frame(sim, start_us))
+        return false;
     convert(sim, volts_now(sim));
     converter->slot_us += setup->slot_us;
     sim->now_us = start_us + ((uint64_t)setup->samples * 1000000u + setup->sample_rate_hz - 1) /
@@ -194,6 +199,7 @@ static void next_burst(sim_board *sim)
     converter->done(converter->user, &burst);
     if (between && (scan->frame != NULL || scan->frames_scanned != frames))
         scan_has_begun(sim);
+    return true;
 }
 
 /* ---- flash ---- */
@@ -356,36 +362,41 @@ const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc)
     return instrument->engine.open ? sim->bank[instrument->bank] : NULL;
 }
 
-/* The range is that of the frames, so that 16 bits are enough for any of them. */
-void sim_show(sim_board *sim, const float *volts, uint32_t untouched, uint32_t frames,
-              double rate_hz)
+void sim_show(sim_board *sim, float largest_v, uint32_t untouched, uint32_t frames, double rate_hz)
 {
-    const size_t cells = (size_t)(untouched + frames) * sim->instrument.engine.model.n_rows;
-    float largest = 0;
-    for (size_t k = 0; k < cells; ++k) {
-        const float size = volts[k] < 0 ? -volts[k] : volts[k];
-        largest = size > largest ? size : largest;
-    }
-    sim->scene.volts = volts;
     sim->scene.untouched = untouched;
     sim->scene.frames = frames;
     sim->scene.rate_hz = rate_hz;
-    const float range_uv = 2e6f * RANGE_MARGIN * largest;
+    sim->scene.count = 0;
+    const float range_uv = 2e6f * RANGE_MARGIN * largest_v;
     sim->board.capture.reference_uv =
         range_uv < (float)MAX_RANGE_UV ? 1u + (uint32_t)range_uv : MAX_RANGE_UV;
     fw_start_scan(&sim->instrument);
 }
 
-void sim_scan_frame(sim_board *sim)
+void sim_put(sim_board *sim, const float *volts, uint32_t first, uint32_t count)
+{
+    sim->scene.volts = volts;
+    sim->scene.first = first;
+    sim->scene.count = count;
+}
+
+uint32_t sim_frame_wanted(const sim_board *sim)
+{
+    return sim->scene.wanted;
+}
+
+bool sim_scan_frame(sim_board *sim)
 {
     const uint32_t frames = sim->instrument.scan.frames_scanned;
     while (sim->instrument.scan.frames_scanned == frames && sim_wants_frame(sim)) {
-        if (sim->converter.running)
-            next_burst(sim);
-        else
+        if (!sim->converter.running)
             wait_idle(sim);
+        else if (!next_burst(sim))
+            return false;
         step(sim);
     }
+    return true;
 }
 
 void sim_give_frame(sim_board *sim, const float *volts, uint32_t passed_us, uint32_t period_us)

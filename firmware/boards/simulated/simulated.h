@@ -16,9 +16,12 @@
 #include "app/instrument.h"
 #include "boards/parts/ad9833_model.h"
 
-/* Frames of the untouched skin, then those of the scene. */
+/* Frames of the untouched skin, then those of the scene; the host puts them before the board by
+ * and by. */
 typedef struct sim_scene {
-    const float *volts; /* (untouched + frames) x n_rows, amplitudes in V */
+    const float *volts; /* count x n_rows, amplitudes in V: frames first, first + 1, ... */
+    uint32_t first, count;
+    uint32_t wanted; /* the frame that the last scan showed, or that is missing */
     uint32_t untouched, frames;
     double rate_hz;
     bool begun, begins_with_scan; /* time 0 is when the next scan begins */
@@ -88,11 +91,17 @@ bool sim_wants_frame(const sim_board *sim);
 /* The model that is open, its length and CRC-32; NULL where there is none. */
 const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc);
 
-/* Put a skin before the board that has a model: its frames in that model's rows, first
- * `untouched` ones (at least 1), then `frames` (at least 1) at rate_hz. They are used until the
- * next call; another model needs another call before sim_scan_frame. */
-void sim_show(sim_board *sim, const float *volts, uint32_t untouched, uint32_t frames,
-              double rate_hz);
+/* Put a skin before the board that has a model: first `untouched` frames (at least 1), then
+ * `frames` (at least 1) at rate_hz, none above largest_v. Another model needs another call before
+ * sim_scan_frame. */
+void sim_show(sim_board *sim, float largest_v, uint32_t untouched, uint32_t frames, double rate_hz);
+
+/* The `count` frames from `first` on (0: the first untouched one), in the model's rows; they are
+ * used until the next call. */
+void sim_put(sim_board *sim, const float *volts, uint32_t first, uint32_t count);
+
+/* Which frame sim_scan_frame misses. */
+uint32_t sim_frame_wanted(const sim_board *sim);
 
 /* Let the scene begin with the next scan. Until then the untouched frames are shown over and over,
  * from the first on when a tare begins; then the frame of the scene that is nearest to the
@@ -100,8 +109,9 @@ void sim_show(sim_board *sim, const float *volts, uint32_t untouched, uint32_t f
 void sim_begin_scene(sim_board *sim);
 bool sim_scene_over(const sim_board *sim);
 
-/* Where frames are wanted: scan until the application has had one more. */
-void sim_scan_frame(sim_board *sim);
+/* Where frames are wanted: scan until the application has had one more. False where the frame that
+ * a scan would show has not been put before the board: put it, and call again. */
+bool sim_scan_frame(sim_board *sim);
 
 /* Where frames are given: the application gets one, n_rows volts of the model's protocol, as they
  * are but for those that are not finite, which it cannot use. The frame began passed_us after the

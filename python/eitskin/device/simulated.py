@@ -163,23 +163,29 @@ class SimBoard(HostBoard):
         if not self.wanted:
             return False
         self._show_skin()
-        self._lib.sim_scan_frame(self._sim)
+        while not self._lib.sim_scan_frame(self._sim):
+            self._put(self._lib.sim_frame_wanted(self._sim))
         return True
 
     def _show_skin(self) -> None:
-        """Put the frames for the model in use before the board, where it is another than before."""
+        """Put the scene for the model in use before the board, where it is another than before."""
         model = self.new_model()
         if model is None:
             return
         scene = self.frames.scene
         try:
-            voltage_v = self.frames.voltage_v(model.protocol)
+            self._rows = self.frames.rows(model.protocol)
+            largest_v = self._rows.largest_v
         except BaseException:
             self._model_crc = -1  # asked again, it says so again
             raise
-        self._volts = np.ascontiguousarray(voltage_v, np.float32)
-        volts = self._pointer(self._volts, "float *")
-        self._lib.sim_show(self._sim, volts, scene.quiet_frames, scene.frames, scene.rate_hz)
+        self._lib.sim_show(self._sim, largest_v, scene.quiet_frames, scene.frames, scene.rate_hz)
+
+    def _put(self, frame: int) -> None:
+        """The frames around number ``frame`` of all, as far as they are known."""
+        first, volts = self._rows.around(frame)
+        self._volts = np.ascontiguousarray(volts, np.float32)
+        self._lib.sim_put(self._sim, self._pointer(self._volts, "float *"), first, len(volts))
 
 
 class SimTransport:

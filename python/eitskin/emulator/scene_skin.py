@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.errors import ProtocolError
-from eitskin.scene.board_frames import BoardFrames
+from eitskin.scene.board_frames import BoardFrames, RecordedRows
 from eitskin.scene.description import Scene
 from eitskin.skin.protocol import Protocol
 
 DONE_BY_THE_BOARD = ("adc",)
+MAX_QUIET = 1024  # as many as a tare takes
 
 
 def skin_of(scene: Scene, protocol: Protocol) -> AnalogSkin:
@@ -26,6 +27,6 @@ def skin_of(scene: Scene, protocol: Protocol) -> AnalogSkin:
             f" {protocol.n_electrodes}; build a model of the scene's skin with  eitskin model build"
             "  and give it with  --model"
         )
-    voltage_v = BoardFrames(scene, DONE_BY_THE_BOARD).voltage_v(protocol)
-    quiet = scene.quiet_frames
-    return AnalogSkin(protocol, voltage_v[:quiet], voltage_v[quiet:], scene.rate_hz)
+    rows = BoardFrames(scene, DONE_BY_THE_BOARD).rows(protocol)
+    quiet_v = rows.part(range(min(scene.quiet_frames, MAX_QUIET)))
+    return AnalogSkin(protocol, quiet_v, RecordedRows(rows), scene.rate_hz)

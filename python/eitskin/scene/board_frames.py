@@ -11,31 +11,104 @@ import numpy.typing as npt
 from eitskin.scene.description import Scene
 from eitskin.skin.protocol import Protocol, table
 
+FloatArray = npt.NDArray[np.float64]
+
+WHOLE_FRAMES = 512  # a scene of no more frames, quiet ones included, is simulated at once
+WINDOW_FRAMES = 64  # of a longer one: so many are compiled together, and made one at a time
+HEADROOM = 2.0  # of a longer one's range over its first quiet frames: touches may raise voltages
+
 
 class BoardFrames:
-    """The frames of ``scene`` for whatever protocol a board scans; each protocol is simulated once.
+    """The frames of ``scene`` for whatever protocol a board scans; each protocol is prepared once.
     Effects named in ``without`` are left to the board."""
 
     def __init__(self, scene: Scene, without: Collection[str] = ()) -> None:
         effects = {name: one for name, one in scene.effects.items() if name not in without}
         self.scene = replace(scene, effects=effects)
-        self._simulated: dict[int, npt.NDArray[np.float64]] = {}
+        self._rows: dict[int, SceneRows] = {}
 
-    def voltage_v(self, protocol: Protocol) -> npt.NDArray[np.float64]:
-        """Voltages (n, m) in the rows of ``protocol``: the scene's quiet frames, then its own.
-        Electrodes that the protocol does not name stay unused.
+    def rows(self, protocol: Protocol) -> SceneRows:
+        """The frames in the rows of ``protocol``. Electrodes that it does not name stay unused.
 
         Raises:
             ProtocolError: the scene's skin has fewer electrodes than the protocol names.
             ConfigError, MissingExtraError: the scene cannot be simulated.
         """
-        if protocol.hash not in self._simulated:
-            from eitskin.scene.compiler import compile_scene
-            from eitskin.scene.runner import simulate_frames
-
+        if protocol.hash not in self._rows:
             scene = self.scene
             if scene.protocol.hash != protocol.hash:
                 rows, electrodes = protocol.drive_measure.tolist(), scene.skin.electrodes.count
                 scene = replace(scene, protocol=table(electrodes, rows, protocol.current_a))
-            self._simulated[protocol.hash] = simulate_frames(compile_scene(scene)).voltage_v
-        return self._simulated[protocol.hash]
+            self._rows[protocol.hash] = SceneRows(scene)
+        return self._rows[protocol.hash]
+
+    def voltage_v(self, protocol: Protocol) -> FloatArray:
+        """All of them, (n, m) in V: the scene's quiet frames, then its own. Raises as ``rows``."""
+        return self.rows(protocol).part(range(self.scene.n_frames))
+
+
+class SceneRows:
+    """All frames of ``scene``, quiet ones first, made as they are asked for; the same values in
+    whatever order. Of a long scene only the last ``WINDOW_FRAMES`` are kept.
+
+    Raises:
+        ConfigError, MissingExtraError: the scene cannot be simulated (also from the methods).
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        from eitskin.scene.compiler import prepare_scene
+        from eitskin.scene.session import MeshCache
+
+        self.scene = scene
+        self._prepared = prepare_scene(scene, mesh_cache=MeshCache())
+        self.solves = 0  # for whoever counts: right-hand sides solved so far
+        self._window = range(0)
+        whole = scene.n_frames <= WHOLE_FRAMES
+        self._size = scene.n_frames if whole else WINDOW_FRAMES
+        first = self.part(range(scene.n_frames if whole else min(scene.quiet_frames, self._size)))
+        largest = float(np.abs(np.asarray(first, np.float32)).max(initial=0))
+        self.largest_v = largest if whole else HEADROOM * largest
+        """None is above it in a scene that was simulated at once; in a long one what is above it
+        is beyond the range of a simulated converter."""
+
+    def around(self, frame: int) -> tuple[int, FloatArray]:
+        """Frames (k, m) among which is number ``frame``, and the number of the first of them: of a
+        long scene only this one, since each takes its time."""
+        if self._size == self.scene.n_frames:
+            return 0, self.part(range(self._size))
+        return frame, self.part(range(frame, frame + 1))
+
+    def part(self, frames: range) -> FloatArray:
+        """``frames`` (k, m) in V."""
+        if not len(frames):
+            return np.zeros((0, self.scene.protocol.n_rows))
+        return np.array([self._frame(frame) for frame in frames])
+
+    def _frame(self, frame: int) -> FloatArray:
+        from eitskin.scene.compiler import compile_frames
+        from eitskin.scene.runner import FrameMaker
+
+        if frame not in self._window:
+            start = frame // self._size * self._size
+            self._window = range(start, min(start + self._size, self.scene.n_frames))
+            self._maker = FrameMaker(compile_frames(self._prepared, self._window))
+            self._made: dict[int, FloatArray] = {}
+        if frame not in self._made:
+            before = self._maker.work.solves
+            self._made[frame] = self._maker.frame(frame)
+            self.solves += self._maker.work.solves - before
+        return self._made[frame]
+
+
+class RecordedRows:
+    """The scene's own frames of ``rows`` as a sequence, without the quiet ones."""
+
+    def __init__(self, rows: SceneRows) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return self._rows.scene.frames
+
+    def __getitem__(self, frame: int) -> FloatArray:
+        number = self._rows.scene.quiet_frames + frame
+        return np.asarray(self._rows.part(range(number, number + 1))[0])

@@ -66,6 +66,7 @@ class Compiled:
         skin: as it truly is, after geometry steps.
         steps: those of the named effects, in the order that they run.
         parameters: of each effect.
+        frames: which of all frames, quiet ones first, are compiled; n of them.
         states: solved once each; ``state_of_frame`` (n,) says which one a frame has.
         known: potentials of states that were solved already, for V0.
         base_factors: those of the untouched skin, made for V0 and used again by the update.
@@ -81,6 +82,7 @@ class Compiled:
     steps: tuple[Step, ...]
     parameters: dict[str, Any]
     phase: PhaseStep | None
+    frames: range
     states: tuple[State, ...]
     state_of_frame: IntArray
     known: dict[int, FloatArray]
@@ -95,10 +97,28 @@ class Compiled:
     work: SessionWork
 
     def times_s(self) -> FloatArray:
-        """All frames' times (n,), below 0 for quiet ones."""
-        return np.asarray(
-            (np.arange(self.scene.n_frames) - self.scene.quiet_frames) / self.scene.rate_hz
-        )
+        """The compiled frames' times (n,), below 0 for quiet ones."""
+        numbers = np.arange(self.frames.start, self.frames.stop)
+        return np.asarray((numbers - self.scene.quiet_frames) / self.scene.rate_hz)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What of a compiled scene does not depend on its frames: made once, however many frames."""
+
+    scene: Scene
+    skin: Skin
+    steps: tuple[Step, ...]
+    parameters: dict[str, Any]
+    phase: PhaseStep | None
+    mesh_cache: MeshCache
+    work: SessionWork
+    base_factors: Any
+
+    @property
+    def as_described(self) -> bool:
+        """Whether the sheet that is solved is the described one: nothing changes it but touches."""
+        return all(step.stage >= Stage.FRONT_END or _is_voltage(step) for step in self.steps)
 
 
 def compile_scene(
@@ -112,6 +132,14 @@ def compile_scene(
         GeometryError, ProtocolError, UsageError, MissingExtraError: from effects, meshing and the
             forward model.
     """
+    prepared = prepare_scene(scene, registry=registry, mesh_cache=mesh_cache)
+    return compile_frames(prepared, range(scene.n_frames))
+
+
+def prepare_scene(
+    scene: Scene, *, registry: Registry | None = None, mesh_cache: MeshCache | None = None
+) -> Prepared:
+    """Import and make the effects of ``scene``; raises as ``compile_scene``."""
     mesh_cache, work = MeshCache() if mesh_cache is None else mesh_cache, SessionWork()
     modules = load_effects(scene, Registry() if registry is None else registry)
     parameters = {
@@ -121,7 +149,16 @@ def compile_scene(
     check_shared(scene, modules, parameters)
     steps, skin = make_steps(scene, modules, parameters, mesh_cache, work)
     phase = _only_phase(scene, steps)
-    states, state_of_frame = _states(scene, mesh_cache.cover(skin, scene.elements), steps)
+    factors, work.v0_factors = work.v0_factors, None
+    return Prepared(scene, skin, steps, parameters, phase, mesh_cache, work, factors)
+
+
+def compile_frames(prepared: Prepared, frames: range) -> Compiled:
+    """Compile only ``frames`` of a prepared scene, of all frames, quiet ones first. Raises as
+    ``compile_scene``."""
+    scene, skin, steps = prepared.scene, prepared.skin, prepared.steps
+    phase, mesh_cache, work = prepared.phase, prepared.mesh_cache, prepared.work
+    states, state_of_frame = _states(scene, mesh_cache.cover(skin, scene.elements), steps, frames)
     model = mesh_cache.model(
         skin, scene.protocol, scene.elements, solved_impedance(states[0].contacts)
     )
@@ -129,9 +166,8 @@ def compile_scene(
     model.patterns = with_bridges(model.patterns, pairs)
     method, reach, counted = _choose_method(scene, model, states, steps)
     known = {}
-    as_described = all(step.stage >= Stage.FRONT_END or _is_voltage(step) for step in steps)
-    base_factors = work.v0_factors if method == "update" and as_described else None
-    work.v0_factors = None
+    as_described = prepared.as_described
+    base_factors = prepared.base_factors if method == "update" and as_described else None
     if method == "factorise" and as_described:
         mesh_cache.v0_v(scene, work)
         electrodes, work.v0_factors = mesh_cache.known(scene), None
@@ -145,8 +181,9 @@ def compile_scene(
         skin=skin,
         model=model,
         steps=steps,
-        parameters=parameters,
+        parameters=prepared.parameters,
         phase=phase,
+        frames=frames,
         states=states,
         state_of_frame=state_of_frame,
         known=known,
@@ -184,25 +221,26 @@ def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
         ConfigError: an effect leaves a conductivity that is not finite and above 0 (here, and from
             the function).
     """
-    scene, times = compiled.scene, compiled.times_s()
+    scene, times, start = compiled.scene, compiled.times_s(), compiled.frames.start
     materials = [step for step in compiled.steps if isinstance(step, MaterialStep)]
     fixed = next((k for k, step in enumerate(materials) if step.varies), len(materials))
     sheet = np.full(compiled.model.mesh.n_elements, compiled.skin.conductivity_s_per_m)
 
     def applied(step: MaterialStep, conductivity: FloatArray, frame: int) -> FloatArray:
-        changed = step.apply(conductivity, float(times[frame]), frame)
+        time_s = float(times[frame - start])
+        changed = step.apply(conductivity, time_s, frame)
         if changed.shape != conductivity.shape or not (
             changed.min() > 0 and changed.max() < np.inf
         ):
             raise ConfigError(
-                f"{scene.where} [effects.{step.name}]: at {times[frame]:g} s it makes a"
+                f"{scene.where} [effects.{step.name}]: at {time_s:g} s it makes a"
                 f" conductivity of {changed.min():.3g} S/m; every conductivity must be finite and"
                 " above 0, so use milder parameters"
             )
         return changed
 
     for step in materials[:fixed]:
-        sheet = applied(step, sheet, 0)
+        sheet = applied(step, sheet, start)
 
     def background(state: State) -> FloatArray:
         conductivity = sheet
@@ -228,21 +266,22 @@ def _is_voltage(step: Step) -> bool:
 
 
 def _states(
-    scene: Scene, cover: Cover, steps: Sequence[Step]
+    scene: Scene, cover: Cover, steps: Sequence[Step], frames: range
 ) -> tuple[tuple[State, ...], IntArray]:
-    """The distinct states, in the order that frames first have them, and which one each frame has
-    (n,)."""
+    """The distinct states of ``frames``, in the order that they first have them, and which one each
+    has (n,)."""
     varying = [step for step in steps if isinstance(step, MaterialStep) and step.varies]
-    contacts = _contacts(scene, steps)
-    samples = scene.samples()
+    contacts = _contacts(scene, steps, frames)
+    first = max(frames.start - scene.quiet_frames, 0)  # of the recorded frames, whose samples
+    samples = scene.samples(range(first, max(frames.stop - scene.quiet_frames, first)))
     changes: dict[tuple[TrueTouch, ...], Change] = {(): NO_CHANGE}
     states: dict[Any, State] = {}
-    state_of_frame = np.zeros(scene.n_frames, dtype=np.int64)
+    state_of_frame = np.zeros(len(frames), dtype=np.int64)
     number: dict[Any, int] = {}
-    for frame in range(scene.n_frames):
+    for place, frame in enumerate(frames):
         recorded = frame - scene.quiet_frames
-        touches = touches_at(samples, recorded) if recorded >= 0 else ()
-        contact = contacts[frame if len(contacts) > 1 else 0]
+        touches = touches_at(samples, recorded - first) if recorded >= 0 else ()
+        contact = contacts[place if len(contacts) > 1 else 0]
         time_s = recorded / scene.rate_hz
         sheet = tuple(float(frame) if s.same is None else s.same(time_s, frame) for s in varying)
         key = (touches, contact_key(contact), sheet)
@@ -251,7 +290,7 @@ def _states(
                 changes[touches] = Change(*cover.factor(touches))
             number[key] = len(states)
             states[key] = State(touches, changes[touches], contact, frame)
-        state_of_frame[frame] = number[key]
+        state_of_frame[place] = number[key]
     return tuple(states.values()), state_of_frame
 
 
@@ -260,13 +299,12 @@ def contact_key(contacts: Contacts) -> tuple[bytes, bytes, tuple[tuple[int, int,
     return contacts.impedance_ohm_m2.tobytes(), contacts.detached.tobytes(), contacts.bridges
 
 
-def _contacts(scene: Scene, steps: Sequence[Step]) -> list[Contacts]:
-    """The contacts of each frame, or of all frames (one) where nothing varies."""
+def _contacts(scene: Scene, steps: Sequence[Step], frames: range) -> list[Contacts]:
+    """The contacts of each of ``frames``, or of all of them (one) where nothing varies."""
     own = [step for step in steps if isinstance(step, ContactStep)]
     count, rows = scene.skin.electrodes.count, scene.protocol.drive_measure.astype(np.int64)
-    frames = scene.n_frames if any(step.varies for step in own) else 1
-    found = []
-    for frame in range(frames):
+    varies, found = any(step.varies for step in own), []
+    for frame in frames if varies else frames[:1]:
         time_s = (frame - scene.quiet_frames) / scene.rate_hz
         contacts, detaching = Contacts(np.zeros(count), np.zeros(count, np.bool_)), ""
         for step in own:

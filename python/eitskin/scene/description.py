@@ -113,9 +113,9 @@ class Scene:
         """The recorded frames' times (frames,)."""
         return np.asarray(np.arange(self.frames) / self.rate_hz)
 
-    def samples(self) -> tuple[TrackSamples, ...]:
-        """Each track at the recorded frames' times."""
-        times = self.times_s()
+    def samples(self, frames: range | None = None) -> tuple[TrackSamples, ...]:
+        """Each track at the recorded frames' times, or at those of ``frames`` of them."""
+        times = self.times_s() if frames is None else np.asarray(frames) / self.rate_hz
         return tuple(sample(track, times) for track in self.touches)
 
 

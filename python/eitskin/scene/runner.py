@@ -47,6 +47,53 @@ def forward_of(compiled: Compiled, work: Work) -> Forward:
     return Factorise(compiled.model, work)
 
 
+class FrameMaker:
+    """The frames of a compiled scene, each made when it is asked for; a state is solved when a
+    frame first needs it. The same values in whatever order.
+
+    Raises:
+        ConfigError: an effect makes a conductivity that cannot be (also from the methods).
+    """
+
+    def __init__(self, compiled: Compiled) -> None:
+        self.compiled, self.work = compiled, Work()
+        self._forward, self._background = forward_of(compiled, self.work), background_of(compiled)
+        self._read = _reader(compiled)
+        self._times = compiled.times_s()
+        states = compiled.states
+        self._readings = {k: self._read(v, states[k]) for k, v in compiled.known.items()}
+
+    def reading(self, number: int) -> TrueVoltages:
+        """State ``number``'s voltages before excitation, front end and converter."""
+        if number not in self._readings:
+            state = self.compiled.states[number]
+            solved = self._forward.electrodes(
+                self._background(state), state.change, solved_impedance(state.contacts)
+            )
+            self._readings[number] = self._read(solved, state)
+        return self._readings[number]
+
+    def frame(self, frame: int) -> FloatArray:
+        """Frame number ``frame`` of all frames, quiet ones first: (m,) in V.
+
+        Raises:
+            ConfigError: a voltage is not finite.
+        """
+        scene, place = self.compiled.scene, frame - self.compiled.frames.start
+        reading = self.reading(int(self.compiled.state_of_frame[place]))
+        v, time_s = reading.v, float(self._times[place])
+        for function in self.compiled.functions:
+            v = function(v, reading.loads, time_s, frame)  # type: ignore[arg-type]
+        if not np.isfinite(v).all():
+            row = int(np.flatnonzero(~np.isfinite(v))[0])
+            named = ", ".join(scene.effects) or "none"
+            raise ConfigError(
+                f"{scene.where} [effects]: frame {frame - scene.quiet_frames}, row {row} is"
+                f" {v[row]}; an effect's parameters (of {named}) are too extreme"
+            )
+        return np.asarray(v, dtype=np.float64)
+
+
 def simulate_frames(
     compiled: Compiled, progress: Callable[[range], Iterable[int]] | None = None
 ) -> SceneRun:
@@ -56,42 +103,19 @@ def simulate_frames(
     Raises:
         ConfigError: an effect makes a conductivity that cannot be, or a voltage that is not finite.
     """
-    scene, work = compiled.scene, Work()
-    forward, background, read = (
-        forward_of(compiled, work),
-        background_of(compiled),
-        _reader(compiled),
-    )
+    scene, maker = compiled.scene, FrameMaker(compiled)
     unknown = [k for k in range(len(compiled.states)) if k not in compiled.known]
-    readings = {k: read(electrodes, compiled.states[k]) for k, electrodes in compiled.known.items()}
-    factorised = np.zeros(scene.n_frames, dtype=np.int64)
-    for k in map(
-        unknown.__getitem__, progress(range(len(unknown))) if progress else range(len(unknown))
-    ):
-        state, before = compiled.states[k], work.factorisations
-        solved = forward.electrodes(
-            background(state), state.change, solved_impedance(state.contacts)
-        )
-        readings[k] = read(solved, state)
-        factorised[state.frame] += work.factorisations - before
-
-    voltage_v, functions = np.zeros((scene.n_frames, scene.protocol.n_rows)), compiled.functions
-    numbers, times = compiled.state_of_frame.tolist(), compiled.times_s().tolist()
-    for frame, (number, time_s) in enumerate(zip(numbers, times, strict=True)):
-        v, loads = readings[number].v, readings[number].loads
-        for function in functions:
-            v = function(v, loads, time_s, frame)  # type: ignore[arg-type]
-        voltage_v[frame] = v
-    if not np.isfinite(voltage_v).all():
-        frame, row = np.argwhere(~np.isfinite(voltage_v))[0]
-        named = ", ".join(scene.effects) or "none"
-        raise ConfigError(
-            f"{scene.where} [effects]: frame {frame - scene.quiet_frames}, row {row} is"
-            f" {voltage_v[frame, row]}; an effect's parameters (of {named}) are too extreme"
-        )
-    true_v = np.array([readings[k].v for k in range(len(compiled.states))])
-    recorded = int(factorised[scene.quiet_frames :].sum())
-    return SceneRun(voltage_v, true_v, work, recorded, compiled.work.generators)
+    recorded, numbers = 0, range(len(unknown))
+    for k in map(unknown.__getitem__, progress(numbers) if progress else numbers):
+        before = maker.work.factorisations
+        maker.reading(k)
+        if compiled.states[k].frame >= scene.quiet_frames:
+            recorded += maker.work.factorisations - before
+    voltage_v = np.zeros((len(compiled.frames), scene.protocol.n_rows))
+    for place, frame in enumerate(compiled.frames):
+        voltage_v[place] = maker.frame(frame)
+    true_v = np.array([maker.reading(k).v for k in range(len(compiled.states))])
+    return SceneRun(voltage_v, true_v, maker.work, recorded, compiled.work.generators)
 
 
 def _reader(compiled: Compiled) -> Callable[[npt.NDArray[Any], State], TrueVoltages]:

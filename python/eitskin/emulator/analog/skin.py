@@ -15,6 +15,7 @@ give 0 V (counted in ``unknown_rows``); so does a pair that is not joined.
 from __future__ import annotations
 
 from collections import Counter
+from typing import Protocol as TypingProtocol
 
 import numpy as np
 import numpy.typing as npt
@@ -26,12 +27,19 @@ FloatArray = npt.NDArray[np.float64]
 Joined = tuple[int | None, int | None, int | None, int | None]
 
 
+class Rows(TypingProtocol):
+    """Frames by number: an array (n, m), or what makes them as they are asked for."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, frame: int, /) -> FloatArray: ...
+
+
 class AnalogSkin:
-    """``quiet_v`` (q, m) and ``frames_v`` (n, m): amplitudes in V, in the rows of ``protocol``, for
-    its current."""
+    """``quiet_v`` (q, m) and ``frames_v`` (n rows of m): amplitudes in V, in the rows of
+    ``protocol``, for its current."""
 
     def __init__(
-        self, protocol: Protocol, quiet_v: FloatArray, frames_v: FloatArray, rate_hz: float
+        self, protocol: Protocol, quiet_v: FloatArray, frames_v: Rows, rate_hz: float
     ) -> None:
         self.protocol = protocol
         self.quiet_v, self.frames_v, self.rate_hz = quiet_v, frames_v, rate_hz
