@@ -1,12 +1,17 @@
-"""Reading and writing files so that nothing is lost: written beside, then renamed."""
+"""Reading and writing files so that nothing is lost: written beside, then renamed.
+
+Links are followed; devices and FIFOs are written into.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +34,22 @@ def refuse_unwritable(*paths: str | Path | None) -> None:
 
 @contextmanager
 def write_beside(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path in the folder of ``path``; rename it to ``path`` if the block
-    succeeds, else remove it.
+    """Yield a temporary path; if the block succeeds, what it wrote becomes the content of ``path``,
+    whole and on the disk, else ``path`` stays as it was.
+
+    A regular file is replaced by rename and keeps its mode; a link is followed. What is no regular
+    file (a device, a FIFO) is never replaced: the content is written into it.
 
     Raises:
         FileError: the folder does not exist or cannot be written.
     """
-    target = Path(path)
+    target = followed(path)
+    special = target.exists() and not target.is_file()
     try:
         handle, name = tempfile.mkstemp(
-            prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent
+            prefix=f".{target.name}.",
+            suffix=target.suffix,
+            dir=None if special else target.parent,
         )
         os.close(handle)
     except OSError as error:
@@ -48,14 +59,60 @@ def write_beside(path: str | Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(target)
+        if special:
+            with temporary.open("rb") as content, target.open("wb") as out:
+                shutil.copyfileobj(content, out)
+            return
+        replace_by(temporary, target)
     except OSError as error:
         raise FileError(f"{target}: cannot write it ({error.strerror})") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def followed(path: str | Path) -> Path:
+    """Where links lead from ``path``; the file at the end need not exist.
+
+    Raises:
+        FileError: the links go in a circle.
+    """
+    try:
+        return Path(path).resolve() if Path(path).is_symlink() else Path(path)
+    except (OSError, RuntimeError):
+        raise FileError(f"{path}: its links go in a circle; remove them") from None
+
+
+def replace_by(temporary: Path, target: Path) -> None:
+    """Rename ``temporary`` to ``target`` with the mode that ``target`` has or a new file would get,
+    and wait until file and folder are on the disk.
+
+    Raises:
+        OSError: it cannot be done; ``target`` is as it was.
+    """
+    temporary.chmod(_mode(target))
+    with temporary.open("rb") as stream:
+        os.fsync(stream.fileno())
+    temporary.replace(target)
+    sync_folder(target)
+
+
+def sync_folder(path: Path) -> None:
+    """Wait until the name ``path`` is on the disk, where the system can do that."""
+    with suppress(OSError):  # some systems do not open folders
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def _mode(path: Path) -> int:
+    try:
+        return stat.S_IMODE(path.stat().st_mode)
+    except FileNotFoundError:
+        umask = os.umask(0)
+        os.umask(umask)
+        return 0o666 & ~umask
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:

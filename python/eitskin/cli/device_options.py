@@ -258,7 +258,7 @@ def check_recording(path: Path | None, overwrite: bool) -> None:
     from eitskin.fileio import refuse_unwritable
 
     refuse_unwritable(path)
-    if path is not None and path.exists() and not overwrite:
+    if path is not None and path.is_file() and not overwrite:
         raise FileError(
             f"{path}: exists already; name another file, or write over it with  --overwrite"
         )

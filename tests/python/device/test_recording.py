@@ -323,3 +323,68 @@ def test_a_recording_of_a_recording_is_its_equal(tmp_path: Path) -> None:
         Decoder().feed((tmp_path / name).read_bytes())[2:] for name in ("one.eits", "two.eits")
     )
     assert one == two
+
+
+def test_a_second_recorder_on_the_same_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.eits"
+    with sim_device() as one, sim_device() as two:
+        with Recorder(path, one):
+            before = path.read_bytes()
+            with pytest.raises(FileError, match="another process records to it"):
+                Recorder(path, two, overwrite=True)
+            assert path.read_bytes() == before
+        Recorder(path, two, overwrite=True).close()
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.eits"]
+
+
+def test_the_old_recording_stays_until_the_new_one_has_begun(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.eits"
+    path.write_bytes(b"old")
+    path.chmod(0o640)
+
+    def full(*arguments: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with sim_device() as device:
+        with monkeypatch.context() as patch:
+            patch.setattr("eitskin.device.recordings.new_file.replace_by", full)
+            with pytest.raises(FileError, match="cannot write it"):
+                Recorder(path, device, overwrite=True)
+        assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+        Recorder(path, device, overwrite=True).close()
+    assert read_head(path)["format"] == "eits" and path.stat().st_mode & 0o777 == 0o640
+
+
+def test_recordings_follow_links_and_leave_devices_alone(tmp_path: Path) -> None:
+    (tmp_path / "link.eits").symlink_to(tmp_path / "run.eits")
+    with sim_device() as device:
+        Recorder(tmp_path / "link.eits", device, overwrite=True).close()
+        Recorder(Path("/dev/null"), device).close()
+    assert (tmp_path / "link.eits").is_symlink() and Path("/dev/null").is_char_device()
+    assert read_head(tmp_path / "run.eits")["format"] == "eits"
+
+
+def test_a_recording_is_brought_to_the_disk_now_and_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its clock is put forward by half a second a packet."""
+    from eitskin.device.recordings import new_file
+
+    synced, now = [], [0.0]
+
+    def clock() -> float:
+        now[0] += 0.5
+        return now[0]
+
+    monkeypatch.setattr(new_file.time, "monotonic", clock)
+    file = new_file.RecordingFile(tmp_path / "run.eits", b"", overwrite=False)
+    monkeypatch.setattr(new_file.os, "fsync", lambda handle: synced.append(handle))
+    for _ in range(20):
+        file.write(b"packet")
+        file.sync_now_and_then()
+        if file._syncing is not None:
+            file._syncing.join()
+    file.close()
+    assert 6 <= len(synced) <= 11

@@ -1,5 +1,6 @@
-"""Recordings (.eits): the packets of a link as they were received, one after another, flushed each,
-so that a killed recorder loses at most the last. Reading one goes through the live decoder.
+"""Recordings (.eits): the packets of a link as they were received, one after another, each handed
+to the system at once and brought to the disk every second: a killed recorder loses at most the
+last, a machine that loses power two seconds. Reading one goes through the live decoder.
 docs/reference/link-protocol.md, "Recordings", specifies the file.
 """
 
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from eitskin import __version__
 from eitskin.core.results import Options, check_options
+from eitskin.device.recordings.new_file import RecordingFile
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import LINK_VERSION, PacketType
 from eitskin.device.wire.payloads import pack
@@ -37,7 +39,8 @@ class Recorder:
     ``bytes`` count.
 
     Raises:
-        FileError: the file exists already, or cannot be written.
+        FileError: the file exists already (with ``overwrite``: is being recorded to), or cannot be
+            written.
         DeviceError: the board does not answer.
     """
 
@@ -52,12 +55,6 @@ class Recorder:
         self.path, self._device = Path(path), device
         self.packets = self.bytes = 0
         info = device.board if device.transport.replays else device.info()
-        try:
-            self._file = self.path.open("wb" if overwrite else "xb", buffering=0)
-        except FileExistsError:
-            raise FileError(f"{path}: exists already; name another file, or remove it") from None
-        except OSError as error:
-            raise FileError(f"{path}: cannot write it ({error.strerror})") from None
         head = {
             "format": FORMAT,
             "version": VERSION,
@@ -65,8 +62,10 @@ class Recorder:
             "url": device.transport.url,
             "model_crc": f"{info.model_crc:08x}",
         }
+        first = encode(PacketType.RECORDING, 0, json.dumps(head).encode())
+        self._file = RecordingFile(self.path, first, overwrite=overwrite)
+        self.bytes += len(first)
         try:
-            self._write(PacketType.RECORDING, 0, json.dumps(head).encode())
 
             def begin(last_sequence: int) -> None:
                 self._write(PacketType.INFO, last_sequence, pack(info))
@@ -101,18 +100,9 @@ class Recorder:
 
     def _write(self, packet_type: int, sequence: int, payload: bytes) -> None:
         data = encode(packet_type, sequence, payload)
-        try:
-            written = self._file.write(data)
-        except (OSError, ValueError) as error:
-            raise FileError(
-                f"{self.path}: cannot go on recording ({error}); what was recorded can be read"
-            ) from None
-        if written != len(data):
-            raise FileError(
-                f"{self.path}: cannot go on recording (the disk is full); what was recorded can be"
-                " read"
-            )
+        self._file.write(data)
         self.bytes += len(data)
+        self._file.sync_now_and_then()
 
 
 class FileTransport:
