@@ -1,5 +1,5 @@
 """Devices are URLs: auto, serial:PORT, sim:SCENE, emu:SCENE, file:RUN.eits. The same frames,
-commands and errors behind each."""
+commands and errors behind each. After the last three, ``?speed=1&loop=1`` (``timing``)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from eitskin.device.check import check_model
 from eitskin.device.client import Device
 from eitskin.device.link import Reconnect
 from eitskin.device.ports import BAUD, Port, SerialTransport, only_board, ports
+from eitskin.device.timing import split_timing
 from eitskin.device.transport import Transport
 from eitskin.errors import UsageError
 
@@ -56,7 +57,8 @@ def open_device(
 
 def open_transport(url: str, *, model: bytes | None = None, image: Path | None = None) -> Transport:
     """The bare bytes behind ``url``; raises as ``open_device``."""
-    scheme, colon, rest = url.partition(":")
+    bare, timing = split_timing(url)
+    scheme, colon, rest = bare.partition(":")
     if scheme not in SCHEMES or (scheme == "auto") == bool(colon):
         if scheme.startswith("/") or scheme.upper().startswith("COM"):
             raise UsageError(f"device {url!r}: write  serial:{url}")
@@ -76,11 +78,11 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
     if scheme == "sim":
         from eitskin.device.simulated import open_simulated
 
-        return open_simulated(rest, model=model)
+        return open_simulated(rest, model=model, loop=timing.loop)
     if scheme == "emu":
         from eitskin.emulator.transport import open_emulated
 
-        transport: Transport = open_emulated(rest, model=model, image=image)
+        transport: Transport = open_emulated(rest, model=model, image=image, loop=timing.loop)
         return transport
     from eitskin.device.recordings.recording import FileTransport
 

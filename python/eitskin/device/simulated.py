@@ -190,23 +190,25 @@ class SimBoard(HostBoard):
 
 class SimTransport:
     """The bytes of a ``SimBoard``. It scans a frame each time that it is read and has nothing else
-    to say."""
+    to say. ``loop``: the scene begins again at its end."""
 
     synchronous = True
     replays = False
 
-    def __init__(self, name: str, board: SimBoard) -> None:
+    def __init__(self, name: str, board: SimBoard, *, loop: bool = False) -> None:
         self.url = self.name = f"sim:{name}"
-        self.board = board
+        self.board, self._loop = board, loop
 
     @property
     def ended(self) -> bool:
         """The scene is over."""
-        return self.board.ended
+        return self.board.ended and not self._loop
 
     def read(self, timeout_s: float) -> bytes:
         """What the board sends; empty where it has nothing to do, or the scene is over."""
         output = self.board.take_output()
+        if self._loop and self.board.ended:
+            self.board.begin_scene()
         while not output and not self.ended and self.board.scan_one():
             output = self.board.take_output()
         return output
@@ -224,7 +226,7 @@ class SimTransport:
         """Nothing is held."""
 
 
-def open_simulated(scene: str, *, model: bytes | None = None) -> SimTransport:
+def open_simulated(scene: str, *, model: bytes | None = None, loop: bool = False) -> SimTransport:
     """A simulated board before ``scene`` (a file or a library scene), with ``model`` in its first
     bank (or the prebuilt one).
 
@@ -238,4 +240,4 @@ def open_simulated(scene: str, *, model: bytes | None = None) -> SimTransport:
     frames = BoardFrames(find_scene(scene))
     blob = load_prebuilt()[1] if model is None else model
     empty = bytes([ERASED]) * BANK_BYTES
-    return SimTransport(scene, SimBoard(frames, [bank_bytes(blob, 1), empty]))
+    return SimTransport(scene, SimBoard(frames, [bank_bytes(blob, 1), empty]), loop=loop)

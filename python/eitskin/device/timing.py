@@ -171,3 +171,25 @@ class Pacer:
                 self._start = None
             self._woken = self._woken or woken
             self._changed.notify_all()
+
+
+class Slowness:
+    """Says once how much slower than real time frames are made, after ``AFTER_S`` of them."""
+
+    AFTER_S = 0.5
+
+    def __init__(self, clock: WaitingClock | None = None) -> None:
+        self._clock, self._told = clock or WallClock(), False
+        self._start: tuple[float, int] | None = None
+
+    def lines(self, time_us: int) -> list[str]:
+        """What is to be said with the frame at ``time_us``."""
+        now = self._clock.now_s()
+        if self._start is None:
+            self._start = now, time_us
+        made_s = (time_us - self._start[1]) / 1e6
+        if self._told or made_s < self.AFTER_S:
+            return []
+        self._told = True
+        times = (now - self._start[0]) / made_s
+        return [f"emulated: {times:.1f} times slower than real time"] if times > 1.2 else []

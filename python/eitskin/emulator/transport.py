@@ -4,6 +4,7 @@ thread; time is the board's."""
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,15 +25,18 @@ MAX_WALL_S = 120.0
 
 class EmulatedTransport:
     """The host's end of the emulated board's serial line. ``board`` may be looked at, and
-    disturbed."""
+    disturbed. ``loop``: the scene begins again at its end; ``looking_on`` is called every second of
+    this computer's, with the board's own time in seconds."""
 
     synchronous = True
     replays = False
     ended = False  # the scene's last frame is held; the board goes on
 
-    def __init__(self, name: str, board: EmulatedBoard) -> None:
+    def __init__(self, name: str, board: EmulatedBoard, *, loop: bool = False) -> None:
         self.url = self.name = f"emu:{name}"
-        self.board = board
+        self.board, self._loop = board, loop
+        self.looking_on: Callable[[float], None] | None = None
+        self._told = time.monotonic()
         self._closed = False
 
     def read(self, timeout_s: float) -> bytes:
@@ -46,8 +50,15 @@ class EmulatedTransport:
         until = board.clock.now + max(round(timeout_s * TICKS_PER_S), 1)
         give_up = time.monotonic() + MAX_WALL_S
 
+        if self._loop and board.skin.over(board.clock.now):
+            board.skin.begin_again()
+
         def enough() -> bool:
-            if time.monotonic() > give_up:
+            now = time.monotonic()
+            if self.looking_on is not None and now > self._told + 1.0:
+                self._told = now
+                self.looking_on(board.clock.now / TICKS_PER_S)
+            if now > give_up:
                 raise DeviceError(
                     f"{self.name}: the emulated board said nothing in {MAX_WALL_S:.0f} s; its"
                     " firmware hangs, or this computer is too slow for it"
@@ -84,7 +95,7 @@ class EmulatedTransport:
 
 
 def open_emulated(
-    scene: str, *, model: bytes | None = None, image: Path | None = None
+    scene: str, *, model: bytes | None = None, image: Path | None = None, loop: bool = False
 ) -> EmulatedTransport:
     """An emulated board before ``scene`` (a file or a library scene), with ``model`` in its first
     bank (or the prebuilt one) and the firmware ``image`` (.bin; or the one that ships). Until
@@ -113,4 +124,4 @@ def open_emulated(
     banks = (bank_bytes(blob, 1),)
     board = EmulatedBoard(program, skin_of(described, prebuilt.protocol), banks)
     board.run_until(START_TICKS, lambda: board.line.up_next_end() <= board.clock.now)
-    return EmulatedTransport(scene, board)
+    return EmulatedTransport(scene, board, loop=loop)

@@ -35,6 +35,7 @@ from eitskin.device.live import (
 )
 from eitskin.device.open import open_device
 from eitskin.device.settings import ScanSettings, SolverSettings
+from eitskin.device.timing import Pacer, Slowness, WaitingClock, split_timing
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import Fault
 from eitskin.errors import EitskinError, UsageError
@@ -85,7 +86,8 @@ class SessionSettings:
 
 class Session:
     """A board, set up and followed. Use it in ``with``: that opens it, takes the reference and
-    begins the scene. ``say`` gets lines for whoever looks on.
+    begins the scene. ``say`` gets lines for whoever looks on. ``speed``: of what is simulated,
+    emulated or recorded, where the URL does not say; 0 is as fast as it can.
 
     ``ask``, ``tare`` and ``stop`` may be called from any thread; all else belongs to the one that
     iterates.
@@ -95,6 +97,7 @@ class Session:
         solver: the solver's options as set; None where the board's model is not known here.
         summary, score: what the frames amounted to so far.
         recorder: where every packet is recorded.
+        pacer: holds what is simulated, emulated or recorded until it is due; not a real board.
 
     Raises:
         EitskinError: as ``open_device``; a setting cannot be, the board refuses it, or a recording
@@ -108,8 +111,14 @@ class Session:
         *,
         say: Say = lambda text: None,
         reconnect: Reconnect | None = None,
+        speed: float = 0.0,
+        clock: WaitingClock | None = None,
     ) -> None:
         self.url, self.settings, self._say = url, settings or SessionSettings(), say
+        named = split_timing(url)[1]
+        self._loops = named.loop
+        self.pacer = Pacer(speed if named.speed is None else named.speed, clock)
+        self._slowness = Slowness(clock)
         self._reconnect = reconnect
         self.known: KnownModel | None = None
         self.truth: SceneTruth | None = None
@@ -152,11 +161,17 @@ class Session:
         """It is a recording: nothing can be asked of it."""
         return self.device.transport.replays
 
+    @property
+    def timed(self) -> bool:
+        """It is simulated, emulated or recorded: ``pacer`` says when frames come."""
+        return self.device.transport.synchronous
+
     # ---- from any thread ----
 
     def stop(self) -> None:
         """End after the frame that comes next."""
         self._stopping.set()
+        self.pacer.wake()
 
     def ask(self, action: Callable[[Device], T]) -> Future[T]:
         """Let ``action`` talk to the board between two frames; the stream stops meanwhile."""
@@ -171,6 +186,7 @@ class Session:
                 answer.set_exception(error)
 
         self._asked.put(run)
+        self.pacer.wake()
         return answer
 
     def tare(self, frames: int = TARE_FRAMES) -> Future[None]:
@@ -192,8 +208,10 @@ class Session:
                         if self._over(item):
                             return
                         count += 1
+                        if self.timed:
+                            self.pacer.hold(item.time_us)
                     yield item
-                    if self._stopping.is_set():
+                    if self._stopping.is_set() or 0 < self.settings.frames <= count:
                         return
                     if not self._asked.empty():
                         if self.replays:
@@ -219,6 +237,9 @@ class Session:
                 arrived_ns = time.monotonic_ns()
                 if isinstance(item, LiveFrame):
                     last = item.time_us / 1e6
+                    if self.url.startswith("emu:"):
+                        for text in self._slowness.lines(item.time_us):
+                            self._say(text)
                 notices = [Notice(_kind(item), text, last, now_s) for text in events.lines(item)]
                 yield from notices
                 if isinstance(item, LiveFrame):
@@ -258,6 +279,7 @@ class Session:
             self.truth = _recorded_truth(self.url) if self._solves else None
             return
         self.truth = truth_of(self.url, how.solver.sign or "increase")
+        self._look_on()
         self.solver = set_up(self.device, how.scan, self._solver_settings(), self.known)
         if how.record is not None:
             from eitskin.device.recordings.recording import Recorder
@@ -265,6 +287,8 @@ class Session:
             self.recorder = Recorder(how.record, self.device, self.solver, overwrite=True)
         self._take_reference()
         began_us, meanwhile = begin_scene(self.device)
+        if hasattr(self.device.transport, "looking_on"):
+            self.device.transport.looking_on = None
         if self.truth is not None and began_us is not None:
             self.truth.begin(began_us)
         events = Events()
@@ -272,6 +296,20 @@ class Session:
             for text in events.lines(item):
                 self._say(text)
         self._every = how.every or self._carried()
+
+    def _look_on(self) -> None:
+        """Say how far an emulated board is, until its scene begins."""
+        transport = self.device.transport
+        if hasattr(transport, "looking_on"):
+            start = time.monotonic()
+
+            def looking_on(board_s: float) -> None:
+                self._say(
+                    f"the emulated board starts: {board_s:.2f} s of its time in"
+                    f" {time.monotonic() - start:.0f} s"
+                )
+
+            transport.looking_on = looking_on
 
     @property
     def _solves(self) -> bool:
@@ -341,10 +379,30 @@ class Session:
     def _follow(self, clock: Clock, count: int) -> Generator[Item, None, None]:
         how = self.settings
         if self.replays:
-            return replayed(self.device, how.mode, every=how.every or 1, frames=how.frames)
+            return self._replayed()
         frames = max(how.frames - count, 1) if how.frames else 0
         stream = self.device.stream(how.mode, every=self._every, frames=frames)
         return put_together(stream, how.mode, clock)
+
+    def _replayed(self) -> Generator[Item, None, None]:
+        """The recording; with ``loop`` again and again, as if it went on."""
+        how, offset_us = self.settings, 0
+        while True:
+            last_us = step_us = 0
+            items = replayed(self.device, how.mode, every=how.every or 1, frames=how.frames)
+            for item in items:
+                if isinstance(item, LiveFrame):
+                    if self._over(item):
+                        break
+                    step_us, last_us = item.time_us - last_us, item.time_us
+                    item = replace(item, time_us=item.time_us + offset_us)
+                yield item
+            items.close()
+            if not (self._loops and last_us):
+                return
+            offset_us += last_us + step_us
+            self.device.close()
+            self.device = self._open()
 
     def _over(self, frame: LiveFrame) -> bool:
         """The scene has ended; an emulated board would hold its last frame for ever."""
@@ -369,7 +427,7 @@ def _recorded_truth(url: str) -> SceneTruth | None:
     from eitskin.device.recordings.recording import read_head, recorded_options
     from eitskin.scoring.matching import match
 
-    path = url.partition(":")[2]
+    path = split_timing(url)[0].partition(":")[2]
     solver = recorded_options(path)
     try:
         match([], [])  # scipy, which every comparison with the truth needs

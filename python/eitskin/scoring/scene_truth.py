@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.device.sample import Sample
+from eitskin.device.timing import split_timing
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.random_touches import TrueTouch
@@ -24,11 +25,14 @@ LOOKED_FOR = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 class SceneTruth:
     """The touches of ``scene`` at the board's times; ``sign`` is which changes the board looks for.
     A simulated board shows the scene's frame that is nearest to the beginning of a scan, an
-    emulated one (``held``) the last that has begun by then.
+    emulated one (``held``) the last that has begun by then. With ``loop`` the scene begins again
+    at its end: a simulated board's with the next scan, an emulated one's at once.
     """
 
-    def __init__(self, scene: Scene, sign: str = "increase", *, held: bool = False) -> None:
-        self.scene = scene
+    def __init__(
+        self, scene: Scene, sign: str = "increase", *, held: bool = False, loop: bool = False
+    ) -> None:
+        self.scene, self._held, self._loop = scene, held, loop
         self._ahead = 1e-9 if held else 0.5
         self.gate_mm = GATE_MM * size_to_paper(scene.skin.outline)
         self._samples, self._wanted = scene.samples(), LOOKED_FOR[sign]
@@ -43,6 +47,8 @@ class SceneTruth:
         """What was there when the scan of a frame began at ``time_us``."""
         if self._began_us is None:
             self._began_us = time_us
+        if self._loop:
+            self._begin_again(time_us)
         frame = min(self._frame(time_us), self.scene.frames - 1)
         return tuple(
             t
@@ -52,7 +58,19 @@ class SceneTruth:
 
     def over(self, time_us: int) -> bool:
         """Whether the scene has ended when the scan of a frame begins at ``time_us``."""
-        return self._began_us is not None and self._frame(time_us) >= self.scene.frames
+        began = self._began_us is not None
+        return began and not self._loop and self._frame(time_us) >= self.scene.frames
+
+    def _begin_again(self, time_us: int) -> None:
+        """Let time 0 be that of the loop in which a scan begins at ``time_us``."""
+        scene, late = self.scene, self._frame(time_us) - self.scene.frames
+        if late < 0 or self._began_us is None:
+            return
+        if late == 0 and not self._held:
+            self._began_us = time_us
+        else:
+            loops = 1 + late // scene.frames
+            self._began_us += round(1e6 * loops * scene.frames / scene.rate_hz)
 
     def _frame(self, time_us: int) -> int:
         elapsed_s = ((time_us - (self._began_us or 0)) % WRAP_US) / 1e6
@@ -67,8 +85,10 @@ class SceneTruth:
 def truth_of(url: str, sign: str = "increase") -> SceneTruth | None:
     """The truth of a simulated or emulated board's scene; None for any other device. Raises as
     ``scene_of``."""
-    scene = scene_of(url)
-    return None if scene is None else SceneTruth(scene, sign, held=url.startswith("emu:"))
+    scene, (bare, timing) = scene_of(url), split_timing(url)
+    if scene is None:
+        return None
+    return SceneTruth(scene, sign, held=bare.startswith("emu:"), loop=timing.loop)
 
 
 def scene_of(url: str) -> Scene | None:
@@ -77,7 +97,7 @@ def scene_of(url: str) -> Scene | None:
     Raises:
         FileError, ConfigError, GeometryError, ProtocolError: it cannot be read.
     """
-    scheme, _, rest = url.partition(":")
+    scheme, _, rest = split_timing(url)[0].partition(":")
     return find_scene(rest) if scheme in ("sim", "emu") else None
 
 

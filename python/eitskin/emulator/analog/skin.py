@@ -60,6 +60,11 @@ class AnalogSkin:
         """Let the scene's time 0 be ``at`` (ticks)."""
         self._began = at
 
+    def begin_again(self) -> None:
+        """Let time 0 be when the scene ended."""
+        assert self._began is not None
+        self._began += round(len(self.frames_v) * TICKS_PER_S / self.rate_hz)
+
     def over(self, at: int) -> bool:
         """Whether the scene has ended."""
         return self._began is not None and self.frame_number(at) >= len(self.frames_v)
