@@ -112,41 +112,46 @@ static void leaving_out_is_solving_again_without(void)
         CHECK_EQUAL(n, count == 2 ? 16 : 12);
         CHECK_NEAR(now.here, q.here, 1e4 * EPS * q.here);
         CHECK_NEAR(now.least, least_without(&q, &answer, out, s), room * q.here);
+        const eits_answer whole = answer;
+        uint32_t is[3] = {0, 1, 2}; /* which disc of the whole answer each is */
         for (uint32_t round = 0; round < count; ++round) {
-            const double before = least_without(&q, &answer, out, s);
-            for (int i = 0; i < n; ++i) {
-                if (out[(uint32_t)i / answer.parameters])
-                    continue;
-                double unit = 0;
-                CHECK_NEAR(now.step[i], s[i], 10 * room * (1 + fabs(s[i])));
-                for (int j = 0; j < n; ++j) { /* a row of A^-1 A, within the discs that are left */
-                    unit = 0;
-                    for (int k = 0; k < n; ++k)
-                        unit += out[(uint32_t)k / answer.parameters]
-                                    ? 0
-                                    : (double)ctx->scratch
-                                              .square[EITS_STRIDE(n) * (uint32_t)i + (uint32_t)k] *
-                                          q.a[k][j];
-                    if (!out[(uint32_t)j / answer.parameters])
-                        CHECK_NEAR(unit, i == j,
-                                   30 * room * sqrt(q.a[j][j] / q.a[i][i]) + 10 * room);
+            const double before = least_without(&q, &whole, out, s);
+            const uint32_t p = answer.parameters, left = (count - round) * p;
+            CHECK_EQUAL(now.count, left);
+            for (uint32_t i = 0; i < left; ++i) {
+                const uint32_t of_i = is[i / p] * p + i % p;
+                CHECK_NEAR(now.step[i], s[of_i], 10 * room * (1 + fabs(s[of_i])));
+                for (uint32_t j = 0; j < left; ++j) { /* A^-1 A, within the discs that are left */
+                    const uint32_t of_j = is[j / p] * p + j % p;
+                    double unit = 0;
+                    for (uint32_t k = 0; k < left; ++k)
+                        unit += (double)ctx->scratch.square[EITS_STRIDE(left) * i + k] *
+                                q.a[is[k / p] * p + k % p][of_j];
+                    CHECK_NEAR(unit, i == j,
+                               30 * room * sqrt(q.a[of_j][of_j] / q.a[of_i][of_i]) + 10 * room);
                 }
             }
-            for (uint32_t k = 0; k < count; ++k) {
-                if (out[k])
-                    continue;
-                out[k] = 1;
-                const double rise = least_without(&q, &answer, out, s) - before;
+            for (uint32_t k = 0; k < answer.count; ++k) {
+                out[is[k]] = 1;
+                const double rise = least_without(&q, &whole, out, s) - before;
                 CHECK(rise > 0);
                 CHECK_NEAR(eits_linear_rise(&ctx->scratch, &answer, &now, k), rise,
                            10 * room * rise);
-                out[k] = 0;
+                out[is[k]] = 0;
             }
-            const uint32_t gone = (round + 1) % count;
+            const uint32_t gone = round == 0 ? 1 : 0;
             CHECK(eits_linear_drop(ctx, &ctx->scratch, &answer, &now, gone) > 0);
-            out[gone] = 1;
-            const double least = least_without(&q, &answer, out, s);
+            CHECK_EQUAL(answer.count, count - round - 1);
+            out[is[gone]] = 1;
+            for (uint32_t k = gone; k < answer.count; ++k)
+                is[k] = is[k + 1];
+            const double least = least_without(&q, &whole, out, s);
             CHECK_NEAR(now.least, least, 10 * room * least);
+            if (answer.count == 1) { /* as the other linearised by itself */
+                eits_likelihood alone;
+                (void)eits_linearise(ctx, &ctx->scratch, &answer, &alone);
+                CHECK_NEAR(now.here, alone.here, 1e4 * EPS * q.here);
+            }
         }
         dense_bench_close(&b.b);
     }
@@ -172,8 +177,9 @@ static void refitting_lowers_the_misfit_by_limited_steps(void)
     near.disc[0].x_mm += 2;
     near.disc[0].change *= R(0.8);
     (void)eits_linearise(ctx, &ctx->scratch, &near, &now);
-    CHECK(eits_refit(ctx, &ctx->scratch, &near, 0) > 0);
-    CHECK(near.misfit < R(0.05) * now.here);
+    const eits_real here = now.here;
+    CHECK(eits_refit(ctx, &ctx->scratch, &near, &now, 0) > 0);
+    CHECK(near.misfit < R(0.05) * here);
     CHECK_NEAR(near.disc[0].x_mm, ONE.x_mm, 0.2);
     CHECK_NEAR(near.disc[0].change, ONE.change, 0.05 * (double)ONE.change);
     for (int k = 0; k < 8; ++k) {
@@ -183,9 +189,10 @@ static void refitting_lowers_the_misfit_by_limited_steps(void)
         far.disc[0].change *= k < 4 ? R(8.0) : R(0.05);
         const eits_disc before = far.disc[0];
         (void)eits_linearise(ctx, &ctx->scratch, &far, &now);
-        (void)eits_refit(ctx, &ctx->scratch, &far, 0);
+        const eits_real from = now.here;
+        (void)eits_refit(ctx, &ctx->scratch, &far, &now, 0);
         const eits_disc *after = &far.disc[0];
-        CHECK(far.misfit <= now.here && after->change > 0);
+        CHECK(far.misfit <= from && after->change > 0);
         CHECK(after->change >= R(0.124) * before.change && after->change <= R(8.1) * before.change);
         CHECK(eits_fabs(after->x_mm - before.x_mm) <= R(18.01) &&
               eits_fabs(after->y_mm - before.y_mm) <= R(18.01) &&
@@ -194,7 +201,8 @@ static void refitting_lowers_the_misfit_by_limited_steps(void)
               after->radius_mm <= ctx->options.touch_max_radius_mm);
     }
     eits_answer none = {.count = 0, .parameters = 8};
-    (void)eits_refit(ctx, &ctx->scratch, &none, 0);
+    (void)eits_refit(ctx, &ctx->scratch, &none, &now, 0);
+    CHECK_EQUAL(now.at_hand, 0);
     double *data = dense_copy(ctx->evidence.data, RANK);
     CHECK_NEAR(none.misfit, dense_dot(data, data, RANK), 100 * EPS * (double)none.misfit);
     free(data);

@@ -7,9 +7,10 @@
  * while F rises by less than the threshold, times what the data fit worse than they should: where
  * the model is wrong by more than it says, more is asked of a touch.
  *
- * The whole is done a second time for a sheet that has drifted since its reference (+ D), and the
- * likelier of the two stands, by F + threshold n + log det Sigma: allowing for a drift that is not
- * there would cost light touches. */
+ * As soon as the data are found not to fit, the same is done for a sheet that has drifted since its
+ * reference (+ D). The likelier of the two stands, by F + threshold n + log det Sigma: allowing for
+ * a drift that is not there would cost light touches. What has no drift is gone on with only where
+ * F as it is leaves it a chance. */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
@@ -19,20 +20,21 @@
 /* One hypothesis's answer, and what is known of each disc of it. */
 typedef struct verdict {
     eits_answer answer;
-    eits_real evidence; /* F + threshold n + log det Sigma */
+    eits_real log_determinant; /* of Sigma */
     eits_real rise[EITS_MAX_TOUCHES];
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
     eits_real best_mm[EITS_MAX_TOUCHES][2]; /* where the linearisation has the disc */
     eits_real pair[EITS_MAX_TOUCHES];       /* log odds that it is two (pair.c) */
     int changed;                            /* 1: discs were dropped or merged */
-    int clear;                              /* 1: by the linearisation without shapes alone */
+    int fitted;                             /* 1: in Sigma's metric */
+    int linear; /* 1: what the linearisation can do without is to be left out at once */
 } verdict;
 
 /* How much worse the data fit than Sigma says; at least 1. */
 static eits_real excess(const eits_context *ctx, eits_real misfit, uint32_t count)
 {
     const eits_real data = (eits_real)(ctx->model->rank - ctx->evidence.drifts),
-                    free = data - R(4.0) * (eits_real)count,
+                    free = data - (eits_real)(EITS_PLACE_PARAMETERS * count),
                     of = misfit / (free > EITS_MIN_FREEDOM ? free : EITS_MIN_FREEDOM);
     return of > 1 ? of : 1;
 }
@@ -62,47 +64,37 @@ static int any_may_be_one(const verdict *v, eits_real needed)
     return 0;
 }
 
-static eits_answer without(const eits_context *ctx, const eits_answer *from, uint32_t k)
+/* As many shapes as there is room for; what is at hand is then of another answer. */
+static void add_shapes(const eits_context *ctx, eits_answer *answer, eits_likelihood *likelihood)
 {
-    eits_answer to = *from;
-    --to.count;
-    for (uint32_t l = k; l < to.count && l + 1u < EITS_MAX_TOUCHES; ++l) {
-        to.disc[l] = to.disc[l + 1];
-        to.radius_mm[l] = to.radius_mm[l + 1];
-        memcpy(to.shape[l], to.shape[l + 1], sizeof to.shape[l]);
+    const uint32_t parameters = eits_shape_parameters(ctx, answer->count);
+    if (parameters > answer->parameters) {
+        answer->parameters = parameters;
+        likelihood->at_hand = 0;
     }
-    const uint32_t parameters = eits_shape_parameters(ctx, to.count);
-    to.parameters = parameters > to.parameters ? parameters : to.parameters;
-    return to;
 }
 
 /* Discs i < j as one of the same strength. */
-static eits_answer with_merged(const eits_context *ctx, const eits_answer *from, uint32_t i,
-                               uint32_t j)
+static void merge(const eits_context *ctx, eits_answer *answer, uint32_t i, uint32_t j)
 {
-    const eits_disc *a = &from->disc[i], *b = &from->disc[j];
-    eits_answer to = without(ctx, from, j);
-    eits_disc one = eits_merged_disc(&ctx->options, a, b);
-    one.change =
-        (a->change * a->radius_mm * a->radius_mm + b->change * b->radius_mm * b->radius_mm) /
-        (one.radius_mm * one.radius_mm);
-    to.disc[i] = one;
-    to.radius_mm[i] = one.radius_mm;
-    memset(to.shape[i], 0, sizeof to.shape[i]);
-    return to;
+    const eits_disc a = answer->disc[i], b = answer->disc[j];
+    eits_disc one = eits_merged_disc(&ctx->options, &a, &b);
+    one.change = (a.change * a.radius_mm * a.radius_mm + b.change * b.radius_mm * b.radius_mm) /
+                 (one.radius_mm * one.radius_mm);
+    eits_leave_out(answer, j);
+    answer->disc[i] = one;
+    answer->radius_mm[i] = one.radius_mm;
+    memset(answer->shape[i], 0, sizeof answer->shape[i]);
 }
 
-/* Rises of the discs that are `in` the linearisation; returns the weakest of these, or count. */
-static uint32_t weakest_of(const eits_scratch *scratch, const eits_likelihood *likelihood,
-                           const uint8_t *out, verdict *v)
+/* Rises of the answer's discs; returns the weakest. */
+static uint32_t weakest_of(const eits_scratch *scratch, const eits_answer *answer,
+                           const eits_likelihood *likelihood, eits_real *rise)
 {
-    uint32_t weakest = v->answer.count;
-    for (uint32_t k = 0; k < v->answer.count; ++k) {
-        if (out != NULL && out[k])
-            continue;
-        v->rise[k] = eits_linear_rise(scratch, &v->answer, likelihood, k);
-        if (weakest == v->answer.count || v->rise[k] < v->rise[weakest])
-            weakest = k;
+    uint32_t weakest = 0;
+    for (uint32_t k = 0; k < answer->count; ++k) {
+        rise[k] = eits_linear_rise(scratch, answer, likelihood, k);
+        weakest = rise[k] < rise[weakest] ? k : weakest;
     }
     return weakest;
 }
@@ -132,177 +124,220 @@ static void places_of(const eits_context *ctx, const eits_scratch *scratch,
     pairs_of(scratch, likelihood, v);
 }
 
-/* Linearise, and set what is known of each disc by it. Returns the weakest. */
-static uint32_t look(eits_context *ctx, const eits_scratch *scratch, verdict *v, int fitted,
-                     eits_likelihood *likelihood, uint64_t *macs)
+/* Set what is known of each disc by the linearisation. Returns the weakest. */
+static uint32_t look(const eits_context *ctx, const eits_scratch *scratch, verdict *v,
+                     const eits_likelihood *likelihood)
 {
-    *macs += eits_linearise(ctx, scratch, &v->answer, likelihood);
-    if (!fitted)
+    if (!v->fitted)
         v->answer.misfit = likelihood->least;
     places_of(ctx, scratch, likelihood, v);
-    return weakest_of(scratch, likelihood, NULL, v);
+    return weakest_of(scratch, &v->answer, likelihood, v->rise);
 }
 
+/* What F is to rise by without a touch. */
 static eits_real needed(const eits_context *ctx, const verdict *v)
 {
     return EITS_TOUCH_EVIDENCE * excess(ctx, v->answer.misfit, v->answer.count);
 }
 
-/* Leave out, one after another, whatever the linearisation can do without. Returns how many stay;
- * `out` marks those that do not. */
-static uint32_t drop_linearly(eits_context *ctx, const eits_scratch *scratch, verdict *v,
-                              eits_likelihood *likelihood, uint8_t *out, uint64_t *macs)
+/* Whether the data are explained about as well as Sigma says. */
+static int fits(const eits_context *ctx, const verdict *v)
 {
-    uint32_t left = v->answer.count;
-    memset(out, 0, EITS_MAX_TOUCHES);
-    while (left > ctx->reference.far) {
-        const uint32_t k = weakest_of(scratch, likelihood, out, v);
-        if (!(v->rise[k] < EITS_TOUCH_EVIDENCE * excess(ctx, likelihood->least, left)))
-            break;
-        *macs += eits_linear_drop(ctx, scratch, &v->answer, likelihood, k);
-        out[k] = 1;
-        --left;
-    }
-    return left;
+    return excess(ctx, v->answer.misfit, v->answer.count) <= EITS_FITS;
 }
 
-/* The discs that stay, fitted again; taken where F has risen by no more than they were found to be
- * worth. */
-static int take_linear(eits_context *ctx, const eits_scratch *scratch, verdict *v,
-                       const uint8_t *out, uint32_t left, uint64_t *macs)
+/* F + threshold n + log det Sigma */
+static eits_real evidence(const verdict *v)
 {
-    const eits_real before = v->answer.misfit;
-    eits_answer rest = v->answer;
-    for (uint32_t k = v->answer.count; k-- > 0;) {
-        if (out[k])
-            rest = without(ctx, &rest, k);
-    }
-    *macs += eits_refit(ctx, scratch, &rest, 0);
-    const eits_real allowed = EITS_TOUCH_EVIDENCE * excess(ctx, rest.misfit, left);
-    if (!(rest.misfit - before < allowed * (eits_real)(v->answer.count - left)))
+    return eits_fma(EITS_TOUCH_EVIDENCE, (eits_real)v->answer.count, v->answer.misfit) +
+           v->log_determinant;
+}
+
+/* Take a simpler answer where F rises by less than is allowed. */
+static int take(verdict *v, const eits_answer *simpler, eits_real allowed)
+{
+    if (!(simpler->misfit - v->answer.misfit < allowed))
         return 0;
-    v->answer = rest;
+    v->answer = *simpler;
     v->changed = 1;
     return 1;
+}
+
+/* Leave out of `rest`, one after another from the weakest on, whatever the linearisation can do
+ * without. */
+static void drop_linearly(eits_context *ctx, const eits_scratch *scratch, const verdict *v,
+                          uint32_t weakest, eits_answer *rest, eits_likelihood *likelihood,
+                          uint64_t *macs)
+{
+    eits_real rise[EITS_MAX_TOUCHES];
+    memcpy(rise, v->rise, sizeof rise);
+    while (rise[weakest] < EITS_TOUCH_EVIDENCE * excess(ctx, likelihood->least, rest->count)) {
+        *macs += eits_linear_drop(ctx, scratch, rest, likelihood, weakest);
+        if (rest->count <= ctx->reference.far)
+            break;
+        weakest = weakest_of(scratch, rest, likelihood, rise);
+    }
+    add_shapes(ctx, rest, likelihood);
+}
+
+/* The same, fitted again; taken where F has risen by no more than the discs were found to be worth.
+ * Returns 1 if it was, -1 if not, 0 where there is nothing to leave out. */
+static int take_linear(eits_context *ctx, const eits_scratch *scratch, verdict *v, uint32_t weakest,
+                       eits_likelihood *likelihood, uint64_t *macs)
+{
+    eits_answer rest = v->answer;
+    drop_linearly(ctx, scratch, v, weakest, &rest, likelihood, macs);
+    if (rest.count == v->answer.count)
+        return 0;
+    *macs += eits_refit(ctx, scratch, &rest, likelihood, 0);
+    const eits_real allowed = EITS_TOUCH_EVIDENCE * excess(ctx, rest.misfit, rest.count);
+    return take(v, &rest, allowed * (eits_real)(v->answer.count - rest.count)) ? 1 : -1;
 }
 
 /* The best of the answers with one disc less: without the weakest, or with a near pair as one. */
 static int take_simpler(eits_context *ctx, const eits_scratch *scratch, verdict *v,
-                        uint32_t weakest, uint64_t *macs)
+                        uint32_t weakest, eits_likelihood *likelihood, uint64_t *macs)
 {
-    const eits_answer *from = &v->answer;
-    const eits_real threshold = needed(ctx, v), enough = from->misfit + threshold;
-    eits_answer best = without(ctx, from, weakest);
-    *macs += eits_refit(ctx, scratch, &best, enough);
-    for (uint32_t j = 1; j < from->count; ++j) {
+    const eits_real threshold = needed(ctx, v), enough = v->answer.misfit + threshold;
+    eits_answer best = v->answer;
+    *macs += eits_linear_drop(ctx, scratch, &best, likelihood, weakest);
+    add_shapes(ctx, &best, likelihood);
+    *macs += eits_refit(ctx, scratch, &best, likelihood, enough);
+    for (uint32_t j = 1; j < v->answer.count; ++j) {
         for (uint32_t i = 0; i < j; ++i) {
             if (!may_be_one(v, i, j, threshold))
                 continue;
-            eits_answer one = with_merged(ctx, from, i, j);
-            *macs += eits_refit(ctx, scratch, &one, enough);
+            eits_answer one = v->answer;
+            merge(ctx, &one, i, j);
+            add_shapes(ctx, &one, likelihood);
+            likelihood->at_hand = 0;
+            *macs += eits_refit(ctx, scratch, &one, likelihood, enough);
             if (one.misfit < best.misfit)
                 best = one;
+            else
+                likelihood->at_hand = 0;
         }
     }
-    if (!(best.misfit - from->misfit < needed(ctx, v)))
-        return 0;
-    v->answer = best;
-    v->changed = 1;
-    return 1;
+    return take(v, &best, threshold);
 }
 
-/* From the discs as they are to those that stay, under the covariance at hand. */
-static void eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v, uint64_t *macs)
+/* From the discs as they are to those that stay, under the covariance at hand; not `to_the_end`: 0
+ * as soon as the data are found not to fit, to be gone on with another time. */
+static int eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v, int to_the_end,
+                     uint64_t *macs)
 {
-    eits_likelihood likelihood;
-    uint8_t out[EITS_MAX_TOUCHES];
-    int fitted = 0, linear = 1;
+    eits_likelihood now = {.at_hand = 0};
     while (v->answer.count > ctx->reference.far) {
-        uint32_t weakest = look(ctx, scratch, v, fitted, &likelihood, macs);
+        if (!now.at_hand)
+            *macs += eits_linearise(ctx, scratch, &v->answer, &now);
+        uint32_t weakest = look(ctx, scratch, v, &now);
         if (v->rise[weakest] > EITS_CLEAR * needed(ctx, v) && !any_may_be_one(v, needed(ctx, v)))
-            return;
-        if (linear) {
-            const uint32_t left = drop_linearly(ctx, scratch, v, &likelihood, out, macs);
-            if (left < v->answer.count) {
-                linear = take_linear(ctx, scratch, v, out, left, macs);
-                fitted = linear || fitted;
+            return 1;
+        if (!to_the_end && !fits(ctx, v))
+            return 0;
+        if (v->linear) {
+            const int taken = take_linear(ctx, scratch, v, weakest, &now, macs);
+            v->linear = taken >= 0;
+            v->fitted |= taken > 0;
+            if (taken > 0)
                 continue;
-            }
+            now.at_hand = now.at_hand && taken == 0;
         }
         /* too many to try each: what is left is believed */
         if (ctx->evidence.columns_made > EITS_TEST_COLUMNS)
-            return;
-        if (!fitted) {
-            *macs += eits_refit(ctx, scratch, &v->answer, 0);
-            weakest = look(ctx, scratch, v, 1, &likelihood, macs);
-            fitted = 1;
-        }
-        if (!take_simpler(ctx, scratch, v, weakest, macs))
-            return;
+            return 1;
+        const int was_fitted = v->fitted;
+        if (!was_fitted)
+            *macs += eits_refit(ctx, scratch, &v->answer, &now, 0);
+        v->fitted = 1;
+        if (!now.at_hand)
+            *macs += eits_linearise(ctx, scratch, &v->answer, &now);
+        if (!was_fitted)
+            weakest = look(ctx, scratch, v, &now);
+        if (!to_the_end && !fits(ctx, v))
+            return 0;
+        if (!take_simpler(ctx, scratch, v, weakest, &now, macs))
+            return 1;
     }
-    *macs += eits_refit(ctx, scratch, &v->answer, 0);
-    if (v->answer.count > 0) /* on an instrument that is far from the model one stays */
-        (void)look(ctx, scratch, v, 1, &likelihood, macs);
+    v->fitted = 1;
+    *macs += eits_refit(ctx, scratch, &v->answer, &now, 0);
+    if (v->answer.count == 0)
+        return 1;
+    /* on an instrument that is far from the model one stays */
+    if (!now.at_hand)
+        *macs += eits_linearise(ctx, scratch, &v->answer, &now);
+    (void)look(ctx, scratch, v, &now);
+    return 1;
 }
 
 /* Whether the discs need no closer look: as discs, which costs least. Where discs leave something,
  * one look at their shapes then tells whether one may be two. */
 static int is_clear(eits_context *ctx, const eits_scratch *scratch, verdict *v, uint64_t *macs)
 {
-    eits_likelihood likelihood;
+    eits_likelihood now;
     const uint32_t all = v->answer.parameters;
     v->answer.parameters = EITS_PLACE_PARAMETERS;
-    const uint32_t weakest = look(ctx, scratch, v, 0, &likelihood, macs);
-    v->clear = v->rise[weakest] > EITS_CLEAR_AS_DISCS * needed(ctx, v) &&
-               !any_may_be_one(v, needed(ctx, v)) &&
-               excess(ctx, v->answer.misfit, v->answer.count) < EITS_FITS_AS_DISCS;
+    *macs += eits_linearise(ctx, scratch, &v->answer, &now);
+    const uint32_t weakest = look(ctx, scratch, v, &now);
+    const int clear = v->rise[weakest] > EITS_CLEAR_AS_DISCS * needed(ctx, v) &&
+                      !any_may_be_one(v, needed(ctx, v)) &&
+                      excess(ctx, v->answer.misfit, v->answer.count) < EITS_FITS_AS_DISCS;
     v->answer.parameters = all;
-    if (v->clear && all > EITS_PLACE_PARAMETERS &&
+    if (clear && all > EITS_PLACE_PARAMETERS &&
         v->answer.misfit > EITS_PAIR_MISFIT * (eits_real)ctx->model->rank) {
-        *macs += eits_linearise(ctx, scratch, &v->answer, &likelihood);
-        pairs_of(scratch, &likelihood, v);
+        *macs += eits_linearise(ctx, scratch, &v->answer, &now);
+        pairs_of(scratch, &now, v);
     }
-    return v->clear;
+    return clear;
 }
 
-static verdict judge(eits_context *ctx, const eits_scratch *scratch, const eits_fit *f, int drift,
-                     uint64_t *macs)
+/* The covariance, and the data in its metric; 0 where there is none. */
+static int take_errors(eits_context *ctx, const eits_scratch *scratch, const eits_fit *f,
+                       verdict *v, int drift, uint64_t *macs)
 {
-    verdict v = {.evidence = -1};
-    eits_real log_determinant;
-    v.answer.count = f->count;
-    v.answer.parameters = eits_shape_parameters(ctx, f->count);
-    if (v.answer.parameters == 0 ||
-        !eits_factor_covariance(ctx, scratch, drift, &log_determinant, macs)) {
-        v.answer.parameters = 0;
-        return v;
-    }
-    for (uint32_t k = 0; k < f->count; ++k) {
-        v.answer.disc[k] = f->disc[k];
-        v.answer.radius_mm[k] = f->disc[k].radius_mm;
-    }
-    ctx->evidence.columns_made = 0;
+    if (!eits_factor_covariance(ctx, scratch, drift, &v->log_determinant, macs))
+        return 0;
     eits_copy(ctx->evidence.data, f->data, EITS_STRIDE(ctx->model->rank));
     *macs += eits_whiten_errors(ctx, ctx->evidence.data);
-    if (drift || !is_clear(ctx, scratch, &v, macs))
-        eliminate(ctx, scratch, &v, macs);
-    v.evidence =
-        eits_fma(EITS_TOUCH_EVIDENCE, (eits_real)v.answer.count, v.answer.misfit) + log_determinant;
-    return v;
+    return 1;
+}
+
+/* Which discs stay, in v, which has them all; 0 where they cannot be tested. */
+static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, verdict *v)
+{
+    verdict drifted = *v;
+    uint64_t *macs = &f->macs;
+    if (v->answer.parameters == 0 || !take_errors(ctx, scratch, f, v, 0, macs))
+        return 0;
+    ctx->evidence.columns_made = 0;
+    if (is_clear(ctx, scratch, v, macs))
+        return 1;
+    int whole = eliminate(ctx, scratch, v, 0, macs);
+    if (fits(ctx, v))
+        return 1;
+    const int drifts = take_errors(ctx, scratch, f, &drifted, 1, macs);
+    if (drifts)
+        (void)eliminate(ctx, scratch, &drifted, 1, macs);
+    if (!whole && (!drifts || evidence(&drifted) >= v->answer.misfit + v->log_determinant))
+        whole = take_errors(ctx, scratch, f, v, 0, macs) && eliminate(ctx, scratch, v, 1, macs);
+    if (drifts && (!whole || evidence(&drifted) < evidence(v)))
+        *v = drifted;
+    return 1;
 }
 
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     if (f->count == 0)
         return;
-    verdict v = judge(ctx, scratch, f, 0, &f->macs);
-    if (v.answer.parameters == 0)
-        return;
-    if (!v.clear && excess(ctx, v.answer.misfit, v.answer.count) > EITS_FITS) {
-        const verdict drifted = judge(ctx, scratch, f, 1, &f->macs);
-        if (drifted.answer.parameters > 0 && drifted.evidence < v.evidence)
-            v = drifted;
+    verdict v = {.linear = 1};
+    v.answer.count = f->count;
+    v.answer.parameters = eits_shape_parameters(ctx, f->count);
+    for (uint32_t k = 0; k < f->count; ++k) {
+        v.answer.disc[k] = f->disc[k];
+        v.answer.radius_mm[k] = f->disc[k].radius_mm;
     }
+    if (!judge(ctx, scratch, f, &v))
+        return;
     const eits_real unit = excess(ctx, v.answer.misfit, v.answer.count);
     f->tested = 1;
     for (uint32_t k = 0; k < v.answer.count; ++k) {

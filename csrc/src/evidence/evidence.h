@@ -46,18 +46,27 @@ uint64_t eits_whiten_errors(const eits_context *ctx, eits_real *v);
 /* How many parameters each of `count` discs gets. */
 uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count);
 
+/* How much of a parameter's column disc k has. */
+eits_real eits_shape_part(const eits_answer *answer, uint32_t k, uint32_t parameter);
+
 /* evidence.column of disc k of the answer, R'^-1 applied, each times the disc's change; and
  * evidence.left less what the disc answers. */
 uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
                             const eits_answer *answer, uint32_t k);
 
+/* The answer without disc k, the others as they are. */
+void eits_leave_out(eits_answer *answer, uint32_t k);
+
 /* likelihood.c */
 
-/* What one linearisation of F tells: scratch->square has the inverse of its matrix. */
+/* What one linearisation of F about an answer tells. */
 typedef struct eits_likelihood {
     eits_real here;  /* F of the discs as they are */
     eits_real least; /* at the linearisation's minimum */
     uint32_t count;  /* parameters of all discs */
+    /* 1: of the answer in question, and the last that was made: scratch->square has the inverse of
+     * its matrix, evidence.column and evidence.left are its */
+    int at_hand;
     eits_real step[EITS_EVIDENCE_COLUMNS];
 } eits_likelihood;
 
@@ -69,15 +78,15 @@ uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const ei
 eits_real eits_linear_rise(const eits_scratch *scratch, const eits_answer *answer,
                            const eits_likelihood *likelihood, uint32_t k);
 
-/* Leave disc k out of the linearisation: least, step and the inverse of the others become what they
- * are without it; its own are of no use any more, nor are its columns. */
-uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
+/* Leave disc k out of the answer and of its linearisation, which becomes that of the others where
+ * they are. */
+uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
                           eits_likelihood *likelihood, uint32_t k);
 
 /* Gauss and Newton's steps, a few at most, until F is `enough` or hardly falls; sets
- * answer->misfit. */
+ * answer->misfit. `likelihood` is made unless it is at hand; afterwards it may be or not. */
 uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
-                    eits_real enough);
+                    eits_likelihood *likelihood, eits_real enough);
 
 /* elimination.c */
 

@@ -31,6 +31,19 @@ static eits_real offset(const eits_answer *answer, uint32_t k, uint32_t paramete
     return answer->shape[k][parameter - EITS_PLACE_PARAMETERS];
 }
 
+/* The priors' part of F. */
+static eits_real prior_of(const eits_answer *answer)
+{
+    eits_real sum = 0;
+    for (uint32_t k = 0; k < answer->count; ++k) {
+        for (uint32_t p = 0; p < answer->parameters; ++p) {
+            const eits_real off = offset(answer, k, p);
+            sum = eits_fma(precision(p) * off, off, sum);
+        }
+    }
+    return sum;
+}
+
 static eits_real *row_of_square(const eits_scratch *scratch, uint32_t count, uint32_t i)
 {
     return scratch->square + EITS_STRIDE(count) * i;
@@ -91,11 +104,13 @@ uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const ei
     eits_real gradient[EITS_EVIDENCE_COLUMNS];
     uint64_t macs = 0;
     out->count = n;
+    out->at_hand = 1;
     ctx->evidence.columns_made += n;
     eits_copy(ctx->evidence.left, ctx->evidence.data, stride);
     for (uint32_t k = 0; k < answer->count; ++k)
         macs += eits_shape_columns(ctx, scratch, answer, k);
-    out->here = eits_dot(ctx->kernels, ctx->evidence.left, ctx->evidence.left, rank);
+    out->here =
+        eits_dot(ctx->kernels, ctx->evidence.left, ctx->evidence.left, rank) + prior_of(answer);
     for (uint32_t i = 0; i < n; ++i) {
         const uint32_t k = i / answer->parameters, p = i % answer->parameters;
         const eits_real *column = ctx->evidence.column + stride * i, off = offset(answer, k, p);
@@ -104,7 +119,6 @@ uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const ei
         row[i] += precision(p);
         gradient[i] =
             eits_fma(-precision(p), off, eits_dot(ctx->kernels, column, ctx->evidence.left, rank));
-        out->here = eits_fma(precision(p) * off, off, out->here);
     }
     factor(ctx, scratch, n);
     invert(ctx, scratch, n);
@@ -153,18 +167,39 @@ eits_real eits_linear_rise(const eits_scratch *scratch, const eits_answer *answe
     return hold(scratch, answer, likelihood, k, l, w);
 }
 
+/* Rows and columns from..from + count - 1 go from the inverse and the step; rows from the
+ * columns. */
+static void close_up(eits_context *ctx, const eits_scratch *scratch, eits_likelihood *likelihood,
+                     uint32_t from, uint32_t count)
+{
+    const uint32_t n = likelihood->count, left = n - count, after = left - from;
+    const size_t stride = EITS_STRIDE(ctx->model->rank);
+    for (uint32_t i = 0; i < left; ++i) { /* each to a place at or before its own */
+        const eits_real *row = row_of_square(scratch, n, i < from ? i : i + count);
+        eits_real *to = row_of_square(scratch, left, i);
+        eits_copy(to, row, from);
+        eits_copy(to + from, row + from + count, after);
+    }
+    eits_real *column = ctx->evidence.column + stride * from, *step = likelihood->step + from;
+    eits_copy(column, column + stride * count, stride * after);
+    eits_copy(step, step + count, after);
+    likelihood->count = left;
+}
+
 /* With W = L^-1 times the block's rows of A^-1, the others' inverse is A^-1 - W'W and their step
  * s - W'w (Schur's complement). W takes the place of the disc's columns. */
-uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
+uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
                           eits_likelihood *likelihood, uint32_t k)
 {
-    const uint32_t p = answer->parameters, n = likelihood->count, first = k * p;
-    const size_t stride = EITS_STRIDE(ctx->model->rank);
+    const uint32_t p = answer->parameters, n = likelihood->count, first = k * p,
+                   rank = ctx->model->rank;
+    const size_t stride = EITS_STRIDE(rank);
     eits_real w[EITS_SHAPE_PARAMETERS], *of_block = ctx->evidence.column + stride * first;
     block l;
     likelihood->least += hold(scratch, answer, likelihood, k, l, w);
     for (uint32_t i = 0; i < p; ++i) {
         eits_real *row = of_block + stride * i;
+        eits_axpy(ctx->kernels, ctx->evidence.left, eits_shape_part(answer, k, i), row, rank);
         eits_copy(row, row_of_square(scratch, n, first + i), n);
         for (uint32_t m = 0; m < i; ++m)
             eits_axpy(ctx->kernels, row, -l[i][m], of_block + stride * m, n);
@@ -177,7 +212,11 @@ uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, const 
         for (uint32_t j = 0; j < n; ++j)
             eits_axpy(ctx->kernels, row_of_square(scratch, n, j), -row[j], row, n);
     }
-    return (uint64_t)p * n * (n + p);
+    close_up(ctx, scratch, likelihood, first, p);
+    eits_leave_out(answer, k);
+    likelihood->here =
+        eits_dot(ctx->kernels, ctx->evidence.left, ctx->evidence.left, rank) + prior_of(answer);
+    return (uint64_t)p * (n * (n + p) + 2u * rank);
 }
 
 static eits_real bounded(eits_real v, eits_real low, eits_real high)
@@ -210,29 +249,34 @@ static eits_answer moved(const eits_context *ctx, const eits_answer *from, const
 }
 
 uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
-                    eits_real enough)
+                    eits_likelihood *likelihood, eits_real enough)
 {
-    eits_likelihood now, next;
+    uint64_t macs = 0;
     if (answer->count == 0) {
+        likelihood->at_hand = 0;
         answer->misfit =
             eits_dot(ctx->kernels, ctx->evidence.data, ctx->evidence.data, ctx->model->rank);
         return ctx->model->rank;
     }
-    uint64_t macs = eits_linearise(ctx, scratch, answer, &now);
+    if (!likelihood->at_hand)
+        macs += eits_linearise(ctx, scratch, answer, likelihood);
     eits_real fraction = 1;
     for (int step = 0; step < EITS_REFIT_STEPS; ++step) {
-        if (now.here <= enough || now.here - now.least < EITS_SETTLED_MISFIT)
+        if (likelihood->here <= enough ||
+            likelihood->here - likelihood->least < EITS_SETTLED_MISFIT)
             break;
-        const eits_answer trial = moved(ctx, answer, now.step, fraction);
+        eits_likelihood next;
+        const eits_answer trial = moved(ctx, answer, likelihood->step, fraction);
         macs += eits_linearise(ctx, scratch, &trial, &next);
-        if (next.here < now.here) {
+        if (next.here < likelihood->here) {
             *answer = trial;
-            now = next;
+            *likelihood = next;
             fraction = 1;
         } else {
+            likelihood->at_hand = 0;
             fraction *= EITS_SHORTER;
         }
     }
-    answer->misfit = now.here;
+    answer->misfit = likelihood->here;
     return macs;
 }

@@ -11,6 +11,7 @@
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
+#include "evidence/constants.h"
 #include "frame/fold.h"
 #include "kernels/kernels.h"
 #include "touch/interaction.h"
@@ -24,9 +25,24 @@ uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count)
     const int dipoles = fields->data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE &&
                         fields->stride <= ctx->model->rank * EITS_STRIDE(ctx->model->rank);
     const uint32_t all = dipoles ? EITS_SHAPE_PARAMETERS : EITS_EDGE_PARAMETERS;
-    if (count * all <= room)
+    if (count * all <= room && count * all <= EITS_SHAPE_COLUMNS)
         return all;
     return count * EITS_PLACE_PARAMETERS <= room ? EITS_PLACE_PARAMETERS : 0;
+}
+
+eits_real eits_shape_part(const eits_answer *answer, uint32_t k, uint32_t parameter)
+{
+    if (parameter < EITS_PLACE_PARAMETERS)
+        return parameter == 0;
+    return answer->shape[k][parameter - EITS_PLACE_PARAMETERS];
+}
+
+void eits_leave_out(eits_answer *answer, uint32_t k)
+{
+    const size_t after = --answer->count - k;
+    memmove(&answer->disc[k], &answer->disc[k + 1u], after * sizeof answer->disc[k]);
+    memmove(&answer->radius_mm[k], &answer->radius_mm[k + 1u], after * sizeof answer->radius_mm[k]);
+    memmove(&answer->shape[k], &answer->shape[k + 1u], after * sizeof answer->shape[k]);
 }
 
 /* Re and Im of what the disc answers as a dipole that turns: `out`, two columns. */
@@ -82,10 +98,8 @@ uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
         macs += dipoles(ctx, scratch, disc, &column[6]);
     for (uint32_t p = 0; p < parameters; ++p) {
         macs += eits_whiten_errors(ctx, column[p]);
-        const eits_real part =
-            p == 0 ? 1
-                   : (p < EITS_PLACE_PARAMETERS ? 0 : answer->shape[k][p - EITS_PLACE_PARAMETERS]);
-        eits_axpy(ctx->kernels, ctx->evidence.left, -part, column[p], rank);
+        eits_axpy(ctx->kernels, ctx->evidence.left, -eits_shape_part(answer, k, p), column[p],
+                  rank);
     }
     return macs + (uint64_t)parameters * rank;
 }

@@ -26,6 +26,7 @@ from eitskin.core.constants_table import (
     PAIR_MISFIT,
     REFIT_STEPS,
     SETTLED_MISFIT,
+    SHAPE_COLUMNS,
     SHAPE_PRECISION,
     SHORTER,
     TEST_COLUMNS,
@@ -88,38 +89,67 @@ class Answer:
         free = np.zeros((len(self.discs), PLACE - 1))
         return np.column_stack([free, radius, self.shape])[:, : self.parameters]
 
+    def parts(self) -> FloatArray:
+        """How much of each parameter's column there is (k, parameters)."""
+        parts = self.offsets()
+        parts[:, :PLACE] = 1, 0, 0, 0
+        return parts
+
+    def prior(self) -> float:
+        """The priors' part of F."""
+        return float((self.offsets() ** 2 @ PRECISION[: self.parameters]).sum())
+
+    def without(self, k: int) -> Answer:
+        """Without disc k."""
+        return replace(
+            self,
+            discs=self.discs[:k] + self.discs[k + 1 :],
+            radius_mm=np.delete(self.radius_mm, k),
+            shape=np.delete(self.shape, k, axis=0),
+        )
+
 
 @dataclass(eq=False)
 class Likelihood:
-    """F linearised: F ``here``, the ``least`` at the minimum, the ``step`` to it (n,) and the
-    ``inverse`` of its matrix (n, n)."""
+    """F linearised about an answer: F ``here``, the ``least`` at the minimum, the ``step`` to it
+    (n,), the ``inverse`` of its matrix (n, n), the ``columns`` (n, r), and what the answer ``left``
+    of the data (r,)."""
 
     here: float
     least: float
     step: FloatArray
     inverse: FloatArray
+    columns: FloatArray
+    left: FloatArray
 
-    def hold(self, offsets: FloatArray, k: int) -> tuple[slice, FloatArray, FloatArray]:
+    def hold(self, answer: Answer, k: int) -> tuple[slice, FloatArray, FloatArray]:
         """Disc k's own rows of the inverse, the Cholesky factor L of their block, and w = L^-1 q, q
         how far its parameters are from where there is no such disc; F rises by |w|^2 without it."""
-        own = slice(k * offsets.shape[1], (k + 1) * offsets.shape[1])
+        own = slice(k * answer.parameters, (k + 1) * answer.parameters)
         lower = held_cholesky(self.inverse[own, own])
-        absent = -offsets[k]
+        absent = -answer.offsets()[k]
         absent[0] = -1.0
         return own, lower, np.linalg.solve(lower, self.step[own] - absent)
 
-    def rise(self, offsets: FloatArray, k: int) -> float:
+    def rise(self, answer: Answer, k: int) -> float:
         """What F rises by without disc k."""
-        w = self.hold(offsets, k)[2]
+        w = self.hold(answer, k)[2]
         return float(w @ w)
 
-    def drop(self, offsets: FloatArray, k: int) -> None:
-        """Leave disc k out; its own step and inverse are of no use any more."""
-        own, lower, w = self.hold(offsets, k)
+    def without(self, answer: Answer, k: int) -> tuple[Answer, Likelihood]:
+        """``answer`` without disc k, and F linearised about the others where they are."""
+        own, lower, w = self.hold(answer, k)
         rows = np.linalg.solve(lower, self.inverse[own])
-        self.least += float(w @ w)
-        self.step = self.step - rows.T @ w
-        self.inverse = self.inverse - rows.T @ rows
+        rest, others = answer.without(k), np.delete(np.arange(len(self.step)), own)
+        left = self.left + answer.parts().ravel()[own] @ self.columns[own]
+        return rest, Likelihood(
+            float(left @ left) + rest.prior(),
+            self.least + float(w @ w),
+            (self.step - rows.T @ w)[others],
+            (self.inverse - rows.T @ rows)[np.ix_(others, others)],
+            self.columns[others],
+            left,
+        )
 
 
 def held_cholesky(matrix: FloatArray) -> FloatArray:
@@ -136,7 +166,7 @@ def held_cholesky(matrix: FloatArray) -> FloatArray:
 def parameters_of(fit: Fit, errors: DataErrors, count: int) -> int:
     """How many parameters each of ``count`` discs gets."""
     room, all_ = min(fit.model.rank, MAX_COLUMNS), ALL if errors.dipoles is not None else EDGE
-    if count * all_ <= room:
+    if count * all_ <= min(room, SHAPE_COLUMNS):
         return all_
     return PLACE if count * PLACE <= room else 0
 
@@ -166,7 +196,8 @@ class Hypothesis:
             np.zeros((count, ALL - PLACE)),
             parameters_of(fit, errors, count),
         )
-        self.changed = self.clear = False
+        self.changed = self.clear = self.fitted = False
+        self.linear = True
         self.columns_made = 0
         self.rise, self.place_mm2 = np.zeros(count), np.zeros((count, 3))
         self.best_mm, self.pair = np.zeros((count, 2)), np.zeros(count)
@@ -194,17 +225,14 @@ class Hypothesis:
         """F about ``answer``."""
         columns = np.vstack([self.columns(answer, k) for k in range(len(answer.discs))])
         self.columns_made += len(columns)
-        offsets = answer.offsets()
-        parts = offsets.copy()  # how much of each column there is
-        parts[:, :PLACE] = 1, 0, 0, 0
-        left, off = self.data - parts.ravel() @ columns, offsets.ravel()
+        left, off = self.data - answer.parts().ravel() @ columns, answer.offsets().ravel()
         precision = np.tile(PRECISION[: answer.parameters], len(answer.discs))
-        here = float(left @ left + precision @ off**2)
+        here = float(left @ left) + answer.prior()
         gradient = columns @ left - precision * off
         root = np.linalg.inv(held_cholesky(columns @ columns.T + np.diag(precision)))
         inverse = root.T @ root
         step = inverse @ gradient
-        return Likelihood(here, here - float(gradient @ step), step, inverse)
+        return Likelihood(here, here - float(gradient @ step), step, inverse, columns, left)
 
     def moved(self, answer: Answer, step: FloatArray, fraction: float) -> Answer:
         """``answer`` a ``fraction`` of ``step`` (n,) further."""
@@ -237,22 +265,25 @@ class Hypothesis:
         shape[:, : answer.parameters - PLACE] += fraction * np.clip(steps[:, PLACE:], -1, 1)
         return replace(answer, discs=discs, shape=shape)
 
-    def refit(self, answer: Answer, enough: float = 0.0) -> Answer:
+    def refit(
+        self, answer: Answer, now: Likelihood | None = None, enough: float = 0.0
+    ) -> tuple[Answer, Likelihood | None]:
         """Gauss and Newton's steps, a few at most, until F is ``enough`` or hardly falls; sets its
-        misfit."""
+        misfit. ``now``: F about ``answer``, if it is at hand; so is what is returned beside it."""
         if not answer.discs:
-            return replace(answer, misfit=float(self.data @ self.data))
-        now, fraction = self.linearise(answer), 1.0
+            return replace(answer, misfit=float(self.data @ self.data)), None
+        last = now = now or self.linearise(answer)
+        fraction = 1.0
         for _ in range(REFIT_STEPS):
             if now.here <= enough or now.here - now.least < SETTLED_MISFIT:
                 break
             trial = self.moved(answer, now.step, fraction)
-            after = self.linearise(trial)
-            if after.here < now.here:
-                answer, now, fraction = trial, after, 1.0
+            last = self.linearise(trial)
+            if last.here < now.here:
+                answer, now, fraction = trial, last, 1.0
             else:
                 fraction *= SHORTER
-        return replace(answer, misfit=now.here)
+        return replace(answer, misfit=now.here), now if last is now else None
 
     # ---- simpler answers ----
 
@@ -275,32 +306,32 @@ class Hypothesis:
             if (weak[i] or weak[j]) and is_near(discs[i], discs[j])
         ]
 
-    def without(self, answer: Answer, k: int) -> Answer:
-        """``answer`` without disc k."""
-        discs = answer.discs[:k] + answer.discs[k + 1 :]
-        return replace(
-            answer,
-            discs=discs,
-            radius_mm=np.delete(answer.radius_mm, k),
-            shape=np.delete(answer.shape, k, axis=0),
-            parameters=max(answer.parameters, parameters_of(self.fit, self.errors, len(discs))),
-        )
+    def shaped(self, answer: Answer) -> Answer:
+        """``answer`` with as many shapes as there is room for."""
+        parameters = parameters_of(self.fit, self.errors, len(answer.discs))
+        return replace(answer, parameters=max(answer.parameters, parameters))
+
+    def one_less(self, answer: Answer, now: Likelihood, k: int) -> tuple[Answer, Likelihood | None]:
+        """``answer`` without disc k, and F about it, None where there is room for more shapes."""
+        rest, about = now.without(answer, k)
+        shaped = self.shaped(rest)
+        return shaped, about if shaped.parameters == rest.parameters else None
 
     def as_one(self, answer: Answer, i: int, j: int) -> Answer:
         """Discs i < j as one of the same strength."""
-        a, b, to = answer.discs[i], answer.discs[j], self.without(answer, j)
+        a, b, to = answer.discs[i], answer.discs[j], self.shaped(answer.without(j))
         one = merged(self.fit.options, a, b)
         strength = a.change * a.radius_mm**2 + b.change * b.radius_mm**2
         to.discs[i] = replace(one, change=strength / one.radius_mm**2)
         to.radius_mm[i], to.shape[i] = one.radius_mm, 0.0
         return to
 
-    def look(self, *, fitted: bool) -> tuple[int, Likelihood]:
-        """Linearise, and set what is known of each disc by it; returns the weakest."""
-        now, answer = self.linearise(self.answer), self.answer
-        if not fitted:
+    def look(self, now: Likelihood) -> int:
+        """Set what is known of each disc by F about them; returns the weakest."""
+        answer = self.answer
+        if not self.fitted:
             self.answer = answer = replace(answer, misfit=now.least)
-        offsets, count, p = answer.offsets(), len(answer.discs), answer.parameters
+        count, p = len(answer.discs), answer.parameters
         unit = self.fit.model.grid.pixel_mm**2 * self.excess(answer.misfit, count)
         x = p * np.arange(count) + 1
         self.place_mm2 = unit * np.column_stack(
@@ -308,42 +339,42 @@ class Hypothesis:
         )
         self.best_mm = np.array([(disc.x_mm, disc.y_mm) for disc in answer.discs])
         self.best_mm += self.fit.model.grid.pixel_mm * now.step.reshape(count, p)[:, 1:3]
-        self.pair = pair_scores(offsets, now.step, np.diag(now.inverse))
-        self.rise = np.array([now.rise(offsets, k) for k in range(count)])
-        return int(np.argmin(self.rise)), now
+        self.pair = pair_scores(answer.offsets(), now.step, np.diag(now.inverse))
+        self.rise = np.array([now.rise(answer, k) for k in range(count)])
+        return int(np.argmin(self.rise))
 
-    def drop_linearly(self, now: Likelihood) -> list[int]:
-        """Which discs stay where whatever the linearisation can do without is left out, one after
-        another."""
-        offsets, left = self.answer.offsets(), list(range(len(self.answer.discs)))
-        while len(left) > self.errors.kept:
-            rises = [now.rise(offsets, k) for k in left]
-            weakest = int(np.argmin(rises))
-            if not rises[weakest] < TOUCH_EVIDENCE * self.excess(now.least, len(left)):
+    def drop_linearly(self, now: Likelihood, weakest: int) -> tuple[Answer, Likelihood | None]:
+        """The answer without whatever the linearisation can do without, one after another from the
+        ``weakest`` on, and F about it."""
+        rest, about, rise = self.answer, now, float(self.rise[weakest])
+        while rise < TOUCH_EVIDENCE * self.excess(about.least, len(rest.discs)):
+            rest, about = about.without(rest, weakest)
+            if len(rest.discs) <= self.errors.kept:
                 break
-            now.drop(offsets, left.pop(weakest))
-        return left
+            rises = [about.rise(rest, k) for k in range(len(rest.discs))]
+            weakest = int(np.argmin(rises))
+            rise = rises[weakest]
+        shaped = self.shaped(rest)
+        return shaped, about if shaped.parameters == rest.parameters else None
 
-    def take_linear(self, left: list[int]) -> bool:
-        """Take the discs that are ``left``, fitted again, where F has risen by no more than the
-        others were found to be worth."""
-        rest, dropped = self.answer, len(self.answer.discs) - len(left)
-        for k in reversed(range(len(self.answer.discs))):
-            if k not in left:
-                rest = self.without(rest, k)
-        rest = self.refit(rest)
-        allowed = TOUCH_EVIDENCE * self.excess(rest.misfit, len(left))
-        return self.take(rest, allowed * dropped)
+    def take_linear(self, rest: Answer, about: Likelihood | None) -> tuple[bool, Likelihood | None]:
+        """Take ``rest``, fitted again, where F has risen by no more than the others were found to
+        be worth."""
+        dropped = len(self.answer.discs) - len(rest.discs)
+        rest, about = self.refit(rest, about)
+        allowed = TOUCH_EVIDENCE * self.excess(rest.misfit, len(rest.discs))
+        return self.take(rest, allowed * dropped), about
 
-    def take_simpler(self, weakest: int) -> bool:
+    def take_simpler(self, now: Likelihood, weakest: int) -> tuple[bool, Likelihood | None]:
         """Take the best of the answers with one disc less: without the weakest, or with a near pair
-        as one."""
+        as one. What is at hand of the best is told, if it was tried last."""
         enough = self.answer.misfit + self.needed()
-        best = self.refit(self.without(self.answer, weakest), enough)
+        best, about = self.refit(*self.one_less(self.answer, now, weakest), enough)
         for i, j in self.near_pairs():
-            one = self.refit(self.as_one(self.answer, i, j), enough)
-            best = one if one.misfit < best.misfit else best
-        return self.take(best, self.needed())
+            one, of_one = self.refit(self.as_one(self.answer, i, j), None, enough)
+            better = one.misfit < best.misfit
+            best, about = (one, of_one) if better else (best, None)
+        return self.take(best, self.needed()), about
 
     def take(self, simpler: Answer, allowed: float) -> bool:
         """Take a ``simpler`` answer where F rises by less than is ``allowed``."""
@@ -352,36 +383,54 @@ class Hypothesis:
         self.answer, self.changed = simpler, True
         return True
 
-    def eliminate(self) -> None:
-        """From the discs as they are to those that stay."""
-        fitted, linear = False, True
+    def fits(self) -> bool:
+        """Whether the data are explained about as well as Sigma says."""
+        return self.excess(self.answer.misfit, len(self.answer.discs)) <= FITS
+
+    def eliminate(self, *, to_the_end: bool) -> bool:
+        """From the discs as they are to those that stay; not ``to_the_end``: false as soon as the
+        data are found not to fit, to be gone on with another time."""
+        now: Likelihood | None = None
         while len(self.answer.discs) > self.errors.kept:
-            weakest, now = self.look(fitted=fitted)
+            now = now or self.linearise(self.answer)
+            weakest = self.look(now)
             if self.rise[weakest] > CLEAR * self.needed() and not self.near_pairs():
-                return
-            if linear:
-                left = self.drop_linearly(now)
-                if len(left) < len(self.answer.discs):
-                    linear = self.take_linear(left)
-                    fitted = linear or fitted
-                    continue
+                return True
+            if not to_the_end and not self.fits():
+                return False
+            if self.linear:
+                rest, about = self.drop_linearly(now, weakest)
+                if len(rest.discs) < len(self.answer.discs):
+                    self.linear, now = self.take_linear(rest, about)
+                    if self.linear:
+                        self.fitted = True
+                        continue
+                    now = None
             if self.columns_made > TEST_COLUMNS:
-                return
-            if not fitted:
-                self.answer = self.refit(self.answer)
-                weakest, _ = self.look(fitted=True)
-                fitted = True
-            if not self.take_simpler(weakest):
-                return
-        self.answer = self.refit(self.answer)
+                return True
+            if not self.fitted:
+                self.answer, now = self.refit(self.answer, now)
+            if now is None:
+                now = self.linearise(self.answer)
+            if not self.fitted:
+                self.fitted = True
+                weakest = self.look(now)
+            if not to_the_end and not self.fits():
+                return False
+            taken, now = self.take_simpler(now, weakest)
+            if not taken:
+                return True
+        self.fitted = True
+        self.answer, now = self.refit(self.answer, now)
         if self.answer.discs:  # on an instrument that is far from the model one stays
-            self.look(fitted=True)
+            self.look(now or self.linearise(self.answer))
+        return True
 
     def is_clear(self) -> bool:
         """Whether the discs need no closer look, as discs: what that costs least."""
         parameters = self.answer.parameters
         self.answer = replace(self.answer, parameters=PLACE)
-        weakest, _ = self.look(fitted=False)
+        weakest = self.look(self.linearise(self.answer))
         excess = self.excess(self.answer.misfit, len(self.answer.discs))
         clear = self.rise[weakest] > CLEAR_AS_DISCS * self.needed() and not self.near_pairs()
         self.clear = clear and excess < FITS_AS_DISCS
@@ -400,11 +449,16 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
         return None
     best = Hypothesis(fit, errors, drift=False)
     if not best.is_clear():
-        best.eliminate()
-        if best.excess(best.answer.misfit, len(best.answer.discs)) > FITS:
+        whole = best.eliminate(to_the_end=False)
+        if not best.fits():
             drifted = Hypothesis(fit, errors, drift=True)
-            drifted.eliminate()
-            best = drifted if drifted.evidence < best.evidence else best
+            drifted.columns_made = best.columns_made
+            drifted.eliminate(to_the_end=True)
+            if not whole and drifted.evidence >= best.answer.misfit + best.log_determinant:
+                best.columns_made = drifted.columns_made
+                whole = best.eliminate(to_the_end=True)
+            if not whole or drifted.evidence < best.evidence:
+                best = drifted
     count = len(best.answer.discs)
     unit = best.excess(best.answer.misfit, count)
     if best.changed:
