@@ -91,6 +91,12 @@ class DeviceError(EitskinError):
     exit_code = 12  # 11 is doctor's
 
 
+class SinkError(EitskinError):
+    """What touches are sent to cannot be opened: its port is taken, nobody answers there."""
+
+    exit_code = 13
+
+
 def missing_extra(extra: str, package: str) -> MissingExtraError:
     """The error for an absent optional ``package`` that the extra named ``extra`` brings."""
     return MissingExtraError(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import read_mode, say, whole
+from eitskin.cli.device_options import add_verbose, read_mode, say, whole
 from eitskin.errors import FrameError, UsageError, VerificationError
 
 
@@ -31,6 +31,7 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "--picture PNG", "draw images and touches, a panel a frame", Path)
     option(parser, "--frames OUT.npz", "write the raw frames for  reconstruct  and  doctor", Path)
     option(parser, "--check", "solve again here and compare; exit code 10 where bits differ")
+    add_verbose(parser)
     option(parser, "--json", "print for programs")
     parser.set_defaults(run=run)
 

@@ -10,8 +10,11 @@ from typing import Any
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
     add_device,
+    add_outputs,
     add_scan,
     add_stream,
+    add_verbose,
+    opened_outputs,
     read_mode,
     say,
     session_settings,
@@ -24,17 +27,19 @@ def add_parser(subparsers: Any) -> None:
         "stream",
         help="touches, images or raw frames of a board as they come",
         description=(
-            "Follow a board: a line a frame on standard output, faults and events of the link on"
-            " standard error, a summary at the end. What is seen on a simulated or emulated board"
-            " is compared with its scene's truth. With --json each line is a JSON object, the last"
-            " one the summary."
+            "Follow a board: its touches as a table on standard output, faults and events of the"
+            " link on standard error, a summary at the end. What is seen on a simulated or emulated"
+            " board is compared with its scene's truth. With --json each line is a JSON object,"
+            " the last one the summary (docs/reference/message.md)."
         ),
     )
     add_device(parser)
     add_stream(parser, "touches")
     option(parser, "--picture PNG", "draw images and touches, a panel a frame", Path)
     option(parser, "--record RUN.eits", "also record every packet, as  eitskin record  does", Path)
-    option(parser, "--overwrite", "record over a file that exists")
+    option(parser, "--overwrite", "write over files that exist, of --record and --to")
+    add_outputs(parser)
+    add_verbose(parser)
     add_scan(parser)
     parser.set_defaults(run=run)
 
@@ -51,6 +56,10 @@ def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.picture)
     settings = session_settings(options, mode, record=options.record, model_for=needs)
     check_picture(options.picture, mode)
-    with Session(options.device, settings, say=say) as session:
-        show(options, session)
+    with (
+        Session(options.device, settings, say=say) as session,
+        opened_outputs(options, session) as outputs,
+    ):
+        session.start()
+        show(options, session, outputs)
     return 0

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from eitskin.device.client import Device
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.link_table import Stream
-    from eitskin.live.session import SessionSettings
+    from eitskin.live.session import Session, SessionSettings
+    from eitskin.sinks.outputs import Outputs
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in), serial:/dev/ttyACM0, sim:SCENE (simulated),"
@@ -137,6 +138,38 @@ def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
     option(
         parser, "--frames N", "stop after N (default: go on until Ctrl-C, or the scene ends)", int
     )
+
+
+def add_verbose(parser: argparse.ArgumentParser) -> None:
+    """How much is said of each frame."""
+    option(parser, "-v --verbose", "all that is known of a frame, the solver's numbers included")
+
+
+def add_outputs(parser: argparse.ArgumentParser) -> None:
+    """``--to``."""
+    option(
+        parser,
+        "--to URL",
+        "also send touches there, any number of times: udp://HOST:PORT, ws://HOST:PORT (clients"
+        " connect to it), osc://HOST:PORT, tuio://HOST, mqtt://HOST, lsl:, csv:FILE, mcap:FILE,"
+        " foxglove:, or a sink that another package brings (docs/guide/touches-out.md)",
+        action="append",
+    )
+
+
+def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
+    """The sinks of ``--to``, open.
+
+    Raises:
+        EitskinError: one cannot be opened.
+    """
+    from eitskin.sinks.outputs import Outputs
+    from eitskin.sinks.sink import Source
+
+    transport, board = session.device.transport, session.device.board
+    model = None if session.known is None else session.known.model
+    source = Source(transport.url, board.board, model, getattr(options, "overwrite", False))
+    return Outputs(options.to or (), source, patient=session.patient, say=say)
 
 
 def read_mode(text: str) -> Stream:

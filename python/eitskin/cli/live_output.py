@@ -7,11 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.device_options import say
+from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.errors import EitskinError, UsageError
 
 if TYPE_CHECKING:
     from eitskin.device.wire.link_table import Stream
+    from eitskin.live.frame import Frame
     from eitskin.live.session import Session
+    from eitskin.sinks.outputs import Outputs
+
+HEADER = "  time s  touch    x mm    y mm  radius mm  force g"
+SCORED = "  off mm"
 
 
 def check_picture(path: Path | None, what: Stream) -> None:
@@ -33,28 +39,67 @@ def check_picture(path: Path | None, what: Stream) -> None:
     load_matplotlib()
 
 
-def show(options: argparse.Namespace, session: Session) -> None:
-    """Print every frame and all news of ``session``, draw ``--picture``, print the summary; Ctrl-C
-    ends it in good order.
+class Rows:
+    """Frames for reading: with ``verbose`` a line a frame with all that is known of it; else
+    touches in a table, a row each, and other frames in brief."""
+
+    def __init__(self, verbose: bool, scored: bool) -> None:
+        self._verbose, self._scored, self._begun = verbose, scored, False
+
+    def lines(self, frame: Frame) -> list[str]:
+        """Of the next frame."""
+        from eitskin.scoring.stream_check import line
+
+        live = frame.live
+        if self._verbose or live.touches is None or live.image is not None or live.raw is not None:
+            return [line(frame.compared, solver=self._verbose)]
+        rows = [] if self._begun else [HEADER + (SCORED if self._scored else "")]
+        self._begun = True
+        if frame.refused:
+            return [*rows, f"{frame.time_s:8.3f}  refused: {frame.refused}"]
+        if not frame.touches:
+            rows.append(f"{frame.time_s:8.3f}      -")
+        for number, touch in enumerate(frame.touches):
+            time = f"{frame.time_s:8.3f}" if number == 0 else " " * 8
+            force = f"{touch.force_n / NEWTONS_PER_GRAM:.1f}" if touch.force_n else "-"
+            rows.append(
+                f"{time}  {touch.id:5d} {touch.x_mm:7.1f} {touch.y_mm:7.1f} {touch.radius_mm:10.1f}"
+                f" {force:>8}{self._off(frame, number)}"
+            )
+        return rows
+
+    def _off(self, frame: Frame, number: int) -> str:
+        errors = frame.compared.errors_mm
+        if errors is None:
+            return ""
+        return f" {errors[number]:7.2f}" if number in errors else "   false"
+
+
+def show(options: argparse.Namespace, session: Session, outputs: Outputs | None = None) -> None:
+    """Print every frame and all news of ``session``, give them to ``outputs``, draw ``--picture``,
+    print the summary; Ctrl-C ends it in good order.
 
     Raises:
         EitskinError: what ended the stream, after everything up to then was summed up.
     """
     from eitskin.live.frame import Notice
     from eitskin.live.message import encoded
-    from eitskin.scoring.stream_check import line
     from eitskin.view.stream_picture import Album, draw_stream
 
     album, broken = Album(), None
+    rows = Rows(options.verbose, session.truth is not None)
     frames = session.frames()
     try:
         for item in frames:
+            if outputs is not None:
+                outputs.put(item)
             if isinstance(item, Notice):
                 say(item.text)
                 continue
             if options.picture is not None:
                 album.add(item.compared)
-            print(encoded(item.message()) if options.json else line(item.compared), flush=True)
+            lines = [encoded(item.message())] if options.json else rows.lines(item)
+            print("\n".join(lines), flush=True)
     except KeyboardInterrupt:
         say("stopped")
     except EitskinError as error:
@@ -68,22 +113,28 @@ def show(options: argparse.Namespace, session: Session) -> None:
         board, url = session.device.board.board, session.device.transport.url
         draw_stream(options.picture, session.known.model, album, title=f"{board} {url}")
     if session.summary.frames or broken is None:
-        _print_summary(options, session)
+        _print_summary(options, session, outputs)
     if broken is not None:
         raise broken
 
 
-def _print_summary(options: argparse.Namespace, session: Session) -> None:
+def _print_summary(options: argparse.Namespace, session: Session, outputs: Outputs | None) -> None:
     from eitskin.live.message import encoded, summary_message
 
     summary, score = session.summary, session.score
     drawn = str(options.picture) if options.picture is not None and summary.frames else None
+    facts: dict[str, Any] = summary.as_dict()
+    facts["truth"] = score.as_dict() if score.frames else None
+    if drawn is not None:
+        facts["picture"] = drawn
+    if outputs is not None:
+        counts = outputs.end(facts)
+        if counts:
+            facts["sinks"] = counts
     if options.json:
-        facts: dict[str, Any] = summary.as_dict()
-        facts["truth"] = score.as_dict() if score.frames else None
-        print(encoded(summary_message(facts | ({} if drawn is None else {"picture": drawn}))))
+        print(encoded(summary_message(facts)))
         return
-    lines = summary.lines()
+    lines = summary.lines() + ([] if outputs is None else outputs.lines)
     if score.frames:
         lines.append(score.text())
     if drawn is not None:

@@ -85,9 +85,10 @@ class SessionSettings:
 
 
 class Session:
-    """A board, set up and followed. Use it in ``with``: that opens it, takes the reference and
-    begins the scene. ``say`` gets lines for whoever looks on. ``speed``: of what is simulated,
-    emulated or recorded, where the URL does not say; 0 is as fast as it can.
+    """A board, set up and followed. ``with`` opens it and lets go of it; ``start`` sets it up,
+    takes the reference and begins the scene, and where nobody called it the first frame does.
+    ``say`` gets lines for whoever looks on. ``speed``: of what is simulated, emulated or recorded,
+    where the URL does not say; 0 is as fast as it can.
 
     ``ask``, ``tare`` and ``stop`` may be called from any thread; all else belongs to the one that
     iterates.
@@ -126,14 +127,14 @@ class Session:
         self.recorder: Recorder | None = None
         self.summary, self.score = LiveSummary(), TruthScore()
         self._asked: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        self._stopping = threading.Event()
+        self._stopping, self._started, self._every = threading.Event(), False, 1
 
     def __enter__(self) -> Session:
         self.device = self._open()
         try:
-            self._set_up()
+            self._find()
         except BaseException:
-            self.close()
+            self.device.close()
             raise
         return self
 
@@ -165,6 +166,22 @@ class Session:
     def timed(self) -> bool:
         """It is simulated, emulated or recorded: ``pacer`` says when frames come."""
         return self.device.transport.synchronous
+
+    @property
+    def patient(self) -> bool:
+        """No clock is kept: whoever takes its frames may take as long as they like."""
+        return self.timed and not self.pacer.speed
+
+    def start(self) -> None:
+        """Set up, take the reference, begin the scene; once.
+
+        Raises:
+            EitskinError: a setting cannot be, the board refuses it, or the recording cannot be
+                written.
+        """
+        if not self._started:
+            self._started = True
+            self._set_up()
 
     # ---- from any thread ----
 
@@ -198,6 +215,7 @@ class Session:
     def items(self) -> Generator[Item, None, None]:
         """Frames, faults and events of the link as they come, until the scene, the recording or the
         number of frames is over."""
+        self.start()
         clock, count = Clock(), 0
         while True:
             again = False
@@ -228,6 +246,7 @@ class Session:
     def frames(self) -> Generator[Frame | Notice, None, None]:
         """The same as frames beside the truth and notices of what is new with them, summed up in
         ``summary`` and ``score``."""
+        self.start()
         watcher, events, last = Watcher(self.known, self.truth), Events(), None
         watcher.score = self.score
         items = self.items()
@@ -268,7 +287,8 @@ class Session:
             )
         return open_device(self.url, model=blob, image=how.firmware, reconnect=self._reconnect)
 
-    def _set_up(self) -> None:
+    def _find(self) -> None:
+        """The board's model, and the truth of its scene."""
         how, board = self.settings, self.device.board
         if how.model_for:
             self.known = need_model(board, how.model, self.name, how.model_for)
@@ -277,8 +297,13 @@ class Session:
         if self.replays:
             self._refuse_settings()
             self.truth = _recorded_truth(self.url) if self._solves else None
+        else:
+            self.truth = truth_of(self.url, how.solver.sign or "increase")
+
+    def _set_up(self) -> None:
+        how = self.settings
+        if self.replays:
             return
-        self.truth = truth_of(self.url, how.solver.sign or "increase")
         self._look_on()
         self.solver = set_up(self.device, how.scan, self._solver_settings(), self.known)
         if how.record is not None:

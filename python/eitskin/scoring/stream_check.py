@@ -98,10 +98,12 @@ def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
     return ImageView(float(values[top]), (float(centres[top, 0]), float(centres[top, 1])), places)
 
 
-def line(seen: ComparedFrame) -> str:
-    """A frame in a line."""
+def line(seen: ComparedFrame, *, solver: bool = True) -> str:
+    """A frame in a line, with or without what the solver says of it."""
     frame = seen.frame
-    parts = [_touches_text(seen), _image_text(seen), _raw_text(frame), _solve_text(frame)]
+    parts = [_touches_text(seen), _image_text(seen), _raw_text(frame)]
+    if solver:
+        parts.append(_solve_text(frame))
     if frame.refused:
         parts = [f"refused: {frame.refused}", _raw_text(frame)]
     text = "; ".join(part for part in (*parts, _found_text(frame)) if part)

@@ -59,7 +59,7 @@ def test_two_touches_within_two_millimetres_of_the_scene(
 ) -> None:
     """The issue's own words, before the simulated board; the emulated one has the same test."""
     monkeypatch.chdir(tmp_path)
-    out = done("stream", "--device", "sim:two_touch.toml", "--mode", "touches", "--frames", "20")
+    out = done("stream", "--device", "sim:two_touch.toml", "--frames", "20", "-v")
     lines = out.splitlines()
     assert len(lines) == 22
     for line in lines[:20]:
@@ -222,7 +222,7 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
     board = board_of(scene)
     with behind_a_port(board) as port:
         device = f"serial:{port}"
-        assert main(["stream", "--device", device, "--frames", "3"]) == 0
+        assert main(["stream", "--device", device, "--frames", "3", "-v"]) == 0
         out, err = capsys.readouterr()
         assert (
             "leave the skin untouched: taking the reference from 16 frames" in err
@@ -236,7 +236,8 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
             main(["stream", "--device", device, "--frames", "3"]) == 0
         )  # it has its reference already
         out, err = capsys.readouterr()
-        assert err == "" and out.startswith("     ")
+        assert err == "" and out.startswith("  time s  touch    x mm    y mm")
+        assert [line.split()[1] for line in out.splitlines()[1:4]] == 3 * ["-"]
         assert main(["tare", "--device", device, "--frames", "4", "--json"]) == 0
         assert strict(capsys.readouterr().out) == {"device": device, "frames": 4, "tared": True}
         assert main(["info", "--device", device, "--json"]) == 0

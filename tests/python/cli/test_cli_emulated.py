@@ -32,9 +32,7 @@ def test_two_touches_within_two_millimetres_of_the_scene(
     done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    lines = done(
-        "stream", "--device", "emu:two_touch.toml", "--mode", "touches", "--frames", "20"
-    ).splitlines()
+    lines = done("stream", "--device", "emu:two_touch.toml", "--frames", "20", "-v").splitlines()
     for line in lines[:20]:
         errors = [float(error) for error in OFF_BY.findall(line)]
         assert len(errors) == 2 and max(errors) < 2.0, line

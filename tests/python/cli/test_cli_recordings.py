@@ -91,7 +91,7 @@ def test_replay_shows_what_was_seen_live(done: Done, scene: Path, tmp_path: Path
 def test_a_recording_is_a_device_too(done: Done, run: Path) -> None:
     shown, replayed = (
         done(*command).splitlines()[0]
-        for command in (("stream", "--device", f"file:{run}"), ("replay", run))
+        for command in (("stream", "-v", "--device", f"file:{run}"), ("replay", "-v", run))
     )
     assert shown == replayed and ", off by " in shown
     assert json.loads(done("info", "--device", f"file:{run}", "--json"))["statistics"] is None
@@ -322,6 +322,7 @@ def test_ctrl_c_stops_the_board_and_sums_up(scene: Path) -> None:
             "stream",
             "--device",
             f"serial:{port}",
+            "-v",
             "--tare",
             "4",
         ]

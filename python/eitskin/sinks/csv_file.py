@@ -1,0 +1,73 @@
+"""``csv:FILE``: a line a touch, and one with empty cells for a frame without touches. Each line is
+written whole as it comes, so that a killed program leaves a readable file."""
+
+from __future__ import annotations
+
+import csv
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from eitskin.errors import FileError, UsageError
+from eitskin.fileio import refuse_unwritable
+from eitskin.sinks.sink import Sink, Source, Told
+
+TOUCH = (
+    "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence",
+    "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2",
+)  # fmt: skip
+COLUMNS = ("frame", "time_s", "time_unix_s", *TOUCH, "found", "refused", "events")
+
+
+class CsvSink:
+    """One open file, flushed after each frame."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+        self._put([COLUMNS])
+
+    def write(self, told: Told) -> None:
+        message = told.message
+        if message["type"] != "frame":
+            return
+        head = [message["frame"], message["time_s"], message["time_unix_s"]]
+        events = " ".join(event["kind"] for event in message["events"])
+        tail = ["; ".join(message["found"]), message["refused"], events]
+        touches = message["touches"] or [dict.fromkeys(TOUCH)]
+        self._put([[*head, *(touch[name] for name in TOUCH), *tail] for touch in touches])
+
+    def close(self) -> None:
+        self._stream.close()
+
+    def _put(self, rows: list[Any]) -> None:
+        text = StringIO()
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        self._stream.write(text.getvalue().encode())
+        self._stream.flush()
+
+
+def new_file(url: str, source: Source) -> Any:
+    """The file that ``csv:FILE`` and the like name, open for writing.
+
+    Raises:
+        UsageError: it names none.
+        FileError: it exists already, or cannot be written.
+    """
+    scheme, _, name = url.partition(":")
+    if not name:
+        raise UsageError(f"--to {url}: name a file, as in  {scheme}:touches.{scheme}")
+    path = Path(name)
+    refuse_unwritable(path)
+    try:
+        return path.open("wb" if source.overwrite else "xb")
+    except FileExistsError:
+        raise FileError(
+            f"{path}: exists already; name another file, or write over it with  --overwrite"
+        ) from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot write it ({error.strerror})") from None
+
+
+def open_sink(url: str, source: Source) -> Sink:
+    """See the module. Raises as ``new_file``."""
+    return CsvSink(new_file(url, source))

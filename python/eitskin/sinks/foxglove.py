@@ -1,0 +1,107 @@
+"""``foxglove:[//HOST[:8765]]``: a live server that the Foxglove application connects to.
+
+/touches carries the message of docs/reference/message.md with its schema, /notices the notices,
+/image a foxglove.RawImage where images are streamed.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from eitskin.errors import SinkError, missing_extra
+from eitskin.live.message import schema
+from eitskin.sinks.mcap_file import FRAME_ID
+from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
+
+USAGE = "foxglove: or foxglove://HOST:PORT"
+PORT = 8765
+BACKLOG = 128  # messages a client that does not read is kept; the oldest go
+
+
+class FoxgloveSink:
+    """A server of the Foxglove SDK, with channels of its own.
+
+    Raises:
+        MissingExtraError: foxglove-sdk is not installed.
+        RuntimeError, OSError: it cannot listen.
+    """
+
+    def __init__(self, host: str, port: int, source: Source) -> None:
+        try:
+            import foxglove
+            from foxglove.channels import RawImageChannel
+            from foxglove.messages import RawImage, Timestamp
+        except ImportError:
+            raise missing_extra("foxglove", "foxglove-sdk") from None
+        self._image, self._time, self._model = RawImage, Timestamp, source.model
+        self._context = context = foxglove.Context()  # its channels close with it
+        described = schema()
+        defined = {"$defs": described["$defs"]}
+        channels = {
+            name: foxglove.Channel(
+                f"/{name}s" if name == "notice" else "/touches",
+                schema={"title": f"eitskin.{name}", **described["$defs"][name], **defined},
+                message_encoding="json",
+                context=context,
+            )
+            for name in ("frame", "notice")
+        }
+        self._channels: dict[str, Any] = channels
+        self._pictures = RawImageChannel("/image", context=context)
+        self._server = foxglove.start_server(
+            name=f"eitskin {source.url}",
+            host=host,
+            port=port,
+            context=context,
+            message_backlog_size=BACKLOG,
+        )
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return int(self._server.port)
+
+    def write(self, told: Told) -> None:
+        channel = self._channels.get(told.message["type"])
+        if channel is None:
+            return
+        message = told.message
+        time_s = message["time_unix_s"] if message["time_unix_s"] is not None else message["time_s"]
+        now = round(1e9 * (time_s or 0.0))
+        channel.log(json.dumps(message).encode(), log_time=now)
+        if told.frame is not None and told.frame.image is not None and self._model is not None:
+            picture = np.nan_to_num(self._model.grid.image(told.frame.image)[::-1])
+            height, width = picture.shape
+            self._pictures.log(
+                self._image(
+                    timestamp=self._time(now // 10**9, now % 10**9),
+                    frame_id=FRAME_ID,
+                    width=width,
+                    height=height,
+                    encoding="32FC1",
+                    step=4 * width,
+                    data=picture.astype("<f4").tobytes(),
+                ),
+                log_time=now,
+            )
+
+    def close(self) -> None:
+        self._server.stop()
+
+
+def open_sink(url: str, source: Source) -> Sink:
+    """See the module. Raises as ``address`` and ``FoxgloveSink``; SinkError where the port is
+    taken."""
+    named = "foxglove://" if url == "foxglove:" else url
+    parts, host, port = address(named, PORT, usage=USAGE)
+    nothing_more(url, parts, USAGE)
+    try:
+        return FoxgloveSink(host, port, source)
+    except (RuntimeError, OSError) as error:
+        raise SinkError(
+            f"--to {url}: cannot listen there ({error}); name another port, or end the program"
+            " that has it"
+        ) from None

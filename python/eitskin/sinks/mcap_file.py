@@ -1,0 +1,64 @@
+"""``mcap:FILE``: a recording of ROS 2 messages (CDR), for ROS, Foxglove and the like.
+
+/touches eitskin_msgs/msg/TouchArray, /image sensor_msgs/msg/Image where images are streamed,
+/diagnostics diagnostic_msgs/msg/DiagnosticArray when they change. The file is written in chunks of
+16 kB: a killed program loses the last, less than a second of touches.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from eitskin.errors import missing_extra
+from eitskin.sinks import ros2
+from eitskin.sinks.csv_file import new_file
+from eitskin.sinks.sink import Sink, Source, Told
+
+CHUNK_BYTES = 1 << 14
+FRAME_ID = "skin"
+
+
+class McapSink:
+    """One open file."""
+
+    def __init__(self, stream: Any, writer: Any, source: Source) -> None:
+        self._stream, self._writer, self._source = stream, writer, source
+        self._types = {
+            name: writer.register_msgdef(name, text) for name, text in ros2.definitions().items()
+        }
+        self._status: Any = None
+
+    def write(self, told: Told) -> None:
+        message = told.message
+        if message["type"] == "summary":
+            return
+        time_s = message["time_unix_s"] if message["time_unix_s"] is not None else message["time_s"]
+        now = round(1e9 * (time_s or 0.0))
+        if told.frame is not None:
+            table = ros2.touch_array(message, now, FRAME_ID)
+            self._put("/touches", "eitskin_msgs/msg/TouchArray", table, now)
+            if told.frame.image is not None and self._source.model is not None:
+                table = ros2.image(self._source.model.grid, told.frame.image, now, FRAME_ID)
+                self._put("/image", "sensor_msgs/msg/Image", table, now)
+        table = ros2.diagnostics(message, now, FRAME_ID, self._source.board)
+        if table["status"] != self._status or told.notice is not None:
+            self._put("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", table, now)
+            self._status = table["status"]
+        self._stream.flush()
+
+    def close(self) -> None:
+        self._writer.finish()
+        self._stream.close()
+
+    def _put(self, topic: str, kind: str, table: ros2.Table, time_ns: int) -> None:
+        self._writer.write_message(topic, self._types[kind], table, time_ns, time_ns)
+
+
+def open_sink(url: str, source: Source) -> Sink:
+    """See the module. Raises as ``new_file``; MissingExtraError where mcap is not installed."""
+    try:
+        from mcap_ros2.writer import Writer
+    except ImportError:
+        raise missing_extra("mcap", "mcap-ros2-support") from None
+    stream = new_file(url, source)
+    return McapSink(stream, Writer(stream, chunk_size=CHUNK_BYTES), source)

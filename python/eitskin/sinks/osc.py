@@ -1,0 +1,89 @@
+"""``osc://HOST:PORT[/prefix]``: a bundle of OSC messages a frame, over UDP.
+
+/eitskin/frame number time_s touches; then for each touch /eitskin/touch id x_mm y_mm radius_mm
+strength force_n confidence (nil where one is not known); /eitskin/event kind x_mm y_mm zone
+touch_ids...; /eitskin/notice kind text.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import Any
+
+from eitskin.errors import missing_extra
+from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
+from eitskin.sinks.udp import connected
+
+USAGE = "osc://HOST:PORT or osc://HOST:PORT/prefix"
+
+
+def need_osc(extra: str) -> None:
+    """Refuse where python-osc is not installed.
+
+    Raises:
+        MissingExtraError: it is not.
+    """
+    if find_spec("pythonosc") is None:
+        raise missing_extra(extra, "python-osc")
+
+
+def bundle(messages: list[tuple[str, list[Any]]]) -> bytes:
+    """An OSC bundle, to be handled at once; None becomes nil."""
+    from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+    from pythonosc.osc_message_builder import OscMessageBuilder
+
+    whole = OscBundleBuilder(IMMEDIATELY)
+    for path, arguments in messages:
+        message = OscMessageBuilder(path)
+        for one in arguments:
+            message.add_arg(one)
+        whole.add_content(message.build())
+    built: bytes = whole.build().dgram
+    return built
+
+
+class OscSink:
+    """A datagram a frame."""
+
+    def __init__(self, target: Any, prefix: str) -> None:
+        self._socket, self._prefix = target, prefix
+
+    def write(self, told: Told) -> None:
+        messages = [(self._prefix + path, values) for path, values in osc_messages(told.message)]
+        if messages:
+            data = bundle(messages)
+            try:
+                self._socket.send(data)
+            except ConnectionRefusedError:
+                self._socket.send(data)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
+    """Paths and arguments of a message; none of a summary."""
+    if message["type"] == "notice":
+        return [("/notice", [message["kind"], message["text"]])]
+    if message["type"] != "frame":
+        return []
+    touches = message["touches"] or []
+    listed: list[tuple[str, list[Any]]] = [
+        ("/frame", [message["frame"] & 0x7FFFFFFF, float(message["time_s"]), len(touches)])
+    ]
+    for t in touches:
+        place = [t["id"], t["x_mm"], t["y_mm"], t["radius_mm"]]
+        known = [t["strength_s_per_m_mm2"], t["force_n"], t["confidence"]]
+        listed.append(("/touch", place + known))
+    for event in message["events"]:
+        place = [event["kind"], event["x_mm"], event["y_mm"], event.get("zone")]
+        listed.append(("/event", place + event["touch_ids"]))
+    return listed
+
+
+def open_sink(url: str, source: Source) -> Sink:
+    """See the module. Raises as ``address``, ``connected`` and ``need_osc``."""
+    parts, host, port = address(url, None, usage=USAGE)
+    nothing_more(url, parts, USAGE, path=True)
+    need_osc("osc")
+    return OscSink(connected(url, host, port), parts.path.rstrip("/") or "/eitskin")

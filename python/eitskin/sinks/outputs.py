@@ -1,0 +1,205 @@
+"""All sinks of a session, each behind a bounded queue with a thread of its own: what is slow or
+gone drops and counts, and holds up nobody.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from importlib.metadata import EntryPoint, entry_points
+from types import TracebackType
+from typing import Any
+
+from eitskin.config import nearest
+from eitskin.errors import UsageError
+from eitskin.live.frame import Frame, Notice
+from eitskin.live.message import summary_message
+from eitskin.sinks.sink import Dropped, Sink, Source, Told
+
+ENTRY_POINT_GROUP = "eitskin.sinks"
+ROOM = 64  # frames: more than a second
+PATIENCE_S = 2.0
+ENDING_S = 3.0  # for all sinks together
+
+
+def sinks() -> dict[str, EntryPoint]:
+    """Those that are installed, by the scheme of their URLs."""
+    return {one.name: one for one in entry_points(group=ENTRY_POINT_GROUP)}
+
+
+def open_sink(url: str, source: Source) -> Sink:
+    """The sink behind ``url``.
+
+    Raises:
+        UsageError: its scheme is unknown, or its address cannot be read.
+        EitskinError: it cannot be opened.
+    """
+    scheme, colon, _ = url.partition(":")
+    known = sinks()
+    if not colon or scheme not in known:
+        raise UsageError(
+            f"--to {url}: {nearest(scheme, sorted(known))}, as in udp://127.0.0.1:9000,"
+            " tuio://127.0.0.1 or csv:touches.csv"
+        )
+    opened: Sink = known[scheme].load()(url, source)
+    return opened
+
+
+class Outputs:
+    """The sinks of ``urls``, open. ``patient``: the board runs only while it is asked and is not
+    paced, so that a sink that is behind may be waited for, 2 s at most; else never. ``say`` gets a
+    line where one fails.
+
+    Raises:
+        EitskinError: one cannot be opened; the others are closed again.
+    """
+
+    def __init__(
+        self,
+        urls: Sequence[str],
+        source: Source,
+        *,
+        patient: bool = False,
+        say: Callable[[str], None] = lambda text: None,
+        room: int = ROOM,
+    ) -> None:
+        self._queues: list[Queue] = []
+        self._patience_s = PATIENCE_S if patient else 0.0
+        try:
+            for url in urls:
+                self._queues.append(Queue(url, open_sink(url, source), say, room))
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Outputs:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def put(self, item: Frame | Notice) -> None:
+        """Give it to every sink."""
+        told = Told(item)
+        for one in self._queues:
+            one.put(told, self._patience_s)
+
+    def end(self, facts: dict[str, Any]) -> list[dict[str, Any]]:
+        """Give ``facts``, the summary, to every sink, close them all, and return their counts."""
+        if self._queues:
+            told = Told(summary_message(facts))
+            for one in self._queues:
+                one.put(told, self._patience_s)
+        self.close()
+        return self.counts
+
+    def close(self) -> None:
+        """Let each send what it still has, for 3 s; may be called twice."""
+        for one in self._queues:
+            one.begin_end()
+        end_s = time.monotonic() + ENDING_S
+        for one in self._queues:
+            one.end(end_s - time.monotonic())
+
+    @property
+    def counts(self) -> list[dict[str, Any]]:
+        """Of each sink: what was sent, dropped and failed, and the last error."""
+        return [one.counts for one in self._queues]
+
+    @property
+    def lines(self) -> list[str]:
+        """The counts, for reading."""
+        return [
+            f"to {one['url']}: {one['sent']} sent"
+            + (f", {one['dropped']} dropped" if one["dropped"] else "")
+            + (f", {one['failed']} failed ({one['error']})" if one["failed"] else "")
+            for one in self.counts
+        ]
+
+
+class Queue:
+    """A sink's queue and thread."""
+
+    def __init__(self, url: str, sink: Sink, say: Callable[[str], None], room: int) -> None:
+        self._url, self._sink, self._say, self._room = url, sink, say, room
+        self._waiting: deque[Told] = deque()
+        self._changed = threading.Condition()
+        self._ending = self._slow = False
+        self._sent = self._dropped = self._failed = 0
+        self._error: str | None = None
+        self._thread = threading.Thread(target=self._run, name=f"eitskin {url}", daemon=True)
+        self._thread.start()
+
+    def put(self, told: Told, patience_s: float) -> None:
+        """Queue it, or where there is no room, not within the patience either, drop and count it; a
+        sink that took nothing through all of that is not waited for again until it does."""
+        with self._changed:
+            if len(self._waiting) >= self._room and patience_s and not self._slow:
+                self._slow = not self._changed.wait_for(
+                    lambda: len(self._waiting) < self._room, patience_s
+                )
+            if self._ending or len(self._waiting) >= self._room:
+                self._dropped += 1
+                return
+            self._waiting.append(told)
+            self._changed.notify_all()
+
+    def begin_end(self) -> None:
+        """Take no more."""
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
+
+    def end(self, timeout_s: float) -> None:
+        """Wait for what is queued; what is left then is dropped."""
+        self._thread.join(max(timeout_s, 0.0))
+        with self._changed:
+            self._dropped += len(self._waiting)
+            self._waiting.clear()
+
+    @property
+    def counts(self) -> dict[str, Any]:
+        """So far."""
+        return {
+            "url": self._url,
+            "sent": self._sent,
+            "dropped": self._dropped,
+            "failed": self._failed,
+            "error": self._error,
+        }
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting or self._ending)
+                if not self._waiting:
+                    break
+                told = self._waiting.popleft()
+                self._slow = False
+                self._changed.notify_all()
+            try:
+                self._sink.write(told)
+                self._sent += 1
+            except Dropped:
+                self._dropped += 1
+            except Exception as error:
+                self._fail(error)
+        try:
+            self._sink.close()
+        except Exception as error:
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        """Count it, and say it once."""
+        self._failed += 1
+        text = " ".join(str(error).split()) or type(error).__name__
+        if text != self._error:
+            self._error = text
+            self._say(f"to {self._url}: {text}")

@@ -1,0 +1,129 @@
+"""Messages of ROS 2 as plain tables: a touch array (``msg/``), sensor_msgs/Image and
+diagnostic_msgs/DiagnosticArray.
+
+``mcap:`` writes them, and the node in examples/python/ros2 publishes them. They know nothing of
+ROS.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from eitskin.fem.grid import Grid
+
+Table = dict[str, Any]
+NUMBERS = ("x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence")
+COVARIANCE = ("x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2")
+OK, WARN, ERROR = 0, 1, 2
+COMMON = {
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+}
+IMAGE = """std_msgs/Header header
+uint32 height
+uint32 width
+string encoding
+uint8 is_bigendian
+uint32 step
+uint8[] data
+"""
+DIAGNOSTICS = "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"
+STATUS = """byte OK=0
+byte WARN=1
+byte ERROR=2
+byte STALE=3
+byte level
+string name
+string message
+string hardware_id
+diagnostic_msgs/KeyValue[] values
+"""
+KEY_VALUE = "string key\nstring value\n"
+
+
+def definitions() -> dict[str, str]:
+    """Each type's definition with those that it uses, as ros2msg files have them."""
+    folder = files("eitskin.sinks").joinpath("msg")
+    touch = folder.joinpath("Touch.msg").read_text("utf-8")
+    array = folder.joinpath("TouchArray.msg").read_text("utf-8")
+    diagnostic = {"diagnostic_msgs/DiagnosticStatus": STATUS, "diagnostic_msgs/KeyValue": KEY_VALUE}
+    return {
+        "eitskin_msgs/msg/TouchArray": _whole(array, {"eitskin_msgs/Touch": touch}),
+        "sensor_msgs/msg/Image": _whole(IMAGE, {}),
+        "diagnostic_msgs/msg/DiagnosticArray": _whole(DIAGNOSTICS, diagnostic),
+    }
+
+
+def _whole(first: str, others: dict[str, str]) -> str:
+    parts = [f"{'=' * 80}\nMSG: {name}\n{text}" for name, text in (others | COMMON).items()]
+    return "".join((first, *parts))
+
+
+def header(time_ns: int, frame_id: str) -> Table:
+    """std_msgs/Header."""
+    return {
+        "stamp": {"sec": time_ns // 10**9, "nanosec": time_ns % 10**9},
+        "frame_id": frame_id,
+    }
+
+
+def touch_array(message: Table, time_ns: int, frame_id: str) -> Table:
+    """eitskin_msgs/TouchArray of a frame's message."""
+    touches = [
+        {
+            "id": touch["id"],
+            **{name: _known(touch[name]) for name in NUMBERS},
+            "covariance_mm2": [_known(touch[name]) for name in COVARIANCE],
+        }
+        for touch in message["touches"] or []
+    ]
+    return {
+        "header": header(time_ns, frame_id),
+        "frame": message["frame"],
+        "time_s": _known(message["time_s"]),
+        "refused": message["refused"] is not None,
+        "touches": touches,
+    }
+
+
+def image(grid: Grid, values: npt.ArrayLike, time_ns: int, frame_id: str) -> Table:
+    """sensor_msgs/Image, 32FC1 in S/m: row 0 is the highest y, NaN outside the skin."""
+    picture = np.ascontiguousarray(grid.image(values)[::-1], dtype="<f4")
+    height, width = picture.shape
+    return {
+        "header": header(time_ns, frame_id),
+        "height": height,
+        "width": width,
+        "encoding": "32FC1",
+        "is_bigendian": 0,
+        "step": 4 * width,
+        "data": picture.tobytes(),
+    }
+
+
+def diagnostics(message: Table, time_ns: int, frame_id: str, hardware: str) -> Table:
+    """diagnostic_msgs/DiagnosticArray of a frame's or a notice's message."""
+    if message["type"] == "notice":
+        status = [_status(WARN, f"eitskin {message['kind']}", message["text"], hardware)]
+    elif message["refused"] is not None:
+        status = [_status(ERROR, "eitskin frame", message["refused"], hardware)]
+    else:
+        pairs = zip(message["diagnostics"], message["found"], strict=True)
+        status = [_status(WARN, f"eitskin {name}", text, hardware) for name, text in pairs]
+        status = status or [_status(OK, "eitskin frame", "nothing found", hardware)]
+    return {"header": header(time_ns, frame_id), "status": status}
+
+
+def _status(level: int, name: str, text: str, hardware: str) -> Table:
+    return {"level": level, "name": name, "message": text, "hardware_id": hardware, "values": []}
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else float(value)

@@ -1,0 +1,122 @@
+"""What a sink is, what it is given, and how its address is read."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+from urllib.parse import SplitResult, parse_qs, urlsplit
+
+from eitskin.errors import UsageError
+from eitskin.live.frame import Frame, Notice
+from eitskin.live.message import encoded
+from eitskin.model.model import Model
+
+Box = tuple[float, float, float, float]
+THIS_MACHINE = "127.0.0.1"
+
+
+class Dropped(Exception):
+    """A sink could not take this one for now, such as while its broker is away. It is counted, and
+    nothing is said."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Whose touches they are: the device's URL, its board, and its model where the host has it.
+    ``overwrite``: files that exist may be written over."""
+
+    url: str
+    board: str = ""
+    model: Model | None = None
+    overwrite: bool = False
+
+    @property
+    def box_mm(self) -> Box | None:
+        """The skin's bounding box (x0, y0, x1, y1); None where the model is not known."""
+        return None if self.model is None else self.model.skin.outline.bounding_box_mm
+
+
+class Told:
+    """A frame or a notice, or the ``summary`` message that ends it all, on its way to sinks. What
+    they share is made once, by the first that asks for it."""
+
+    def __init__(self, item: Frame | Notice | dict[str, Any]) -> None:
+        self.frame = item if isinstance(item, Frame) else None
+        self.notice = item if isinstance(item, Notice) else None
+        self._item = item
+
+    @cached_property
+    def message(self) -> dict[str, Any]:
+        """As docs/reference/message.md."""
+        return self._item if isinstance(self._item, dict) else self._item.message()
+
+    @cached_property
+    def text(self) -> str:
+        """The message as a line of JSON."""
+        return encoded(self.message)
+
+
+class Sink(Protocol):
+    """An open way out. All but opening it happens in one thread of its own.
+
+    A module of a sink has ``open_sink(url, source)``, which its entry point names. It raises an
+    EitskinError of one line where the sink cannot be opened.
+    """
+
+    def write(self, told: Told) -> None:
+        """Send it; may take its time. Raises Dropped, or whatever went wrong, which is counted."""
+
+    def close(self) -> None:
+        """Finish files, let go of ports."""
+
+
+def address(url: str, port: int | None, *, usage: str) -> tuple[SplitResult, str, int]:
+    """The parts of ``url``, its host (this machine where none is named) and port.
+
+    Raises:
+        UsageError: it cannot be read, or names no port and there is no usual one.
+    """
+    try:
+        parts = urlsplit(url)
+        named = parts.port
+    except ValueError:
+        raise UsageError(f"--to {url}: no address; write  {usage}") from None
+    chosen = port if named is None else named
+    if not url.startswith(f"{parts.scheme}://") or chosen is None or not 0 <= chosen <= 65535:
+        raise UsageError(f"--to {url}: write  {usage}")
+    return parts, parts.hostname or THIS_MACHINE, chosen
+
+
+def setting(url: str, query: str, name: str, low: int, high: int, usual: int) -> int:
+    """The whole number ``name=N`` of a query; ``usual`` where it is empty.
+
+    Raises:
+        UsageError: it is out of range, or something else is named.
+    """
+    try:
+        values = parse_qs(query, strict_parsing=True, keep_blank_values=True) if query else {}
+        number = int(values.pop(name, [str(usual)])[-1])
+        if values or not low <= number <= high:
+            raise ValueError
+    except ValueError:
+        raise UsageError(
+            f"--to {url}: what follows '?' must be {name}=N, N from {low} to {high}"
+        ) from None
+    return number
+
+
+def nothing_more(url: str, parts: SplitResult, usage: str, *, path: bool = False) -> None:
+    """Refuse what stands after the port.
+
+    Raises:
+        UsageError: something does.
+    """
+    if parts.query or parts.fragment or (parts.path not in ("", "/") and not path):
+        raise UsageError(f"--to {url}: nothing may follow the port; write  {usage}")
+
+
+def or_nan(value: float | None) -> float:
+    """NaN for what is not known."""
+    return math.nan if value is None else value

@@ -1,0 +1,95 @@
+"""``tuio://HOST[:3333]``: TUIO 1.1, profile /tuio/2Dcur, over UDP, for multi-touch programs.
+
+A bundle a frame: source, alive with all ids, a set for each touch (x and y of the skin's bounding
+box, 0 to 1, y downwards as TUIO has it; speed in boxes a second, acceleration in boxes a second
+squared), fseq. After the last frame one with no touch.
+"""
+
+from __future__ import annotations
+
+import math
+import socket
+from typing import Any
+
+from eitskin.errors import SinkError
+from eitskin.sinks.osc import bundle, need_osc
+from eitskin.sinks.sink import Box, Sink, Source, Told, address, nothing_more
+from eitskin.sinks.udp import connected
+
+USAGE = "tuio://HOST or tuio://HOST:PORT"
+PORT = 3333
+PATH = "/tuio/2Dcur"
+State = tuple[float, float, float, float, float]  # x, y, their speeds, the speed's change
+
+
+class Cursors:
+    """TUIO messages of frames, one after another."""
+
+    def __init__(self, box_mm: Box, name: str) -> None:
+        self._box, self._name = box_mm, name
+        self._frame, self._time_s = 0, 0.0
+        self._before: dict[int, State] = {}
+
+    def messages(self, touches: list[dict[str, Any]], time_s: float) -> list[tuple[str, list[Any]]]:
+        """Of the frame at ``time_s``."""
+        self._frame += 1
+        elapsed_s, self._time_s = time_s - self._time_s, time_s
+        now = {t["id"]: self._state(t, elapsed_s) for t in touches}
+        self._before = now
+        sets: list[tuple[str, list[Any]]] = [
+            (PATH, ["set", one, *map(float, state)]) for one, state in now.items()
+        ]
+        return [
+            (PATH, ["source", self._name]),
+            (PATH, ["alive", *now]),
+            *sets,
+            (PATH, ["fseq", self._frame]),
+        ]
+
+    def _state(self, touch: dict[str, Any], elapsed_s: float) -> State:
+        x0, y0, x1, y1 = self._box
+        x = min(max((touch["x_mm"] - x0) / (x1 - x0), 0.0), 1.0)
+        y = min(max((y1 - touch["y_mm"]) / (y1 - y0), 0.0), 1.0)
+        before = self._before.get(touch["id"])
+        if before is None or elapsed_s <= 0:
+            return x, y, 0.0, 0.0, 0.0
+        speed_x, speed_y = (x - before[0]) / elapsed_s, (y - before[1]) / elapsed_s
+        change = math.hypot(speed_x, speed_y) - math.hypot(before[2], before[3])
+        return x, y, speed_x, speed_y, change / elapsed_s
+
+
+class TuioSink:
+    """A datagram a frame."""
+
+    def __init__(self, target: socket.socket, cursors: Cursors) -> None:
+        self._socket, self._cursors, self._time_s = target, cursors, 0.0
+
+    def write(self, told: Told) -> None:
+        message = told.message
+        if message["type"] == "notice":
+            return
+        touches = message.get("touches") or []
+        self._time_s = message.get("time_s", self._time_s)
+        data = bundle(self._cursors.messages(touches, self._time_s))
+        try:
+            self._socket.send(data)
+        except ConnectionRefusedError:
+            self._socket.send(data)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def open_sink(url: str, source: Source) -> Sink:
+    """See the module. Raises as ``address``, ``connected`` and ``need_osc``; SinkError where the
+    skin's bounding box is not known."""
+    parts, host, port = address(url, PORT, usage=USAGE)
+    nothing_more(url, parts, USAGE)
+    need_osc("tuio")
+    if source.box_mm is None:
+        raise SinkError(
+            f"--to {url}: TUIO's places are of the skin's bounding box, which the board's model"
+            " tells; name its file with  --model FILE"
+        )
+    name = f"eitskin@{socket.gethostname()}"
+    return TuioSink(connected(url, host, port), Cursors(source.box_mm, name))

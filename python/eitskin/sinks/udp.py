@@ -1,0 +1,50 @@
+"""``udp://HOST:PORT``: each message as a datagram of JSON."""
+
+from __future__ import annotations
+
+import socket
+
+from eitskin.errors import SinkError
+from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
+
+USAGE = "udp://HOST:PORT"
+
+
+class UdpSink:
+    """A datagram a message. Nobody need listen; what a datagram cannot hold fails."""
+
+    def __init__(self, target: socket.socket) -> None:
+        self._socket = target
+
+    def write(self, told: Told) -> None:
+        try:
+            self._socket.send(told.text.encode())
+        except ConnectionRefusedError:  # of a datagram before: nobody listens on this machine
+            self._socket.send(told.text.encode())
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def open_sink(url: str, source: Source) -> Sink:
+    """See the module. Raises as ``address`` and ``connected``."""
+    parts, host, port = address(url, None, usage=USAGE)
+    nothing_more(url, parts, USAGE)
+    return UdpSink(connected(url, host, port))
+
+
+def connected(url: str, host: str, port: int) -> socket.socket:
+    """A socket that sends datagrams there.
+
+    Raises:
+        SinkError: the host is not known.
+    """
+    try:
+        kind, _, _, _, target = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        opened = socket.socket(kind, socket.SOCK_DGRAM)
+        opened.connect(target)
+    except OSError as error:
+        raise SinkError(
+            f"--to {url}: cannot send there ({error.strerror or error}); check host and port"
+        ) from None
+    return opened

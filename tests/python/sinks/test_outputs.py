@@ -1,0 +1,184 @@
+"""Sinks that are slow, stuck or dying hold up nobody; what cannot be opened is refused."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conftest import Swipe
+from eitskin.cli.main import main
+from eitskin.errors import EitskinError
+from eitskin.sinks import outputs as module
+from eitskin.sinks.outputs import Outputs
+from eitskin.sinks.sink import Dropped, Source, Told
+
+ROOM = 8
+
+
+class Heard:
+    """A sink that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[Told] = []
+        self.closed = threading.Event()
+
+    def write(self, told: Told) -> None:
+        self.told.append(told)
+
+    def close(self) -> None:
+        self.closed.set()
+
+
+class Stuck(Heard):
+    """Never comes back from its first."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.free = threading.Event()
+
+    def write(self, told: Told) -> None:
+        self.free.wait()
+
+
+class Dying(Heard):
+    """Fails from the third on."""
+
+    def write(self, told: Told) -> None:
+        super().write(told)
+        if len(self.told) > 2:
+            raise OSError("the cable\nis out")
+
+
+class Away(Heard):
+    def write(self, told: Told) -> None:
+        raise Dropped
+
+
+class Entry:
+    def __init__(self, sink: Heard) -> None:
+        self._sink = sink
+
+    def load(self) -> Any:
+        return lambda url, source: self._sink
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
+    sinks = {"good": Heard(), "stuck": Stuck(), "dying": Dying(), "away": Away()}
+    monkeypatch.setattr(module, "sinks", lambda: {name: Entry(s) for name, s in sinks.items()})
+    monkeypatch.setattr(module, "ENDING_S", 0.1)
+    yield sinks
+    sinks["stuck"].free.set()  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("patient", [False, True])
+def test_a_stuck_and_a_dying_sink_disturb_no_other(
+    swipe: Swipe, made: dict[str, Any], patient: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "PATIENCE_S", 0.05)
+    said: list[str] = []
+    urls = ["stuck:", "good:", "dying:", "away:"]
+    room = ROOM if patient else len(swipe.frames) + 1
+    with Outputs(urls, swipe.source, patient=patient, say=said.append, room=room) as outputs:
+        for frame in swipe.frames:
+            outputs.put(frame)
+        stuck, good, dying, away = outputs.end({})
+    whole = len(swipe.frames) + 1
+    assert [told.frame for told in made["good"].told[:-1]] == swipe.frames
+    assert (good["sent"], good["dropped"], good["failed"]) == (whole, 0, 0)
+    assert (dying["sent"], dying["failed"], dying["error"]) == (2, whole - 2, "the cable is out")
+    assert (away["sent"], away["dropped"], away["failed"]) == (0, whole, 0)
+    assert (stuck["sent"], stuck["dropped"]) == (0, whole - 1)
+    assert said == ["to dying:: the cable is out"]
+    assert made["good"].closed.is_set() and not made["stuck"].closed.is_set()
+
+
+def test_an_impatient_session_never_waits(swipe: Swipe, made: dict[str, Any]) -> None:
+    with Outputs(["stuck:"], swipe.source, room=ROOM) as outputs:
+        for frame in swipe.frames:
+            outputs.put(frame)
+        (counts,) = outputs.counts
+        assert counts["dropped"] in (len(swipe.frames) - ROOM - 1, len(swipe.frames) - ROOM)
+
+
+def test_a_message_is_made_once_for_all(swipe: Swipe) -> None:
+    told = Told(swipe.frames[20])
+    assert told.message is told.message and told.text is told.text
+
+
+REFUSED = [
+    ("nonsense", 2, "known are: csv"),
+    ("tui://x", 2, "did you mean 'tuio'?"),
+    ("udp://localhost", 2, "udp://HOST:PORT"),
+    ("udp://127.0.0.1:9/path", 2, "nothing may follow the port"),
+    ("ws://127.0.0.1:99999", 2, "write  ws://"),
+    ("ws://127.0.0.1:{taken}", 13, "name another port"),
+    ("foxglove://127.0.0.1:{taken}", 13, "name another port"),
+    ("mqtt://127.0.0.1:{closed}", 13, "no broker answers there"),
+    ("lsl:?touches=0", 2, "touches=N"),
+    ("csv:", 2, "name a file"),
+    ("csv:{folder}/there/is/none.csv", 3, "make it first"),
+    ("mcap:{folder}/here.mcap", 3, "--overwrite"),
+]
+
+
+@pytest.mark.parametrize(("url", "code", "part"), REFUSED)
+def test_what_cannot_be_opened_is_refused_in_a_line(
+    url: str, code: int, part: str, swipe: Swipe, tmp_path: Path
+) -> None:
+    (tmp_path / "here.mcap").touch()
+    with socket.socket() as taken, socket.socket() as closed:
+        for one in (taken, closed):
+            one.bind(("127.0.0.1", 0))
+        taken.listen()
+        ports = {"taken": taken.getsockname()[1], "closed": closed.getsockname()[1]}
+        with pytest.raises(EitskinError) as error:
+            Outputs(["udp://127.0.0.1:9", url.format(folder=tmp_path, **ports)], swipe.source)
+    assert error.value.exit_code == code and part in str(error.value)
+    assert str(error.value).count("\n") == 0
+
+
+def test_tuio_needs_the_skin(swipe: Swipe) -> None:
+    with pytest.raises(EitskinError, match="bounding box"):
+        Outputs(["tuio://127.0.0.1"], Source("serial:x"))
+
+
+@pytest.mark.parametrize("name", ["osc", "tuio", "ws", "mqtt", "lsl", "mcap", "foxglove"])
+def test_a_missing_extra_is_named(
+    name: str, swipe: Swipe, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for package in ("pythonosc", "websockets", "paho", "pylsl", "mcap_ros2", "foxglove"):
+        for loaded in [one for one in sys.modules if one.startswith(package)]:
+            monkeypatch.delitem(sys.modules, loaded)
+        monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.setattr("eitskin.sinks.osc.find_spec", lambda package: None)
+    where = {"lsl": "lsl:", "mcap": f"mcap:{tmp_path}/x.mcap", "foxglove": "foxglove:"}
+    url = where.get(name, f"{name}://127.0.0.1:0")
+    with pytest.raises(EitskinError, match=rf"eitskin\[{name}\]") as error:
+        Outputs([url], swipe.source)
+    assert error.value.exit_code == 9 and not list(tmp_path.iterdir())
+
+
+def test_the_command_line_counts_what_was_sent(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "t.csv"
+    to = ("--to", f"csv:{path}", "--to", "udp://127.0.0.1:9")
+    assert main(["stream", "--device", "sim:swipe", "--frames", "5", *to]) == 0
+    said = capsys.readouterr().out
+    assert f"to csv:{path}: 6 sent" in said and len(path.read_text().splitlines()) >= 6
+    assert main(["stream", "--device", "sim:swipe", "--frames", "5", *to]) == 3
+    assert "--overwrite" in capsys.readouterr().err
+    assert main(["stream", "--device", "sim:swipe", "--frames", "5", "--overwrite", *to]) == 0
+
+
+def test_sinks_are_found_by_entry_point() -> None:
+    assert set(module.sinks()) >= {
+        "udp", "ws", "osc", "tuio", "mqtt", "lsl", "csv", "mcap", "foxglove",
+    }  # fmt: skip

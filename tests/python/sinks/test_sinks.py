@@ -1,0 +1,339 @@
+"""Every sink, heard by a receiver that is not ours."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import json
+import queue
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from conftest import Swipe
+from eitskin.live.message import schema
+from eitskin.sinks.outputs import Outputs
+
+SUMMARY = {
+    "frames": 40, "refused": 0, "faults": 0, "frames_a_second": 20.0, "solve_us_p50": None,
+    "solve_us_p99": None, "link": {}, "board": None, "truth": None,
+}  # fmt: skip
+WAIT_S = 20.0
+VALID = jsonschema.Draft202012Validator(schema())
+
+
+def free_port(kind: int = socket.SOCK_STREAM) -> int:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def send(swipe: Swipe, url: str) -> None:
+    """The whole swipe, and that all of it was sent."""
+    with Outputs([url], swipe.source) as outputs:
+        for frame in swipe.frames:
+            outputs.put(frame)
+        (counts,) = outputs.end(SUMMARY)
+    expected = {"url": url, "sent": len(swipe.frames) + 1, "dropped": 0, "failed": 0, "error": None}
+    assert counts == expected
+
+
+def check(messages: list[dict[str, Any]], swipe: Swipe) -> None:
+    """They are valid and tell of the swipe, whole and in order."""
+    for message in messages:
+        VALID.validate(message)
+    frames = [message for message in messages if message["type"] == "frame"]
+    assert [m["frame"] for m in frames] == [frame.number for frame in swipe.frames]
+    told = [[(t["id"], t["x_mm"], t["y_mm"]) for t in m["touches"]] for m in frames]
+    assert told == [[(t.id, t.x_mm, t.y_mm) for t in touches] for touches in swipe.touches]
+    assert sum(map(len, told)) > 30 and messages[-1]["type"] == "summary"
+    assert all(t["force_n"] is None for m in frames for t in m["touches"])
+
+
+def test_a_plain_socket_gets_a_datagram_a_frame(swipe: Swipe) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(WAIT_S)
+        send(swipe, f"udp://127.0.0.1:{receiver.getsockname()[1]}")
+        check([json.loads(receiver.recv(65536)) for _ in range(len(swipe.frames) + 1)], swipe)
+
+
+@pytest.fixture
+def osc() -> Iterator[tuple[int, queue.Queue[Any]]]:
+    """pythonosc's server: its port, and what it heard."""
+    from pythonosc.dispatcher import Dispatcher
+    from pythonosc.osc_server import ThreadingOSCUDPServer
+
+    heard: queue.Queue[Any] = queue.Queue()
+    dispatcher = Dispatcher()
+    dispatcher.set_default_handler(lambda path, *values: heard.put((path, *values)))
+
+    class InOrder(ThreadingOSCUDPServer):
+        def process_request(self, request: Any, address: Any) -> None:
+            self.finish_request(request, address)
+
+    with InOrder(("127.0.0.1", 0), dispatcher) as server:
+        server.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+        thread.start()
+        yield server.server_address[1], heard
+        server.shutdown()
+        thread.join()
+
+
+def test_osc(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
+    port, heard = osc
+    send(swipe, f"osc://127.0.0.1:{port}/table")
+    for frame in swipe.frames:
+        path, number, time_s, count = heard.get(timeout=WAIT_S)
+        assert (path, number, count) == ("/table/frame", frame.number, len(frame.touches))
+        assert time_s == pytest.approx(frame.time_s, abs=1e-5)
+        for touch in frame.touches:
+            path, one, x, y, _, _, force, confidence = heard.get(timeout=WAIT_S)
+            assert (path, one, force) == ("/table/touch", touch.id, None)
+            assert (x, y, confidence) == pytest.approx(
+                (touch.x_mm, touch.y_mm, touch.confidence), rel=1e-6
+            )
+
+
+def test_tuio(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
+    port, heard = osc
+    send(swipe, f"tuio://127.0.0.1:{port}")
+    x0, y0, x1, y1 = swipe.source.model.skin.outline.bounding_box_mm  # type: ignore[union-attr]
+    last: dict[int, tuple[float, float]] = {}
+    for number, touches in enumerate([*swipe.touches, []], 1):
+        bundle: dict[str, list[Any]] = {"set": []}
+        while "fseq" not in bundle:
+            path, kind, *values = heard.get(timeout=WAIT_S)
+            assert path == "/tuio/2Dcur"
+            if kind == "set":
+                bundle["set"].append(values)
+            else:
+                bundle[kind] = values
+        assert bundle["fseq"] == [number] and bundle["source"][0].startswith("eitskin@")
+        assert bundle["alive"] == [t.id for t in touches] == [one[0] for one in bundle["set"]]
+        for touch, (_, x, y, speed_x, *_) in zip(touches, bundle["set"], strict=True):
+            place = (x0 + x * (x1 - x0), y1 - y * (y1 - y0))
+            assert place == pytest.approx((touch.x_mm, touch.y_mm), abs=1e-3)
+            if touch.id in last:
+                moved = (x - last[touch.id][0]) * 20  # frames a second
+                assert speed_x == pytest.approx(moved, abs=1e-4)
+        last = {one[0]: (one[1], one[2]) for one in bundle["set"]}
+
+
+def test_websocket_clients(swipe: Swipe) -> None:
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    url = f"ws://127.0.0.1:{free_port()}"
+    with Outputs([url], swipe.source) as outputs:
+        with pytest.raises(InvalidStatus, match="403"):
+            connect(url, origin="http://elsewhere.example")
+        with connect(url, max_size=None) as one, connect(url, origin="http://localhost:80") as two:
+            for frame in swipe.frames:
+                outputs.put(frame)
+            (counts,) = outputs.end(SUMMARY)
+            assert (counts["sent"], counts["dropped"]) == (len(swipe.frames) + 1, 0)
+            for client in (one, two):
+                check([json.loads(text) for text in client], swipe)
+
+
+def test_a_websocket_client_that_never_reads_is_left_out(swipe: Swipe) -> None:
+    from websockets.sync.client import connect
+
+    port = free_port()
+    url = f"ws://127.0.0.1:{port}"
+    with (
+        Outputs([url], swipe.source, patient=True) as outputs,
+        socket.socket() as deaf,
+        connect(url) as good,
+    ):
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        deaf.connect(("127.0.0.1", port))
+        deaf.sendall(
+            b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+        )
+        assert deaf.recv(12) == b"HTTP/1.1 101"
+        for _ in range(200):  # until all buffers on the way are full
+            if outputs.counts[0]["dropped"]:
+                break
+            for frame in swipe.frames:
+                outputs.put(frame)
+            for _ in swipe.frames:
+                good.recv(timeout=WAIT_S)
+        (counts,) = outputs.counts
+        assert counts["dropped"] > 0 and counts["failed"] == 0
+
+
+@pytest.fixture
+def broker() -> Iterator[int]:
+    port = free_port()
+    program = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin")
+    assert program, "Debian's mosquitto is missing; scripts/test installs it"
+    with subprocess.Popen([program, "-p", str(port), "-v"], stderr=subprocess.PIPE) as running:
+        assert running.stderr is not None
+        while not running.stderr.readline().endswith(b" running\n"):
+            assert running.poll() is None
+        yield port
+        running.terminate()
+
+
+def test_mqtt(swipe: Swipe, broker: int) -> None:
+    from paho.mqtt.client import Client
+    from paho.mqtt.enums import CallbackAPIVersion
+
+    heard: queue.Queue[Any] = queue.Queue()
+    client = Client(CallbackAPIVersion.VERSION2)
+    client.on_subscribe = lambda *_: heard.put("subscribed")
+    client.on_message = lambda _client, _data, message: heard.put((message.topic, message.payload))
+    client.connect("127.0.0.1", broker)
+    client.subscribe("skin/left/#")
+    client.loop_start()
+    assert heard.get(timeout=WAIT_S) == "subscribed"
+    send(swipe, f"mqtt://127.0.0.1:{broker}/skin/left")
+    came = [heard.get(timeout=WAIT_S) for _ in range(len(swipe.frames) + 1)]
+    client.loop_stop()
+    check([json.loads(payload) for _, payload in came], swipe)
+    assert {topic for topic, _ in came} == {"skin/left/frame", "skin/left/summary"}
+
+
+def test_lsl(swipe: Swipe) -> None:
+    pylsl = pytest.importorskip("pylsl", reason="liblsl is not there", exc_type=ImportError)
+    with Outputs(["lsl:table?touches=2"], swipe.source) as outputs:
+        (info,) = pylsl.resolve_byprop("name", "table", timeout=WAIT_S)
+        inlet = pylsl.StreamInlet(info)
+        inlet.open_stream(timeout=WAIT_S)
+        for frame in swipe.frames:
+            outputs.put(frame)
+        for touches in swipe.touches:
+            sample, _ = inlet.pull_sample(timeout=WAIT_S)
+            assert sample[0] == len(touches) and len(sample) == 1 + 2 * 6
+            for k, touch in enumerate(touches):
+                one = sample[1 + 6 * k : 7 + 6 * k]
+                assert one[:3] == pytest.approx((touch.id, touch.x_mm, touch.y_mm), rel=1e-6)
+                assert np.isnan(one[5])
+        inlet.close_stream()
+
+
+def test_csv(swipe: Swipe, tmp_path: Path) -> None:
+    path = tmp_path / "touches.csv"
+    send(swipe, f"csv:{path}")
+    with path.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    found = [row for row in rows if row["id"]]
+    assert len({row["frame"] for row in rows}) == len(swipe.frames)
+    told = [(int(row["id"]), float(row["x_mm"])) for row in found]
+    assert told == [(t.id, t.x_mm) for touches in swipe.touches for t in touches]
+    assert {row["force_n"] for row in rows} == {""}
+
+
+def test_mcap(swipe: Swipe, tmp_path: Path) -> None:
+    from mcap_ros2.reader import read_ros2_messages
+
+    path = tmp_path / "touches.mcap"
+    send(swipe, f"mcap:{path}")
+    came: dict[str, list[Any]] = {}
+    for message in read_ros2_messages(str(path)):
+        came.setdefault(message.channel.topic, []).append(message)
+    touches = [message.ros_msg for message in came["/touches"]]
+    assert [[(t.id, t.x_mm) for t in one.touches] for one in touches] == [
+        [(t.id, t.x_mm) for t in listed] for listed in swipe.touches
+    ]
+    stamps = [message.log_time_ns / 1e9 for message in came["/touches"]]
+    assert stamps == pytest.approx([frame.time_unix_s for frame in swipe.frames], abs=1e-6)
+    image, grid = came["/image"][20].ros_msg, swipe.source.model.grid  # type: ignore[union-attr]
+    picture = np.frombuffer(bytes(image.data), "<f4").reshape(image.height, image.width)[::-1]
+    assert image.encoding == "32FC1" and image.step == 4 * image.width
+    np.testing.assert_array_equal(grid.values(picture), swipe.frames[20].image)
+    assert [one.level for one in came["/diagnostics"][0].ros_msg.status] == [0]
+
+
+KILLED = """
+import os, signal, sys
+from eitskin.cli import live_output
+from eitskin.live.session import Session
+from eitskin.sinks.outputs import Outputs
+from eitskin.sinks.sink import Source
+with Session("sim:swipe") as session, Outputs(sys.argv[1:], Source("x"), patient=True) as outputs:
+    for item in session.frames():
+        outputs.put(item)
+    while min(one["sent"] for one in outputs.counts) < 40:
+        pass
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_files_of_a_killed_program_can_be_read(swipe: Swipe, tmp_path: Path) -> None:
+    from mcap.exceptions import EndOfFile
+    from mcap.reader import NonSeekingReader
+    from mcap_ros2.decoder import DecoderFactory
+
+    table, log = tmp_path / "touches.csv", tmp_path / "touches.mcap"
+    killed = subprocess.run([sys.executable, "-c", KILLED, f"csv:{table}", f"mcap:{log}"])
+    assert killed.returncode == -signal.SIGKILL
+    with table.open(newline="") as stream:
+        assert len({row["frame"] for row in csv.DictReader(stream)}) == len(swipe.frames)
+    frames = []
+    with log.open("rb") as stream, pytest.raises(EndOfFile):
+        reader = NonSeekingReader(stream, decoder_factories=[DecoderFactory()])
+        for _, channel, _, message in reader.iter_decoded_messages(log_time_order=False):
+            frames += [message.frame] if channel.topic == "/touches" else []
+    assert frames == [frame.number for frame in swipe.frames[: len(frames)]]
+
+
+def test_foxglove(swipe: Swipe) -> None:
+    """By the protocol that Foxglove publishes: text for what there is, binary for messages."""
+    from websockets.sync.client import connect
+
+    port = free_port()
+    with (
+        Outputs([f"foxglove://127.0.0.1:{port}"], swipe.source) as outputs,
+        connect(
+            f"ws://127.0.0.1:{port}",
+            subprotocols=["foxglove.sdk.v1"],  # type: ignore[list-item]
+            max_size=None,
+        ) as client,
+    ):
+        channels: dict[str, Any] = {}
+        while not {"/touches", "/image"} <= set(channels):
+            text = json.loads(client.recv(timeout=WAIT_S))
+            if text["op"] == "advertise":
+                channels |= {one["topic"]: one for one in text["channels"]}
+        assert channels["/touches"]["encoding"] == "json"
+        wanted = [
+            {"id": k, "channelId": channels[topic]["id"]}
+            for k, topic in enumerate(("/touches", "/image"))
+        ]
+        client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+        came: dict[int, list[bytes]] = {0: [], 1: []}
+
+        def take(timeout_s: float) -> None:
+            data = client.recv(timeout=timeout_s)
+            if isinstance(data, bytes) and data[0] == 1:
+                came[int.from_bytes(data[1:5], "little")].append(data[13:])
+
+        while not came[0]:  # the subscription holds from a moment on that nobody can foresee
+            outputs.put(swipe.frames[0])
+            with contextlib.suppress(TimeoutError):
+                take(0.05)
+        for frame in swipe.frames[1:]:
+            outputs.put(frame)
+        while json.loads(came[0][-1])["frame"] != swipe.frames[-1].number:
+            take(WAIT_S)
+        assert came[1]
+    told = [json.loads(payload) for payload in came[0][-len(swipe.frames) + 1 :]]
+    for message in told:
+        VALID.validate(message)
+    assert [m["frame"] for m in told] == [frame.number for frame in swipe.frames[1:]]
