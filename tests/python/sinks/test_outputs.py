@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from swipe_frames import Swipe
 
-from conftest import Swipe
 from eitskin.cli.main import main
 from eitskin.errors import EitskinError
 from eitskin.sinks import outputs as module

@@ -19,8 +19,8 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from swipe_frames import Swipe
 
-from conftest import Swipe
 from eitskin.live.message import schema
 from eitskin.sinks.outputs import Outputs
 
