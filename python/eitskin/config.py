@@ -4,6 +4,7 @@ one."""
 from __future__ import annotations
 
 import difflib
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -17,16 +18,25 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+MAX_TOML_BYTES = 1_000_000
+MAX_KEY_PARTS = 32  # the parser's time grows with the square of a key's parts
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+DEEP_KEY = re.compile(rf"{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MAX_KEY_PARTS}}}")
+
 
 def load_toml(path: str | Path, what: str) -> dict[str, Any]:
     """Parse the TOML file ``path``; ``what`` names its kind in errors.
 
     Raises:
         FileError: it cannot be read.
-        ConfigError: it is not UTF-8 or not TOML.
+        ConfigError: it is not UTF-8, not TOML, or has keys of too many parts.
     """
+    content = read_bytes(path, what, MAX_TOML_BYTES)
     try:
-        return tomllib.loads(read_bytes(path, what).decode("utf-8"))
+        text = content.decode("utf-8")
+        if DEEP_KEY.search(text):
+            raise ConfigError(f"{path}: not a {what}: a key of over {MAX_KEY_PARTS} parts")
+        return tomllib.loads(text)
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: not UTF-8 text, so not a {what}") from None
     except (

@@ -17,6 +17,8 @@ from typing import Any
 
 from eitskin.errors import FileError
 
+MOST_BYTES = 100_000_000
+
 
 def refuse_unwritable(*paths: str | Path | None) -> None:
     """Refuse before long work the outputs that ``write_beside`` would refuse after it; None stands
@@ -125,20 +127,26 @@ def write_bytes(path: str | Path, content: bytes) -> None:
         temporary.write_bytes(content)
 
 
-def read_bytes(path: str | Path, what: str) -> bytes:
+def read_bytes(path: str | Path, what: str, most: int = MOST_BYTES) -> bytes:
     """The content of ``path``; ``what`` names its kind in the error ("model", "frames file").
 
     Raises:
-        FileError: it does not exist or cannot be read.
+        FileError: it does not exist, cannot be read, or has over ``most`` bytes.
     """
     try:
-        return Path(path).read_bytes()
+        with Path(path).open("rb") as stream:
+            content = stream.read(most + 1)
     except FileNotFoundError:
         raise FileError(f"{path}: no such {what}; check the path") from None
     except (OSError, ValueError) as error:  # a ValueError: zero bytes in the path
         raise FileError(
             f"{path}: cannot read this {what} ({getattr(error, 'strerror', error)})"
         ) from error
+    if len(content) > most:
+        raise FileError(
+            f"{path}: over {most / 1e6:g} MB, more than a {what} may have; check the path"
+        )
+    return content
 
 
 def parse_json(text: str | bytes) -> Any:

@@ -17,6 +17,7 @@ from eitskin.fileio import read_bytes
 from eitskin.frames.frames import read_npz
 
 LISTED = 40
+MAX_BYTES = 1_000_000_000
 
 
 def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
@@ -51,7 +52,7 @@ def listing(arrays: Mapping[str, NDArray[Any]]) -> str:
 
 
 def _read_npy(path: str | Path) -> NDArray[Any]:
-    content = read_bytes(path, "array")
+    content = read_bytes(path, "array", MAX_BYTES)
     try:
         return np.asarray(np.lib.format.read_array(io.BytesIO(content), allow_pickle=False))
     except Exception:  # of a damaged file numpy raises whatever its parser meets

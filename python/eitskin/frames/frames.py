@@ -8,7 +8,7 @@ checked whole.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,22 @@ IntArray = NDArray[np.int64]
 FORMAT = "eitskin-frames"
 VERSION = 1
 FOREIGN = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".npy", ".mat")  # that import reads
+MAX_ARRAYS = 10_000
+MAX_UNPACKED_BYTES = 4_000_000_000
+INNOCENT_BYTES = 100_000_000  # so much may be packed as tightly as it likes
+MAX_RATIO = 300  # unpacked to packed: masks of a truth reach 100, zeros 1000
 TOUCH_FIELDS = ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign")
+HEAD = ("format", "version", "truth_mask_extent_mm")
+REQUIRED = (
+    "voltage_v",
+    "reference_voltage_v",
+    "drive_measure",
+    "n_electrodes",
+    "current_a",
+    "frame_name",
+    "meta",
+)
+OPTIONAL = ("time_s", *TOUCH_FIELDS, "truth_mask", "truth_conductivity_s_per_m")
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +255,7 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
             f" {Path(path).with_suffix('.npz')}  with the options that  eitskin doctor {where} "
             " finds"
         )
-    arrays = read_npz(path, "frames file")
+    arrays = read_npz(path, "frames file", (*REQUIRED, *OPTIONAL, *HEAD))
     if "format" not in arrays or str(arrays["format"]) != FORMAT:
         raise FrameError(
             f"{where}: not an eitskin frames file (its arrays:"
@@ -267,20 +282,26 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
         ) from None
 
 
-def read_npz(path: str | Path, what: str) -> dict[str, NDArray[Any]]:
+def read_npz(
+    path: str | Path, what: str, wanted: Collection[str] | None = None
+) -> dict[str, NDArray[Any]]:
     """All arrays of an .npz, without pickle; ``what`` names its kind in errors. Arrays of objects
-    are left out.
+    are left out; those that are not ``wanted`` (None: all are) are not unpacked and come out empty.
 
     Raises:
-        FileError: it cannot be read, or is no .npz.
+        FileError: it cannot be read, is no .npz, or unpacks to far more than an .npz of numbers.
     """
     try:
         with Path(path).open("rb") as stream:
             archive = np.load(stream, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise FileError(f"{path}: one bare array (.npy), not an .npz with named arrays")
+            _refuse_inflating(archive, str(path))
             arrays = {}
             for name in archive.files:
+                if wanted is not None and name not in wanted:
+                    arrays[name] = np.zeros(0)
+                    continue
                 try:
                     arrays[name] = np.asarray(archive[name])
                 except ValueError as error:
@@ -299,23 +320,25 @@ def read_npz(path: str | Path, what: str) -> dict[str, NDArray[Any]]:
         ) from None
 
 
+def _refuse_inflating(archive: Any, where: str) -> None:
+    members = archive.zip.infolist()
+    packed = sum(one.compress_size for one in members)
+    unpacked = sum(one.file_size for one in members)
+    if len(members) > MAX_ARRAYS:
+        raise FileError(f"{where}: {len(members)} arrays, over {MAX_ARRAYS}; keep those needed")
+    if unpacked > MAX_UNPACKED_BYTES or (
+        unpacked > INNOCENT_BYTES and unpacked > MAX_RATIO * packed
+    ):
+        raise FileError(
+            f"{where}: {packed} bytes would unpack to {unpacked}; split it into smaller files"
+        )
+
+
 def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Frames:
-    optional = ("time_s", *TOUCH_FIELDS, "truth_mask", "truth_conductivity_s_per_m")
-    required = (
-        "voltage_v",
-        "reference_voltage_v",
-        "drive_measure",
-        "n_electrodes",
-        "current_a",
-        "frame_name",
-        "meta",
-    )
-    for name in required:
+    for name in REQUIRED:
         if name not in arrays:
             raise FrameError(f"the field {name!r} is missing; make the file again")
-    unknown = sorted(
-        set(arrays) - {*required, *optional, "format", "version", "truth_mask_extent_mm"}
-    )
+    unknown = sorted(set(arrays) - {*REQUIRED, *OPTIONAL, *HEAD})
     if unknown:
         raise FrameError(
             f"unknown field {unknown[0]!r}; docs/reference/frames-format.md lists the fields"
@@ -339,7 +362,7 @@ def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Fram
         truth_mask_extent_mm=None if extent is None else tuple(extent.tolist()),
         meta=meta,
         allow_nonfinite=allow_nonfinite,
-        **{name: arrays.get(name) for name in optional},
+        **{name: arrays.get(name) for name in OPTIONAL},
     )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.arrays import listing, pick, read_arrays
-from eitskin.frames.frames import FORMAT
+from eitskin.frames.frames import FORMAT, read_npz
 from eitskin.frames.lines import LineFormat
 from eitskin.frames.pairs import PAIRS, Paired, all_magnitudes, paired, refuse_parts, to_complex
 from eitskin.frames.tables import TextTable, chosen, read_table
@@ -96,7 +96,7 @@ def is_frames_file(path: str | Path) -> bool:
     """Whether ``path`` is an .npz in this project's frames format (of any version)."""
     if Path(path).suffix.lower() != ".npz":
         return False
-    return str(read_arrays(path).get("format")) == FORMAT
+    return str(read_npz(path, "file of arrays", ("format",)).get("format")) == FORMAT
 
 
 def read_source(

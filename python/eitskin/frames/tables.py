@@ -16,6 +16,7 @@ from eitskin.errors import FrameError, UsageError
 from eitskin.fileio import read_bytes
 from eitskin.frames.lines import DELIMITERS, LineFormat, LineReader, Row, own_labels, parse_cell
 
+MAX_BYTES = 1_000_000_000
 SNIFFED_LINES = 50
 LONGEST = 200  # of a list in a message, in characters
 
@@ -80,7 +81,7 @@ def read_table(
         UsageError: the delimiter is not one, or there are several labels.
         FrameError: it is no text, holds no rows, or its rows differ in length.
     """
-    content = read_bytes(path, "table")
+    content = read_bytes(path, "table", MAX_BYTES)
     if b"\0" in content[:4096]:
         raise FrameError(f"{path}: not a text table (it holds zero bytes); save it as CSV in UTF-8")
     lines = list(enumerate(decoded(content).splitlines(), 1))

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice, product
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from eitskin.fileio import read_bytes
 from eitskin.skin.drawing_shapes import DrawingReading, DrawnShape, FloatArray
 from eitskin.skin.outline import Outline, polygon
 
-MAX_BYTES = 20_000_000
+MAX_BYTES = 2_000_000
 JOIN_MM = 0.01  # ends nearer than that are one point
 
 
@@ -90,11 +91,7 @@ def read_drawing(path: Path, reading: DrawingReading) -> Drawing:
     kind = path.suffix.lower()
     if kind not in (".svg", ".dxf"):
         raise ConfigError(f"{path}: a drawing must be .svg or .dxf")
-    content = read_bytes(path, "drawing")
-    if len(content) > MAX_BYTES:
-        raise ConfigError(
-            f"{path}: {len(content)} bytes are more than {MAX_BYTES}; export the outline alone"
-        )
+    content = read_bytes(path, "drawing", MAX_BYTES)
     if kind == ".svg":
         from eitskin.skin.drawing_svg import read_svg as read
     else:
@@ -108,16 +105,14 @@ def read_drawing(path: Path, reading: DrawingReading) -> Drawing:
 def joined(open_shapes: Sequence[DrawnShape]) -> list[DrawnShape]:
     """Closed shapes made of open ones whose ends meet, two at each joint; what does not close is
     left out."""
-    left, closed = [one for one in open_shapes if len(one.points_mm) > 1], []
+    left = {k: one for k, one in enumerate(open_shapes) if len(one.points_mm) > 1}
+    ends, closed = _Ends(left), []
     while left:
-        chain, names = left.pop().points_mm, []
+        first = next(reversed(left))
+        chain, names = left.pop(first).points_mm, []
         while not _meet(chain[0], chain[-1]):
-            found = [
-                (k, end)
-                for k, one in enumerate(left)
-                for end in (0, -1)
-                if _meet(one.points_mm[end], chain[-1])
-            ]
+            at_it = (found for found in ends.near(chain[-1]) if found[0] in left)
+            found = list(islice(at_it, 2))
             if len(found) != 1:
                 break
             k, end = found[0]
@@ -130,6 +125,32 @@ def joined(open_shapes: Sequence[DrawnShape]) -> list[DrawnShape]:
             if len(chain) > 3:
                 closed.append(DrawnShape("", frozenset().union(*names), chain[:-1], True))
     return closed
+
+
+class _Ends:
+    """The ends of lines by place, in cells of ``JOIN_MM``."""
+
+    def __init__(self, lines: Mapping[int, DrawnShape]) -> None:
+        self._cells: dict[tuple[int, int], list[tuple[int, int, FloatArray]]] = {}
+        for k, one in lines.items():
+            for end in (0, -1):
+                point = one.points_mm[end]
+                if np.isfinite(point).all():
+                    self._cells.setdefault(_cell(point), []).append((k, end, point))
+
+    def near(self, point: FloatArray) -> Iterator[tuple[int, int]]:
+        """Number and end (0, -1) of each line that ends at ``point``."""
+        if not np.isfinite(point).all():
+            return
+        column, row = _cell(point)
+        for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
+            for k, end, other in self._cells.get(cell, ()):
+                if _meet(other, point):
+                    yield k, end
+
+
+def _cell(point: FloatArray) -> tuple[int, int]:
+    return math.floor(point[0] / JOIN_MM), math.floor(point[1] / JOIN_MM)
 
 
 def _meet(a: FloatArray, b: FloatArray) -> bool:

@@ -13,7 +13,13 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import ConfigError, EitskinError, missing_extra
-from eitskin.skin.drawing_shapes import MAX_PIECES, MAX_SHAPES, DrawingReading, DrawnShape
+from eitskin.skin.drawing_shapes import (
+    MAX_DEPTH,
+    MAX_PIECES,
+    MAX_SHAPES,
+    DrawingReading,
+    DrawnShape,
+)
 
 try:
     import ezdxf.disassemble
@@ -40,11 +46,8 @@ def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
     try:
         document, _ = ezdxf.recover.read(io.BytesIO(content))
         scale = reading.scale_mm or _scale_of(document, where)
-        entities = list(
-            islice(ezdxf.disassemble.recursive_decompose(document.modelspace()), MAX_SHAPES + 1)
-        )
-        if len(entities) > MAX_SHAPES:
-            raise ConfigError(f"{where}: over {MAX_SHAPES} entities; export the outline alone")
+        _refuse_copies(document, where)
+        entities = list(ezdxf.disassemble.recursive_decompose(document.modelspace()))
         return [
             shape
             for entity in entities
@@ -68,6 +71,30 @@ def _scale_of(document: Any, where: str) -> float:
             " drawing"
         )
     return UNITS_MM[unit]
+
+
+def _refuse_copies(document: Any, where: str) -> None:
+    """Refuse blocks that insert each other in circles, and more copies than a drawing needs, before
+    any is made."""
+    counts: dict[str, int] = {}
+
+    def count(layout: Any, depth: int) -> int:
+        if depth > MAX_DEPTH:
+            raise ConfigError(
+                f"{where}: blocks within each other, over {MAX_DEPTH} deep; explode them"
+            )
+        total = 0
+        for one in layout:
+            total += 1
+            if one.dxftype() == "INSERT" and one.dxf.name in document.blocks:
+                name = one.dxf.name.lower()
+                if name not in counts:
+                    counts[name] = count(document.blocks.get(name), depth + 1)
+                total += max(1, one.dxf.row_count * one.dxf.column_count) * max(1, counts[name])
+        return total
+
+    if count(document.modelspace(), 0) > MAX_SHAPES:
+        raise ConfigError(f"{where}: over {MAX_SHAPES} entities; export the outline alone")
 
 
 def _shapes(entity: Any, scale: float, tolerance: float) -> Iterator[DrawnShape]:

@@ -13,6 +13,7 @@ FloatArray = npt.NDArray[np.float64]
 
 TOLERANCE_MM = 0.1
 MAX_SHAPES = 20_000
+MAX_DEPTH = 100  # groups or blocks within each other
 MAX_PIECES = 2_000
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from eitskin.errors import ConfigError, EitskinError, missing_extra
 from eitskin.skin.drawing_shapes import (
+    MAX_DEPTH,
     MAX_SHAPES,
     DrawingReading,
     DrawnShape,
@@ -30,7 +31,7 @@ except ModuleNotFoundError as error:
 
 MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 MM_A_PIXEL = 25.4 / 96
-MAX_DEPTH = 100
+MAX_STYLE = 10_000  # characters of style sheets
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
@@ -142,6 +143,9 @@ def _refuse_copies(root: ET.Element, where: str) -> None:
 
     if count(root, 0) > MAX_SHAPES:
         raise ConfigError(f"{where}: over {MAX_SHAPES} elements; export the outline alone")
+    sheets = [one for one in root.iter() if str(one.tag).rpartition("}")[2] == "style"]
+    if sum(len(one.text or "") for one in sheets) > MAX_STYLE:
+        raise ConfigError(f"{where}: style sheets over {MAX_STYLE} characters; export plain SVG")
 
 
 def _shapes(
