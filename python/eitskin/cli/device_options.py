@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 DEVICE_HELP = (
     "auto (the one board that is plugged in), serial:/dev/ttyACM0, sim:SCENE (simulated),"
     " emu:SCENE (the firmware on an emulated board), file:RUN.eits (a recording); SCENE is a file"
-    " or a scene of  eitskin scene list"
+    " or a scene of  eitskin scene list; after these, ?speed=1&loop=1"
 )
 KINDS = ("raw", "image", "touches")
 TARE_FRAMES = 16
 
 
-def add_device(parser: argparse.ArgumentParser, *, model: bool = True) -> None:
-    """``--device`` and ``--json``; with ``model``, also ``--model`` and ``--firmware``."""
+def add_device(parser: argparse.ArgumentParser, *, model: bool = True, json: bool = True) -> None:
+    """``--device``; with ``json``, ``--json``; with ``model``, ``--model`` and ``--firmware``."""
     option(parser, "--device URL", DEVICE_HELP, default="auto")
     if model:
         option(
@@ -39,7 +39,8 @@ def add_device(parser: argparse.ArgumentParser, *, model: bool = True) -> None:
             Path,
         )
         option(parser, "--firmware BIN", "of an emulated board (default: the prebuilt one)", Path)
-    option(parser, "--json", "print for programs")
+    if json:
+        option(parser, "--json", "print for programs")
 
 
 def add_scan(parser: argparse.ArgumentParser) -> None:

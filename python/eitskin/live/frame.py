@@ -107,8 +107,9 @@ class Frame:
         """The touches that were there, where a scene tells."""
         return self.compared.true
 
-    def message(self) -> dict[str, Any]:
-        """For programs (docs/reference/message.md)."""
+    def message(self, *, arrays: bool = True) -> dict[str, Any]:
+        """For programs (docs/reference/message.md); without ``arrays`` image and raw voltages are
+        left out."""
         live, solved = self.live, self.live.solved
         message = frame_table(
             self.number,
@@ -122,7 +123,9 @@ class Frame:
             info=None if solved is None else solved.as_dict(),
         )
         message["board_us"] = live.board_us
-        return message | _image(self.compared) | _raw(live) | _truth(self.compared, message)
+        if arrays:
+            message |= _image(self.compared) | _raw(live)
+        return message | _truth(self.compared, message)
 
     def __repr__(self) -> str:
         places = ", ".join(f"#{t.id} ({t.x_mm:.1f}, {t.y_mm:.1f})" for t in self.touches)

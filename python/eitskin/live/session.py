@@ -69,6 +69,7 @@ class SessionSettings:
         tare: take the reference from so many frames; None: from 16 where that is needed.
         target: a budget or an accuracy that chooses the solver's settings.
         record: a new recording of every packet; an existing file is written over.
+        quiet_frames: those of the reference are sent too, for taps of the link.
     """
 
     mode: Stream = Stream.TOUCHES
@@ -82,6 +83,7 @@ class SessionSettings:
     target: Target | None = None
     tare: int | None = None
     record: Path | None = None
+    quiet_frames: bool = False
 
 
 class Session:
@@ -209,6 +211,12 @@ class Session:
     def tare(self, frames: int = TARE_FRAMES) -> Future[None]:
         """Take the reference again, from frames of the untouched skin."""
         return self.ask(lambda device: device.tare(frames))
+
+    def change_mode(self, mode: Stream) -> None:
+        """Stream something else from the next frame on; to be called in ``ask``."""
+        self.settings = replace(self.settings, mode=mode)
+        if not self.replays:
+            self._every = self.settings.every or self._carried()
 
     # ---- what comes ----
 
@@ -349,7 +357,7 @@ class Session:
         frames = TARE_FRAMES if how.tare is None else how.tare
         if not simulated:
             self._say(f"leave the skin untouched: taking the reference from {frames} frames")
-        take_reference(self.device, frames, streamed=recorded)
+        take_reference(self.device, frames, streamed=recorded or how.quiet_frames)
         if not simulated:
             self._say("touch it")
 

@@ -43,6 +43,10 @@ class SceneTruth:
         frame's that is asked for."""
         self._began_us = time_us
 
+    def look_for(self, sign: str) -> None:
+        """The board looks for other changes from now on."""
+        self._wanted = LOOKED_FOR[sign]
+
     def touches(self, time_us: int) -> tuple[TrueTouch, ...]:
         """What was there when the scan of a frame began at ``time_us``."""
         if self._began_us is None:

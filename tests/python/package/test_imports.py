@@ -28,6 +28,7 @@ ORDER = (
     {"view"},
     {"live"},
     {"sinks"},
+    {"page"},
     {"reconstruct"},
     {"cli"},
 )

@@ -1,0 +1,105 @@
+"""``eitskin view``: the live page in a browser."""
+
+from __future__ import annotations
+
+import argparse
+import ipaddress
+import secrets
+import webbrowser
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from eitskin.cli.arguments import option
+from eitskin.cli.device_options import (
+    add_device,
+    add_scan,
+    read_mode,
+    say,
+    session_settings,
+    whole,
+)
+from eitskin.errors import FileError, UsageError
+
+PORT = 8470
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``view``."""
+    parser = subparsers.add_parser(
+        "view",
+        help="the skin live in a browser: image, touches, electrodes, voltages",
+        description=(
+            "Serve a page that shows a board live, and say its address. Simulated and recorded"
+            " frames come at the speed that they were scanned at, or as ?speed=2 or ?speed=max"
+            " after the device says; ?loop=1 begins again at the end. Ctrl-C ends it."
+        ),
+    )
+    add_device(parser, json=False)
+    option(
+        parser,
+        "--mode KIND[,KIND]",
+        "raw, image, touches, or several (default: all; of a real board image,touches)",
+    )
+    option(parser, "--every N", "every N-th frame (default: as many as the line carries)", int)
+    option(parser, "--port PORT", f"to listen on; 0 for any (default: {PORT})", int, default=PORT)
+    option(
+        parser,
+        "--host ADDRESS",
+        "to listen on, such as 0.0.0.0; other than this machine needs --token",
+        default="127.0.0.1",
+    )
+    option(parser, "--token WORD", "that commands need (default: drawn anew, in the address)")
+    option(parser, "--folder FOLDER", "where the page's recordings go", Path, default=Path())
+    option(parser, "--open", "open the page in this machine's browser")
+    add_scan(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Listen, follow, serve."""
+    from eitskin.device.timing import TIMED
+    from eitskin.page.server import MIN_TOKEN, PageServer, listen, load_server
+
+    load_server()
+    whole("--port", options.port, 0, 65535)
+    if options.token is not None and len(options.token) < MIN_TOKEN:
+        raise UsageError(f"--token: a word of at least {MIN_TOKEN} characters")
+    remote = not _this_machine(options.host)
+    if remote and options.token is None:
+        raise UsageError(
+            f"--host {options.host}: who may look on from elsewhere must know a word; name it with"
+            f"  --token WORD, at least {MIN_TOKEN} characters"
+        )
+    if not options.folder.is_dir():
+        raise FileError(f"--folder {options.folder}: no such folder; make it, or name another")
+    options.frames, options.overwrite = None, False
+    timed = options.device.partition(":")[0] in TIMED
+    mode = read_mode(options.mode or ("raw,image,touches" if timed else "image,touches"))
+    settings = replace(session_settings(options, mode), quiet_frames=True)
+    token = options.token or secrets.token_urlsafe(16)
+    server = PageServer(
+        options.device,
+        settings,
+        listen(options.host, options.port),
+        token=token,
+        host=options.host,
+        remote=remote,
+        folder=options.folder,
+        say=say,
+    )
+    address = f"{server.address}#token={token}"
+    print(f"open {address}", flush=True)
+    if options.open:
+        webbrowser.open(address)
+    server.serve()
+    return 0
+
+
+def _this_machine(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

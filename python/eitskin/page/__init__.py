@@ -1,0 +1,1 @@
+"""The live page: a session with a board, served to browsers."""

@@ -1,0 +1,107 @@
+"""What the page is told: of the session once, of each frame in binary.
+
+A frame is one binary message of the WebSocket, little-endian:
+
+======  ==========================================================
+bytes   what
+======  ==========================================================
+0 - 3   "EVF1"
+4 - 7   u32, which frame it is for the page; it answers with it
+8 - 11  u32 n, pixels of the image; 0: none
+12- 15  u32 m, rows of raw voltages; 0: none
+4 n     float32, S/m, on the pixels that ``setup`` names
+4 m     float32, V, NaN where a row cannot be used
+rest    UTF-8: the frame's message (message.schema.json) without the two above
+======  ==========================================================
+
+All else is text, a JSON object with a ``type``: to the page ``setup``, ``state``, ``notice``,
+``page`` and ``answer``; from it ``hello``, ``drawn`` and ``do``. docs/guide/live-view.md.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+
+from eitskin import __version__
+from eitskin.device.wire.link_table import Stream
+from eitskin.live.frame import Frame
+from eitskin.live.message import encoded
+from eitskin.live.session import KINDS, Session
+
+MAGIC = b"EVF1"
+HEAD = struct.Struct("<4sIII")
+
+
+def text_of(kind: str, **facts: Any) -> str:
+    """A message that is no frame."""
+    return json.dumps({"type": kind} | facts, separators=(",", ":"), allow_nan=False)
+
+
+def frame_bytes(number: int, frame: Frame) -> bytes:
+    """A frame for the page."""
+    image, volts, message = frame.image, frame.voltage_v, frame.message(arrays=False)
+    pixels = b"" if image is None else np.ascontiguousarray(image, "<f4").tobytes()
+    rows = b"" if volts is None else np.ascontiguousarray(volts, "<f4").tobytes()
+    head = HEAD.pack(MAGIC, number, len(pixels) // 4, len(rows) // 4)
+    return b"".join((head, pixels, rows, encoded(message).encode()))
+
+
+def setup_text(session: Session, reference_v: list[float] | None, may_command: bool) -> str:
+    """What does not change from frame to frame."""
+    board, how, solver = session.device.board, session.settings, session.solver
+    facts: dict[str, Any] = {
+        "eitskin": __version__,
+        "url": session.url,
+        "board": board.board,
+        "serial": board.serial,
+        "replays": session.replays,
+        "timed": session.timed,
+        "electrodes": board.n_electrodes,
+        "frame_us": board.frame_us,
+        "may_command": may_command,
+        "mode": [kind for kind in KINDS if how.mode & Stream[kind.upper()]],
+        "speed": session.pacer.speed,
+        "paused": session.pacer.paused,
+        "has_truth": session.truth is not None,
+        "reference_v": reference_v,
+        "sign": None if solver is None else solver.sign,
+        "iterations": None if solver is None else solver.iterations,
+        "recording": None if session.recorder is None else session.recorder.path.name,
+        "model_crc": f"{board.model_crc:08x}",
+        "skin": _skin(session),
+    }
+    return text_of("setup", **facts)
+
+
+def _skin(session: Session) -> dict[str, Any] | None:
+    """Outline, electrodes and pixels; None where the board's model is not known here."""
+    if session.known is None:
+        return None
+    model = session.known.model
+    skin, grid = model.skin, model.grid
+    spans = [
+        skin.outline.points_at(np.linspace(start, end, 5))
+        for start, end in skin.electrode_spans_mm()
+    ]
+    cells = grid.index[:, 1] * grid.nx + grid.index[:, 0]
+    return {
+        "name": skin.name,
+        "outline_mm": _rounded(skin.outline.vertices_mm),
+        "electrode_spans_mm": [_rounded(span) for span in spans],
+        "electrode_centres_mm": _rounded(skin.electrode_centres_mm()),
+        "nx": grid.nx,
+        "ny": grid.ny,
+        "pixel_mm": grid.pixel_mm,
+        "origin_mm": list(grid.origin_mm),
+        "cells": cells.tolist(),
+        "conductivity_s_per_m": skin.conductivity_s_per_m,
+    }
+
+
+def _rounded(points: Any) -> list[Any]:
+    rounded: list[Any] = np.round(np.asarray(points, dtype=np.float64), 3).tolist()
+    return rounded

@@ -1,0 +1,287 @@
+"""The thread that follows a board for the page: one session after another, each from its opening
+to its end."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from eitskin.device.client import Device
+from eitskin.device.link import Reconnect
+from eitskin.device.live import set_up, take_reference
+from eitskin.device.recordings.recording import Recorder
+from eitskin.device.settings import ScanSettings
+from eitskin.device.wire.codec import Packet
+from eitskin.device.wire.link_table import PacketType, Stream
+from eitskin.device.wire.packets import RawFrame
+from eitskin.device.wire.payloads import MalformedPacket, parse
+from eitskin.errors import DeviceError, EitskinError, UsageError
+from eitskin.live.frame import Frame, Notice
+from eitskin.live.session import KINDS, TARE_FRAMES, Session, SessionSettings
+
+FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
+T = TypeVar("T")
+
+
+class PageSession(Session):
+    """A session whose quiet frames are looked at: ``reference_v`` (m,) is their mean, None where
+    none were seen."""
+
+    reference_v: list[float] | None = None
+
+    def _open(self) -> Device:
+        device = super()._open()
+        self._quiet: list[Any] = []
+        device.link.begin_tap(lambda last: None, self._look)
+        return device
+
+    def _look(self, packet: Packet) -> None:
+        if packet.type != PacketType.RAW:
+            return
+        try:
+            raw = parse(packet.type, packet.payload)
+        except MalformedPacket:
+            return
+        assert isinstance(raw, RawFrame)
+        if raw.quiet:
+            self._quiet.append(raw.voltage_v)
+            del self._quiet[:-1024]
+        elif self._quiet:
+            mean = np.mean(np.array(self._quiet, dtype=np.float64), axis=0)
+            self.reference_v = np.where(np.isfinite(mean), mean, 0.0).tolist()
+            self._quiet = []
+
+
+class Follower:
+    """Opens ``url`` and gives what comes to ``on_frame`` and ``on_news``, in its own thread, until
+    ``stop``. ``folder`` is where recordings go. ``state``: "starting", "live", "ended" (the scene
+    or the recording is over), "failed" (``text`` says why), "unplugged".
+    """
+
+    def __init__(
+        self,
+        url: str,
+        settings: SessionSettings,
+        *,
+        speed: float,
+        folder: Path,
+        on_frame: Callable[[Frame], None],
+        on_news: Callable[[str, dict[str, Any]], None],
+    ) -> None:
+        self._url, self.settings, self._speed, self._folder = url, settings, speed, folder
+        self._on_frame, self._on_news = on_frame, on_news
+        self.session: PageSession | None = None
+        self.state, self.text, self.error = "starting", "", None
+        self.frames = 0
+        self._stopping, self._again = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, name="eitskin view", daemon=True)
+
+    error: EitskinError | None
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End, and let go of the board."""
+        self._stopping.set()
+        self._again.set()
+        if self.session is not None:
+            self.session.stop()
+        self._thread.join(10.0)
+
+    def again(self) -> None:
+        """Open the device again, where a session is over."""
+        self._again.set()
+
+    # ---- the thread ----
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            self._again.clear()
+            self._set("starting", self._url)
+            try:
+                self._follow()
+                self._set("ended", "the scene or the recording is over")
+            except EitskinError as error:
+                self.error = error
+                self._set("failed", str(error))
+            finally:
+                self.session = None
+            self._again.wait()
+
+    def _follow(self) -> None:
+        session = PageSession(
+            self._url, self.settings, say=self._say, reconnect=FOR_EVER, speed=self._speed
+        )
+        with session:
+            self.session = session
+            self._set("live", "")
+            frames = session.frames()
+            try:
+                for item in frames:
+                    if self._stopping.is_set():
+                        return
+                    if isinstance(item, Notice):
+                        self._notice(item)
+                    else:
+                        self.frames += 1
+                        self._on_frame(item)
+            finally:
+                frames.close()
+                self.settings = replace(session.settings, record=None)
+                self._speed = session.pacer.speed
+
+    def _notice(self, notice: Notice) -> None:
+        self._on_news("notice", notice.message())
+        if notice.kind == "link" and "unplugged" in notice.text:
+            self._set("unplugged", "the board is gone; waiting until it is plugged in again")
+        elif notice.kind == "link" and "reconnected" in notice.text:
+            self._set("live", "")
+
+    def _say(self, text: str) -> None:
+        self._on_news("notice", {"kind": "session", "text": text, "time_s": None})
+
+    def _set(self, state: str, text: str) -> None:
+        self.state, self.text = state, text
+        self._on_news("state", {"state": state, "text": text})
+
+    # ---- commands, from any thread ----
+
+    def live(self) -> PageSession:
+        """The session under way.
+
+        Raises:
+            DeviceError: there is none.
+        """
+        session = self.session
+        if session is None:
+            raise DeviceError("nothing is being followed; press  Start again")
+        return session
+
+    def _changed(self, session: PageSession, action: Callable[[Device], T]) -> Future[T]:
+        def run(device: Device) -> T:
+            try:
+                return action(device)
+            finally:
+                self._on_news("setup", {})
+
+        return session.ask(run)
+
+    def tare(self) -> Future[str]:
+        """The reference again."""
+        session = self._board("tare")
+
+        def action(device: Device) -> str:
+            take_reference(device, TARE_FRAMES, streamed=True)
+            return f"reference taken from {TARE_FRAMES} frames"
+
+        return self._changed(session, action)
+
+    def mode(self, kinds: list[str]) -> Future[str]:
+        """What is streamed.
+
+        Raises:
+            UsageError: nothing, or something unknown.
+        """
+        session = self.live()
+        if not kinds or not set(kinds) <= set(KINDS):
+            raise UsageError(f"mode: choose from {', '.join(KINDS)}")
+        mode = Stream(0)
+        for kind in kinds:
+            mode |= Stream[kind.upper()]
+
+        def action(device: Device) -> str:
+            session.change_mode(mode)
+            return f"streaming {', '.join(kinds)}"
+
+        return self._changed(session, action)
+
+    def solver(self, **changes: Any) -> Future[str]:
+        """Sign or iterations."""
+        session = self._board("the solver")
+        named = replace(session.settings.solver, **changes)
+
+        def action(device: Device) -> str:
+            session.solver = set_up(device, ScanSettings(), named, session.known)
+            session.settings = replace(session.settings, solver=named)
+            if session.truth is not None and named.sign is not None:
+                session.truth.look_for(named.sign)
+            return "solver: " + ", ".join(f"{k} {v}" for k, v in changes.items())
+
+        return self._changed(session, action)
+
+    def upload(self, blob: bytes) -> Future[str]:
+        """Another model, and the reference for it.
+
+        Raises:
+            ModelError: it is none.
+        """
+        from eitskin.device.known_model import KnownModel
+        from eitskin.model.eitm import decode_model
+
+        session = self._board("a model")
+        model = decode_model(blob, "the uploaded file")
+
+        def action(device: Device) -> str:
+            device.upload_model(blob)
+            session.known = KnownModel(model, blob)
+            session.solver = set_up(device, ScanSettings(), session.settings.solver, session.known)
+            take_reference(device, TARE_FRAMES, streamed=True)
+            return f"model {device.board.model_crc:08x} is in use, and the reference is taken"
+
+        return self._changed(session, action)
+
+    def record(self, on: bool) -> Future[str]:
+        """Begin or end a recording in the folder."""
+        session = self._board("a recording")
+
+        def action(device: Device) -> str:
+            if session.recorder is not None:
+                name, count = session.recorder.path.name, session.recorder.packets
+                session.recorder.close()
+                session.recorder = None
+                if not on:
+                    return f"recorded {count} packets in {name}"
+            if on:
+                name = f"eitskin-{datetime.now():%Y%m%d-%H%M%S}.eits"
+                session.recorder = Recorder(self._folder / name, device, session.solver)
+                return f"recording to {name}"
+            return "nothing is being recorded"
+
+        return self._changed(session, action)
+
+    def pace(self, what: str, speed: float | None = None) -> str:
+        """ "play", "pause", "step" or "speed".
+
+        Raises:
+            UsageError: it is a real board, whose time cannot be held.
+        """
+        if what == "play" and self.session is None:
+            self.again()
+            return "starting again"
+        session = self.live()
+        if not session.timed:
+            raise UsageError(f"{session.name} is a real board; its time cannot be held")
+        pacer = session.pacer
+        if what == "speed":
+            pacer.set_speed(speed or 0.0)
+        else:
+            {"play": pacer.play, "pause": pacer.pause, "step": pacer.step}[what]()
+        self._on_news("setup", {})
+        return {"speed": f"speed {speed or 'max'}", "play": "playing", "step": "one frame"}.get(
+            what, "paused"
+        )
+
+    def _board(self, what: str) -> PageSession:
+        session = self.live()
+        if session.replays:
+            raise UsageError(f"{session.name} is a recording: {what} needs a board")
+        return session

@@ -1,0 +1,365 @@
+"""The page's server: its three files, one WebSocket, and a model's upload. Nothing of it waits for
+a page, and nothing of the board waits for it."""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import ipaddress
+import json
+import socket
+from collections.abc import Awaitable, Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from eitskin.device.timing import read_speed
+from eitskin.errors import EitskinError, UsageError, missing_extra
+from eitskin.live.frame import Frame
+from eitskin.live.session import SessionSettings
+from eitskin.page.facts import frame_bytes, setup_text, text_of
+from eitskin.page.follower import Follower
+from eitskin.page.hub import Hub, Outgoing, PageClient
+
+if TYPE_CHECKING:
+    from starlette.applications import Starlette
+    from starlette.requests import Request
+    from starlette.responses import Response
+    from starlette.websockets import WebSocket
+
+FILES = {
+    "/": ("index.html", "text/html; charset=utf-8"),
+    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "/drawing.js": ("drawing.js", "text/javascript; charset=utf-8"),
+    "/page.css": ("page.css", "text/css; charset=utf-8"),
+    "/icon.svg": ("icon.svg", "image/svg+xml"),
+}
+MIN_TOKEN = 12
+MAX_MODEL_BYTES = 8 << 20
+HELLO_S = 10.0
+ABOUT_S = 1.0  # between two messages of how a page keeps up
+NO_TOKEN, NO_ORIGIN = 4401, 4403  # codes that close a WebSocket
+
+
+def load_server() -> tuple[Any, Any]:
+    """starlette and uvicorn.
+
+    Raises:
+        MissingExtraError: they are not installed.
+    """
+    try:
+        import starlette
+        import uvicorn
+        import websockets  # noqa: F401 -- what uvicorn speaks WebSocket with
+    except ImportError:
+        raise missing_extra("view", "starlette, uvicorn and websockets") from None
+    return starlette, uvicorn
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket on ``host`` and ``port``, 0 for any that is free.
+
+    Raises:
+        UsageError: it is taken, or cannot be.
+    """
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        raise UsageError(
+            f"cannot listen on {host} port {port} ({error.strerror}); name another with  --port,"
+            " --port 0  for any that is free"
+        ) from None
+
+
+class PageServer:
+    """Serves one device's page on ``listening`` until ``stop``. ``token`` is asked for by commands,
+    and where ``remote`` by everything. ``say`` gets lines for whoever started it.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        settings: SessionSettings,
+        listening: socket.socket,
+        *,
+        token: str,
+        host: str,
+        remote: bool = False,
+        speed: float = 1.0,
+        folder: Path = Path(),
+        say: Callable[[str], None] = lambda text: None,
+        also: Callable[[Frame], None] | None = None,
+    ) -> None:
+        _, self._uvicorn = load_server()
+        self._listening, self._token, self._remote = listening, token, remote
+        self.host, self.port = host, int(listening.getsockname()[1])
+        self._say, self._also = say, also
+        self.hub, self._loop = Hub(), asyncio.new_event_loop()
+        self._waiting: Frame | None = None
+        self._frames = 0
+        self.skipped = 0  # frames that came while the one before was not taken up yet
+        self.follower = Follower(
+            url, settings, speed=speed, folder=folder, on_frame=self._frame, on_news=self._news
+        )
+
+    @property
+    def address(self) -> str:
+        """What to open, without the token."""
+        name = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{name}:{self.port}/"
+
+    def serve(self) -> None:
+        """Until Ctrl-C or ``stop``.
+
+        Raises:
+            EitskinError: the device could not be opened at all.
+        """
+        config = self._uvicorn.Config(
+            self._app(),
+            log_level="warning",
+            lifespan="off",
+            ws="websockets-sansio",
+            ws_per_message_deflate=False,
+            ws_max_size=1 << 16,
+            server_header=False,
+            date_header=False,
+            access_log=False,
+            timeout_graceful_shutdown=1,
+        )
+        self._server = self._uvicorn.Server(config)
+        self.follower.start()
+        try:
+            self._loop.run_until_complete(self._server.serve(sockets=[self._listening]))
+        finally:
+            self.follower.stop()
+            self._loop.run_until_complete(self._loop.shutdown_asyncgens())
+            self._loop.close()
+        if self.follower.frames == 0 and self.follower.error is not None:
+            raise self.follower.error
+
+    def stop(self) -> None:
+        """End ``serve``; from any thread."""
+        self._call(lambda: setattr(self._server, "should_exit", True))
+
+    # ---- from the board's thread ----
+
+    def _call(self, action: Callable[[], None]) -> None:
+        with suppress(RuntimeError):  # the loop is closed: nobody looks on any more
+            self._loop.call_soon_threadsafe(action)
+
+    def _frame(self, frame: Frame) -> None:
+        if self._also is not None:
+            self._also(frame)
+        if self._waiting is None:
+            self._waiting = frame
+            self._call(self._send_frame)
+        else:
+            self._waiting = frame
+            self.skipped += 1
+
+    def _news(self, kind: str, facts: dict[str, Any]) -> None:
+        failed = kind == "state" and facts["state"] == "failed"
+        if failed and self.follower.frames == 0:
+            self.stop()
+        if kind == "state" and facts["state"] == "live":
+            self._call(self._send_setup)
+        text = text_of(kind, **facts)
+        self._call(self._send_setup if kind == "setup" else lambda: self.hub.tell(text))
+        if kind == "notice":
+            self._say(str(facts["text"]))
+        elif failed or (kind == "state" and facts["text"]):
+            self._say(f"{facts['state']}: {facts['text']}")
+
+    # ---- in the loop ----
+
+    def _send_frame(self) -> None:
+        frame, self._waiting = self._waiting, None
+        if frame is None or not self.hub.size:
+            return
+        self._frames += 1
+        self.hub.offer(Outgoing(self._frames, frame_bytes(self._frames, frame), frame.arrived_ns))
+        if self._frames == 1:
+            self._send_setup()  # the reference is known now
+
+    def _send_setup(self) -> None:
+        for page in self.hub.pages:
+            self._tell_setup(page)
+
+    def _tell_setup(self, page: PageClient) -> None:
+        session = self.follower.session
+        if session is not None:
+            page.tell(setup_text(session, session.reference_v, page.may_command))
+
+    def _app(self) -> Starlette:
+        from starlette.applications import Starlette
+        from starlette.routing import Route, WebSocketRoute
+
+        routes: list[Any] = [Route(path, self._file, methods=["GET"]) for path in FILES]
+        routes.append(Route("/model", self._model, methods=["POST"]))
+        routes.append(WebSocketRoute("/live", self._live))
+        return Starlette(routes=routes)
+
+    def _host_is_ours(self, host: str) -> bool:
+        """Whether a Host header names this server: by its name as given, this machine's, or an
+        address; any other name may be a trick of another site (DNS rebinding)."""
+        name = (urlsplit(f"//{host}").hostname or "").lower()
+        if name in ("localhost", self.host.lower(), socket.gethostname().lower()):
+            return True
+        try:
+            address = ipaddress.ip_address(name)
+        except ValueError:
+            return False
+        return self._remote or address.is_loopback
+
+    def _from_here(self, headers: Any) -> bool:
+        """Whether Host is ours, and Origin, where a browser says one, the same."""
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if not self._host_is_ours(host):
+            return False
+        return origin is None or urlsplit(origin).netloc == host
+
+    def _knows(self, token: object) -> bool:
+        return isinstance(token, str) and hmac.compare_digest(token.encode(), self._token.encode())
+
+    async def _file(self, request: Request) -> Response:
+        from starlette.responses import PlainTextResponse, Response
+
+        if not self._host_is_ours(request.headers.get("host", "")):
+            return PlainTextResponse("another host's name\n", 403)
+        name, kind = FILES[request.url.path]
+        content = files("eitskin.page").joinpath("static", name).read_bytes()
+        host = request.headers["host"]
+        headers = {
+            "Content-Security-Policy": (
+                "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self';"
+                f" connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none';"
+                " frame-ancestors 'none'"
+            ),
+            "X-Content-Type-Options": "nosniff",
+            "Referrer-Policy": "no-referrer",
+            "Cache-Control": "no-store",
+        }
+        return Response(content, media_type=kind, headers=headers)
+
+    async def _model(self, request: Request) -> Response:
+        from starlette.responses import JSONResponse
+
+        if not self._from_here(request.headers):
+            return JSONResponse({"error": "another site asks"}, 403)
+        if not self._knows(request.headers.get("x-eitskin-token")):
+            return JSONResponse({"error": "this needs the token"}, 401)
+        body = bytearray()
+        async for piece in request.stream():
+            body += piece
+            if len(body) > MAX_MODEL_BYTES:
+                return JSONResponse({"error": "this is too long for a model"}, 413)
+        try:
+            text = await asyncio.wrap_future(self.follower.upload(bytes(body)))
+        except EitskinError as error:
+            return JSONResponse({"error": str(error)}, 400)
+        return JSONResponse({"text": text})
+
+    async def _live(self, socket: WebSocket) -> None:
+        if not self._from_here(socket.headers) or socket.headers.get("origin") is None:
+            await socket.close(NO_ORIGIN)  # before it is accepted: HTTP 403
+            return
+        await socket.accept()
+        page = PageClient()
+        try:
+            hello = json.loads(await asyncio.wait_for(socket.receive_text(), HELLO_S))
+            page.may_command = self._knows(hello.get("token"))
+        except Exception:
+            await _closed(socket.close(1002))
+            return
+        if self._remote and not page.may_command:
+            await _closed(socket.close(NO_TOKEN, "this needs the token"))
+            return
+        self.hub.pages.add(page)
+        page.tell(text_of("state", state=self.follower.state, text=self.follower.text))
+        self._tell_setup(page)
+        tasks = [
+            asyncio.create_task(one)
+            for one in (self._send(socket, page), self._receive(socket, page), self._about(page))
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self.hub.pages.discard(page)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _send(self, socket: WebSocket, page: PageClient) -> None:
+        while True:
+            content = await page.next()
+            if isinstance(content, str):
+                await socket.send_text(content)
+            else:
+                await socket.send_bytes(content)
+
+    async def _about(self, page: PageClient) -> None:
+        while True:
+            await asyncio.sleep(ABOUT_S)
+            latencies = sorted(page.latencies_ms)
+            median = latencies[len(latencies) // 2] if latencies else None
+            page.tell(
+                text_of("page", dropped=page.dropped, skipped=self.skipped, latency_ms=median)
+            )
+
+    async def _receive(self, socket: WebSocket, page: PageClient) -> None:
+        while True:
+            try:
+                said = json.loads(await socket.receive_text())
+                if not isinstance(said, dict):
+                    raise ValueError
+                if said.get("type") == "drawn":
+                    page.drawn(int(said["number"]))
+                    continue
+            except (ValueError, KeyError, TypeError):
+                await socket.close(1003)
+                return
+            page.tell(await self._answer(said, page))
+
+    async def _answer(self, said: dict[str, Any], page: PageClient) -> str:
+        if not page.may_command:
+            reason = "this needs the token: open the address that  eitskin view  printed"
+            return text_of("answer", ok=False, text=reason)
+        try:
+            done = self._do(said)
+            if isinstance(done, Future):
+                done = await asyncio.wrap_future(done)
+        except EitskinError as error:
+            return text_of("answer", ok=False, text=str(error))
+        return text_of("answer", ok=True, text=done)
+
+    def _do(self, said: dict[str, Any]) -> Future[str] | str:
+        """What a page asks for.
+
+        Raises:
+            EitskinError: it cannot be.
+        """
+        what, value, follower = said.get("do"), said.get("value"), self.follower
+        if what in ("play", "pause", "step"):
+            return follower.pace(what)
+        if what == "speed":
+            return follower.pace("speed", read_speed(str(value), "speed"))
+        if what == "tare":
+            return follower.tare()
+        if what == "record":
+            return follower.record(value is True)
+        if what == "mode" and isinstance(value, list):
+            return follower.mode([str(kind) for kind in value])
+        if what == "sign" and value in ("increase", "decrease", "both"):
+            return follower.solver(sign=value)
+        if what == "iterations" and isinstance(value, int) and 1 <= value <= 1_000_000:
+            return follower.solver(iterations=value)
+        raise UsageError(f"{what}: {value!r} cannot be")
+
+
+async def _closed(closing: Awaitable[None]) -> None:
+    with suppress(Exception):  # it is gone already
+        await closing

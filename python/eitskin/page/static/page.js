@@ -1,0 +1,275 @@
+// The live page: takes what the server sends, draws the newest frame, and says what the user wants.
+import { SkinDrawing, VoltsDrawing } from "./drawing.js";
+
+const $ = (id) => document.getElementById(id);
+const MAGIC = 0x31465645; // "EVF1"
+const WORDS_MS = 2500; // between two texts for screen readers
+const SHOWN_LOG = 60;
+
+const skin = new SkinDrawing($("skin"));
+const volts = new VoltsDrawing($("volts"));
+const page = {
+  socket: null, setup: null, frame: null, asked: false, times: [], health: {}, dropped: 0, skipped: 0,
+  wordsAt: 0, words: "", gestures: [], state: "",
+};
+const token = new URLSearchParams(location.hash.slice(1)).get("token");
+
+// ---- the line ----
+
+function connect() {
+  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => socket.send(JSON.stringify({ type: "hello", token }));
+  socket.onmessage = ({ data }) => (typeof data === "string" ? take(JSON.parse(data)) : takeFrame(data));
+  socket.onclose = ({ code, reason }) => {
+    if (code === 4401) return setState("failed", `${reason}: open the address that eitskin view printed`);
+    setState("away", "the server is gone; trying again");
+    setTimeout(connect, 1000);
+  };
+  page.socket = socket;
+}
+
+function send(facts) {
+  if (page.socket && page.socket.readyState === WebSocket.OPEN) page.socket.send(JSON.stringify(facts));
+}
+
+function ask(what, value) {
+  answer({ ok: true, text: "…" });
+  send({ type: "do", do: what, value });
+}
+
+function takeFrame(buffer) {
+  const head = new DataView(buffer);
+  if (head.getUint32(0, true) !== MAGIC) return;
+  const [number, pixels, rows] = [4, 8, 12].map((at) => head.getUint32(at, true));
+  const text = new TextDecoder().decode(new Uint8Array(buffer, 16 + 4 * (pixels + rows)));
+  page.frame = {
+    number,
+    image: pixels ? new Float32Array(buffer, 16, pixels) : null,
+    volts: rows ? new Float32Array(buffer, 16 + 4 * pixels, rows) : null,
+    message: JSON.parse(text),
+  };
+  const { message } = page.frame;
+  page.times.push(performance.now());
+  while (page.times.length > 2 && page.times[0] < performance.now() - 2000) page.times.shift();
+  skin.follow(message.touches || [], message.time_s);
+  for (const event of message.events || []) page.gestures.unshift(event);
+  page.gestures.length = Math.min(page.gestures.length, 4);
+  soon();
+}
+
+function soon() {
+  if (page.asked) return;
+  page.asked = true;
+  requestAnimationFrame(() => {
+    page.asked = false;
+    draw();
+    if (page.frame) send({ type: "drawn", number: page.frame.number });
+  });
+}
+
+function take(message) {
+  if (message.type === "setup") return takeSetup(message);
+  if (message.type === "state") return setState(message.state, message.text);
+  if (message.type === "answer") return answer(message);
+  if (message.type === "notice") return note(message);
+  if (message.type === "page") {
+    page.dropped = message.dropped + message.skipped;
+    $("n-latency").textContent = message.latency_ms === null ? "–" : `${message.latency_ms.toFixed(0)} ms`;
+    $("n-dropped").textContent = String(page.dropped);
+  }
+}
+
+// ---- what is shown ----
+
+function setState(state, text) {
+  page.state = state;
+  $("state").dataset.state = state;
+  $("state").textContent = { live: "live", ended: "over", starting: "starting" }[state] || text || state;
+  $("state").title = text || "";
+  if (text && state !== "live" && state !== "starting") note({ kind: "session", text });
+  showPlay();
+}
+
+function takeSetup(setup) {
+  const before = page.setup;
+  page.setup = setup;
+  $("device").textContent = `${setup.url} · ${setup.board}, ${setup.electrodes} electrodes`;
+  document.title = `${setup.url} · eitskin`;
+  const same = before && before.model_crc === setup.model_crc && before.url === setup.url && Boolean(before.skin) === Boolean(setup.skin);
+  if (!same) skin.setSkin(setup.skin);
+  const may = setup.may_command, board = may && !setup.replays;
+  for (const id of ["tare", "record", "sign", "iterations", "model"]) $(id).disabled = !board;
+  for (const box of $("mode").querySelectorAll("input")) {
+    box.disabled = !board;
+    box.checked = setup.mode.includes(box.value);
+  }
+  for (const id of ["play", "step", "speed"]) $(id).disabled = !may;
+  $("step").hidden = $("speed").parentElement.hidden = !setup.timed;
+  const speed = setup.speed === 0 ? "max" : String(setup.speed);
+  if (![...$("speed").options].some((one) => one.value === speed)) $("speed").add(new Option(`${speed} ×`, speed));
+  $("speed").value = speed;
+  if (setup.sign) $("sign").value = setup.sign;
+  if (setup.iterations && document.activeElement !== $("iterations")) $("iterations").value = setup.iterations;
+  $("record").setAttribute("aria-pressed", String(Boolean(setup.recording)));
+  $("record-text").textContent = setup.recording ? "Stop recording" : "Record";
+  $("truth-label").hidden = !setup.has_truth;
+  if (!may) answer({ ok: true, text: "Looking on: buttons need the address that eitskin view printed." });
+  showElectrodes({}, setup.electrodes);
+  showPlay();
+  soon();
+}
+
+function showPlay() {
+  const over = page.state === "ended" || page.state === "failed", setup = page.setup;
+  $("play").textContent = over ? "Start again" : setup && setup.paused ? "Play" : "Pause";
+  $("play").hidden = !over && Boolean(setup) && !setup.timed;
+  if (over) $("play").disabled = Boolean(setup) && !setup.may_command;
+}
+
+function answer({ ok, text }) {
+  $("answer").textContent = text;
+  $("answer").dataset.ok = String(ok);
+}
+
+function note({ kind, text, time_s }) {
+  const item = document.createElement("li"), what = document.createElement("b");
+  what.textContent = time_s === null || time_s === undefined ? `${kind}: ` : `${time_s.toFixed(1)} s ${kind}: `;
+  item.append(what, text);
+  $("log").prepend(item);
+  while ($("log").children.length > SHOWN_LOG) $("log").lastChild.remove();
+}
+
+function cell(text) {
+  const one = document.createElement("td");
+  one.textContent = text;
+  return one;
+}
+
+function showTouches(touches) {
+  const rows = touches.map((touch) => {
+    const row = document.createElement("tr");
+    row.dataset.id = touch.id;
+    const sure = touch.confidence === null ? "–" : `${Math.round(100 * touch.confidence)} %`;
+    row.append(cell(touch.id), cell(touch.x_mm.toFixed(1)), cell(touch.y_mm.toFixed(1)), cell(touch.radius_mm.toFixed(1)),
+      cell(touch.force_n ? touch.force_n.toFixed(2) : "–"), cell(sure));
+    return row;
+  });
+  $("touches").replaceChildren(...rows);
+  $("none").hidden = touches.length > 0;
+}
+
+function chips(holder, texts, fine) {
+  const shown = texts.length ? texts : fine ? [fine] : [];
+  holder.replaceChildren(...shown.map((text) => {
+    const chip = document.createElement("span");
+    chip.textContent = text;
+    if (!texts.length) chip.className = "fine";
+    return chip;
+  }));
+}
+
+function showElectrodes(health, count) {
+  const same = $("electrodes").children.length === count && JSON.stringify(health) === JSON.stringify(page.health);
+  if (same) return;
+  page.health = health;
+  const items = Array.from({ length: count }, (_, k) => {
+    const item = document.createElement("li");
+    item.dataset.health = health[k] || "good";
+    item.textContent = String(k);
+    item.title = item.ariaLabel = `electrode ${k}: ${health[k] || "good"}`;
+    return item;
+  });
+  $("electrodes").replaceChildren(...items);
+  const bad = Object.entries(health).map(([k, state]) => `${k} is ${state}`);
+  $("health").textContent = bad.length ? bad.join(", ") : "None is found open, bridged or noisy.";
+}
+
+function healthOf(info) {
+  const health = {};
+  if (!info) return health;
+  for (const state of ["noisy", "bridged", "open"]) for (const k of info[`${state}_electrodes`] || []) health[k] = state;
+  return health;
+}
+
+function rate() {
+  const { times } = page;
+  return times.length > 1 ? ((times.length - 1) * 1000) / (times[times.length - 1] - times[0]) : null;
+}
+
+function draw() {
+  const { frame, setup } = page;
+  skin.draw(frame, { health: page.health, trails: $("trails").checked, truth: $("truth").checked });
+  if (!frame || !setup) return;
+  const { message } = frame, { info } = message, touches = message.touches || [];
+  $("volts").ariaLabel = volts.draw(frame.volts, setup.reference_v);
+  showElectrodes(healthOf(info), setup.electrodes);
+  showTouches(touches);
+  chips($("found"), message.refused ? [`refused: ${message.refused}`, ...message.found] : message.found, "nothing found wrong");
+  chips($("gestures"), page.gestures.map((event) => event.kind));
+  $("gestures").hidden = !page.gestures.length;
+  $("n-frame").textContent = String(message.frame);
+  $("n-time").textContent = `${message.time_s.toFixed(2)} s`;
+  const hz = rate();
+  $("n-rate").textContent = hz === null ? "–" : `${hz.toFixed(1)} Hz`;
+  const solve_us = info ? info.solve_us + info.touch_us : 0;
+  $("n-solve").textContent = solve_us ? `${(solve_us / 1e3).toFixed(1)} ms` : "–";
+  $("scale-low").textContent = `−${skin.peak.toPrecision(2)}`;
+  $("scale-high").textContent = `+${skin.peak.toPrecision(2)}`;
+  sayTouches(touches);
+}
+
+// Touches in words, seldom enough to be listened to.
+function sayTouches(touches) {
+  const words = touches.length
+    ? `${touches.length} ${touches.length === 1 ? "touch" : "touches"}: ` +
+      touches.map((t) => `number ${t.id} at ${t.x_mm.toFixed(0)}, ${t.y_mm.toFixed(0)} millimetres`).join("; ")
+    : "No touch";
+  $("skin").ariaLabel = `The skin from above. ${words}`;
+  const now = performance.now();
+  if (words === page.words || now - page.wordsAt < WORDS_MS) return;
+  page.words = words;
+  page.wordsAt = now;
+  $("words").textContent = words;
+}
+
+// ---- what is wanted ----
+
+function playOrPause() {
+  const over = page.state === "ended" || page.state === "failed";
+  ask(over || (page.setup && page.setup.paused) ? "play" : "pause");
+}
+
+$("tare").addEventListener("click", () => ask("tare"));
+$("record").addEventListener("click", () => ask("record", $("record").getAttribute("aria-pressed") !== "true"));
+$("play").addEventListener("click", playOrPause);
+$("step").addEventListener("click", () => ask("step"));
+$("speed").addEventListener("change", () => ask("speed", $("speed").value));
+$("sign").addEventListener("change", () => ask("sign", $("sign").value));
+$("iterations").addEventListener("change", () => ask("iterations", Number($("iterations").value)));
+$("mode").addEventListener("change", () => ask("mode", [...$("mode").querySelectorAll("input:checked")].map((box) => box.value)));
+$("model").addEventListener("change", async () => {
+  const [file] = $("model").files;
+  if (!file) return;
+  answer({ ok: true, text: `uploading ${file.name}` });
+  try {
+    const reply = await fetch("/model", { method: "POST", headers: { "X-Eitskin-Token": token || "" }, body: file });
+    const said = await reply.json();
+    answer({ ok: reply.ok, text: said.text || said.error });
+  } catch (error) {
+    answer({ ok: false, text: `the upload did not arrive: ${error.message}` });
+  }
+  $("model").value = "";
+});
+for (const id of ["truth", "trails"]) $(id).addEventListener("change", soon);
+addEventListener("resize", soon);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", soon);
+addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|BUTTON)$/.test(event.target.tagName)) return;
+  const button = { t: "tare", r: "record", " ": "play", ".": "step" }[event.key.toLowerCase()];
+  if (!button || $(button).disabled || $(button).hidden) return;
+  event.preventDefault();
+  $(button).click();
+});
+
+connect();
