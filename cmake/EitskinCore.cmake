@@ -3,7 +3,7 @@
 # Contraction and re-association stay off: kernels say fma where they mean it, and the bits must not depend on the target.
 
 set(EITSKIN_CORE_SOURCES
-    base/status.c base/texts.c
+    base/arithmetic.c base/status.c base/texts.c
     kernels/kernels.c kernels/portable.c
     model/model.c model/options.c model/force.c model/row_form.c model/uncertainty.c
     context/column_cache.c context/products.c

@@ -1,6 +1,7 @@
 /* Status texts, version, checksums: against values known elsewhere. */
 #include "check.h"
 
+#include "base/arithmetic.h"
 #include "eitskin/eitskin.h"
 
 #include <string.h>
@@ -27,6 +28,7 @@ static void status_texts(void)
         {EITS_E_NO_REFERENCE, "no reference"},
         {EITS_E_REFERENCE_SHORT, "too few frames"},
         {EITS_E_NOT_FINITE, "finite"},
+        {EITS_E_ARITHMETIC, "-ffp-contract=off"},
     };
     const int count = (int)(sizeof known / sizeof known[0]);
     for (int i = 0; i < count; ++i) {
@@ -40,6 +42,16 @@ static void status_texts(void)
     }
     CHECK(strcmp(eits_status_text((eits_status)-99), "unknown status") == 0);
     CHECK(strcmp(eits_status_text((eits_status)1), "unknown status") == 0);
+}
+
+static void arithmetic_is_as_written(void)
+{
+    eits_real contracted = 1, reordered = 1;
+    eits_try_arithmetic(&contracted, &reordered);
+    CHECK(contracted == 0 && reordered == 0);
+    CHECK_EQUAL(eits_judge_arithmetic(0, 0), EITS_OK);
+    CHECK_EQUAL(eits_judge_arithmetic((eits_real)1e-8, 0), EITS_E_ARITHMETIC);
+    CHECK_EQUAL(eits_judge_arithmetic(0, 1), EITS_E_ARITHMETIC);
 }
 
 static void version_and_width(void)
@@ -84,6 +96,7 @@ static void protocol_hash_of_known_tables(void)
 int main(void)
 {
     status_texts();
+    arithmetic_is_as_written();
     version_and_width();
     crc32_of_known_texts();
     protocol_hash_of_known_tables();

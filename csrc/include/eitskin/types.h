@@ -58,7 +58,10 @@ typedef enum eits_status {
     /* a reference was finished with fewer frames than it needs */
     EITS_E_REFERENCE_SHORT = -14,
     /* a result would not be finite; the outputs were cleared instead */
-    EITS_E_NOT_FINITE = -15
+    EITS_E_NOT_FINITE = -15,
+    /* the core was compiled so that its results would have other bits than a model's golden frame:
+     * with contraction (compile with -ffp-contract=off) or with sums in another order */
+    EITS_E_ARITHMETIC = -16
 } eits_status;
 
 /* One line of English for a status; never NULL. */

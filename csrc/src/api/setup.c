@@ -175,8 +175,11 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     eits_learn_range(made);
     eits_whitening_init(made, &made->scratch);
     /* Learned from the model above, once: it does not change. */
+    (void)eits_options_default(model, &made->options);
     *ctx = made;
-    return eits_options_default(model, &made->options);
+    eits_real contracted, reordered;
+    eits_try_arithmetic(&contracted, &reordered);
+    return eits_judge_arithmetic(contracted, reordered);
 }
 
 /* What was found with other options may not hold any more: coefficients of another sign are no

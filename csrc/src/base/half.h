@@ -3,6 +3,8 @@
 #ifndef EITSKIN_HALF_H
 #define EITSKIN_HALF_H
 
+#include "base/arithmetic.h"
+
 #include <stdint.h>
 #include <string.h>
 

@@ -36,6 +36,8 @@ const char *eits_status_text(eits_status status)
         return "the reference has too few frames";
     case EITS_E_NOT_FINITE:
         return "the result would not be finite";
+    case EITS_E_ARITHMETIC:
+        return "the core was compiled with contraction or reordered sums; use -ffp-contract=off";
     }
     return "unknown status";
 }

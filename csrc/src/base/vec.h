@@ -3,7 +3,7 @@
 #ifndef EITSKIN_VEC_H
 #define EITSKIN_VEC_H
 
-#include "eitskin/types.h"
+#include "base/arithmetic.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,0 +1,26 @@
+#include "base/arithmetic.h"
+
+#include "base/vec.h"
+
+#ifdef EITS_DOUBLE
+#define TINY 0x1p-27
+#else
+#define TINY 0x1p-12
+#endif
+
+/* Volatile, so that the operations are done by the program and not by the compiler. */
+void eits_try_arithmetic(eits_real *contracted, eits_real *reordered)
+{
+    volatile eits_real tiny = R(TINY), one = 1;
+    const eits_real e = tiny, unit = one, factor = unit + e, known = -(unit + 2 * e);
+    *contracted = factor * factor + known;
+    const eits_real large = unit / (e * e);
+    *reordered = (large + unit) - large;
+}
+
+eits_status eits_judge_arithmetic(eits_real contracted, eits_real reordered)
+{
+    if (contracted != 0 || reordered != 0)
+        return EITS_E_ARITHMETIC;
+    return EITS_OK;
+}
