@@ -18,6 +18,7 @@ COMMANDS = (
     "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate", "recommend",
     "devices", "info", "tare", "view", "stream", "record", "replay", "flash",
 )  # fmt: skip
+FIRST = "eitskin stream --device sim:swipe"
 ENTRY_POINT_GROUP = "eitskin.commands"  # of other packages; eitskin-studies names its own there
 
 
@@ -37,7 +38,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"eitskin {__version__}")
     option(parser, "--traceback", "on an error, show where in the code it arose")
-    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND")
     for name in COMMANDS:
         importlib.import_module(f"eitskin.cli.cmd_{name}").add_parser(subparsers)
     for command in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: one.name):
@@ -50,8 +51,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     one line on stderr."""
     traceback = False
     try:
-        options = build_parser().parse_args(arguments)
+        parser = build_parser()
+        options = parser.parse_args(arguments)
         traceback = options.traceback
+        if options.command is None:
+            print(f"{parser.format_help()}\nTo begin:  {FIRST}")
+            return 0
         return int(options.run(options) or 0)
     except EitskinError as error:
         if traceback:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import numpy.typing as npt
 
 from eitskin.core.diagnostics import names, words
 from eitskin.core.diagnostics_table import InfoFields, Touch
+from eitskin.core.notebook import places_text, touches_html
 from eitskin.core.options_table import CHOICES, RANGES, OptionFields
 from eitskin.errors import FrameError, UsageError
 
@@ -146,9 +149,24 @@ def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: f
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
     """One frame's result: ``image`` (n,) S/m on the model's pixels, ``coefficients`` (n,), touches
-    strongest first, info."""
+    strongest first, info, and where it is known the ``model``."""
 
     image: npt.NDArray[np.floating[Any]]
     coefficients: npt.NDArray[np.floating[Any]]
     touches: tuple[Touch, ...]
     info: Info
+    model: Any = None
+
+    def __repr__(self) -> str:
+        return f"<Reconstruction, touches: {places_text(self.touches)}; {self.info.stop}>"
+
+    def _repr_html_(self) -> str:
+        return touches_html("touches", self.touches)
+
+    def _repr_png_(self) -> bytes | None:
+        """Where the model is known and matplotlib is installed."""
+        if self.model is None or find_spec("matplotlib") is None:
+            return None
+        view = import_module("eitskin.view.touch_axes")  # rooms below do not import view
+        png: bytes = view.touches_png(self.model, self.touches, self.image)
+        return png

@@ -188,6 +188,10 @@ class Frames:
                 )
             self._set("truth_conductivity_s_per_m", conductivity)
 
+    def __repr__(self) -> str:
+        quiet = len(self.reference_voltage_v)
+        return f"<Frames {self.n_frames} of {self.protocol.n_rows} rows, {quiet} quiet>"
+
     @property
     def n_frames(self) -> int:
         """The number of frames, without the quiet ones."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy.typing as npt
 
 from eitskin.core.diagnostics import names, words
 from eitskin.core.diagnostics_table import Touch
+from eitskin.core.notebook import places_text, touches_html
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.packets import Solved
@@ -128,9 +130,29 @@ class Frame:
         return message | _truth(self.compared, message)
 
     def __repr__(self) -> str:
-        places = ", ".join(f"#{t.id} ({t.x_mm:.1f}, {t.y_mm:.1f})" for t in self.touches)
-        shown = f"refused: {self.refused}" if self.refused else f"touches: {places or 'none'}"
+        shown = (
+            f"refused: {self.refused}"
+            if self.refused
+            else f"touches: {places_text(self.touches)}"
+            if self.live.touches is not None
+            else ", ".join(
+                name
+                for name, part in (("image", self.live.image), ("raw", self.live.raw))
+                if part is not None
+            )
+        )
         return f"<Frame {self.number} at {self.time_s:.3f} s, {shown}>"
+
+    def _repr_html_(self) -> str:
+        return touches_html(f"frame {self.number}, {self.time_s:.3f} s", self.touches)
+
+    def _repr_png_(self) -> bytes | None:
+        """Where the model is known and matplotlib is installed."""
+        if self.known is None or find_spec("matplotlib") is None:
+            return None
+        from eitskin.view.touch_axes import touches_png
+
+        return touches_png(self.known.model, self.touches, self.image, self.true or ())
 
 
 def _image(seen: ComparedFrame) -> dict[str, Any]:

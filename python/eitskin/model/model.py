@@ -97,6 +97,11 @@ class Model:
     row_form: RowForm | None = None
     model_errors: ModelErrors | None = None
 
+    def __repr__(self) -> str:
+        name = self.meta.get("skin", {}).get("skin", {}).get("name", "of a skin without a name")
+        scanned = f"{self.protocol.n_electrodes} electrodes, {self.protocol.n_rows} rows"
+        return f"<Model {name}, {scanned}, {self.grid.n_pixels} pixels, rank {self.rank}>"
+
     @cached_property
     def sensitivity(self) -> npt.NDArray[np.float64]:
         """S (r, n) as stored, decoded."""

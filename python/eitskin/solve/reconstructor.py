@@ -146,7 +146,8 @@ class Reconstructor:
         Raises:
             FrameError: the frame cannot be used, or no reference has been taken.
         """
-        return self._engine.reconstruct(_numbers(frame_v, "frame"), touches=touches)
+        result = self._engine.reconstruct(_numbers(frame_v, "frame"), touches=touches)
+        return replace(result, model=self.model)
 
     def stream(self, frames_v: Iterable[npt.ArrayLike]) -> Iterator[Reconstruction]:
         """One after another; ids follow touches from frame to frame."""

@@ -20,6 +20,8 @@ PAGES = (
     "docs/guide/shapes.md",
     "docs/guide/calibration.md",
     "docs/guide/board.md",
+    "docs/guide/touches-out.md",
+    "docs/reference/python-api.md",
     "docs/guide/emulated-board.md",
     "docs/reference/frames-format.md",
     "docs/results/tradeoff.md",

@@ -29,8 +29,10 @@ ORDER = (
     {"live"},
     {"sinks"},
     {"page"},
+    {"public"},
     {"reconstruct"},
     {"cli"},
+    {"__main__"},
 )
 
 
@@ -78,6 +80,7 @@ def circles(imports: dict[str, set[str]]) -> list[list[str]]:
 
 def graph(package: str) -> dict[str, set[str]]:
     found = modules(package)
+    found.pop(package)  # which names lazily what is public, from every room
     return {name: imported(path, found) - {name} for name, path in found.items()}
 
 

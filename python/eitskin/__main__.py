@@ -1,0 +1,7 @@
+"""``python -m eitskin``: the command line."""
+
+import sys
+
+from eitskin.cli.main import main
+
+sys.exit(main())

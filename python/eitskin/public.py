@@ -1,0 +1,112 @@
+"""What ``import eitskin`` gives beside classes: a skin's frames as they come, and models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from eitskin.device.settings import SolverSettings
+from eitskin.device.wire.link_table import Stream
+from eitskin.errors import UsageError
+from eitskin.live.frame import Frame, Notice
+from eitskin.live.session import KINDS, Session, SessionSettings
+from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.sinks.outputs import Outputs
+from eitskin.sinks.sink import Source
+
+
+def load_model(path: str | Path | None = None) -> Model:
+    """The model in the file ``path``, or without one the prebuilt model of the paper's skin.
+
+    Raises:
+        FileError: it cannot be read.
+        ModelError: it is truncated, corrupted, newer or foreign.
+    """
+    return load_or_prebuilt(None if path is None else Path(path))[0]
+
+
+def stream(
+    url: str = "auto",
+    *,
+    mode: str = "touches",
+    model: str | Path | None = None,
+    frames: int = 0,
+    every: int = 0,
+    tare: int | None = None,
+    to: Sequence[str] = (),
+    record: str | Path | None = None,
+    speed: float = 0.0,
+    **solver: Any,
+) -> Iterator[Frame]:
+    """A skin's frames as they come, touches and all; the board is set up first, its reference taken
+    where that is needed, and let go of where the loop ends.
+
+    Args:
+        url: as ``eitskin stream --device``: "auto", "serial:PORT", "sim:SCENE", "emu:SCENE",
+            "file:RUN.eits".
+        mode: "touches", "image", "raw", or several: "touches,image".
+        model: a file, where the board's model is not the prebuilt one.
+        frames: stop after so many; 0: go on until the scene or the recording ends.
+        every: every n-th frame; 0: as many as the line carries.
+        tare: take the reference from so many frames of the untouched skin.
+        to: sinks, such as "udp://127.0.0.1:9000" (docs/guide/touches-out.md).
+        record: a new recording of every packet.
+        speed: of what is simulated, emulated or recorded; 1 is as it was, 0 as fast as it can.
+        solver: ``sign``, ``iterations``, ``track`` and what else SolverSettings has.
+
+    Raises:
+        EitskinError: the board cannot be opened, set up or followed, or a sink not be opened.
+    """
+    settings = SessionSettings(
+        mode=_mode(mode),
+        every=every,
+        frames=frames,
+        model=None if model is None else Path(model),
+        model_for="an image" if "image" in mode else "",
+        solver=_solver(solver),
+        tare=tare,
+        record=None if record is None else Path(record),
+    )
+    with Session(url, settings, speed=speed) as session:
+        known = None if session.known is None else session.known.model
+        source = Source(session.device.transport.url, session.device.board.board, known)
+        with Outputs(to, source, patient=session.patient) as outputs:
+            yield from _frames(session, outputs)
+            facts = session.finish().as_dict()
+            outputs.end(facts | {"truth": session.score.as_dict() if session.truth else None})
+
+
+def _frames(session: Session, outputs: Outputs) -> Iterator[Frame]:
+    """Frames, each with the notices since the one before."""
+    notices: list[Notice] = []
+    items = session.frames()
+    try:
+        for item in items:
+            outputs.put(item)
+            if isinstance(item, Notice):
+                notices.append(item)
+                continue
+            yield replace(item, notices=tuple(notices))
+            notices.clear()
+    finally:
+        items.close()
+
+
+def _mode(text: str) -> Stream:
+    mode = Stream(0)
+    for kind in text.split(","):
+        if kind not in KINDS:
+            raise UsageError(f"mode {text!r}: use {', '.join(KINDS)}, or several of them")
+        mode |= Stream[kind.upper()]
+    return mode
+
+
+def _solver(named: dict[str, Any]) -> SolverSettings:
+    try:
+        return SolverSettings(**named)
+    except TypeError:
+        known = ", ".join(SolverSettings.__dataclass_fields__)
+        raise UsageError(f"stream({', '.join(named)}): the solver has {known}") from None

@@ -1,0 +1,61 @@
+"""One skin with its image and touches on matplotlib axes, for notebooks and figures of your own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.diagnostics_table import Touch
+from eitskin.model.model import Model
+from eitskin.scene.random_touches import TrueTouch
+from eitskin.view.pictures import STYLE, Mark, Panel, draw_panel, found_mark, load_matplotlib
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+INCHES, DPI = 3.6, 100
+
+
+def draw_touches(
+    model: Model,
+    touches: Sequence[Touch] = (),
+    image: npt.ArrayLike | None = None,
+    *,
+    true: Sequence[TrueTouch] = (),
+    title: str = "",
+    ax: Axes | None = None,
+) -> Axes:
+    """The skin of ``model`` with an ``image`` (n,) in S/m, touches found (crosses) and ``true``
+    (circles), on ``ax``, or on axes of a new figure. Returns the axes.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        ConfigError: the model does not say which skin it is for.
+    """
+    matplotlib = load_matplotlib()
+    values = None if image is None else np.asarray(image, dtype=np.float64)
+    marks = tuple(Mark(one.x_mm, one.y_mm, one.radius_mm) for one in true)
+    panel = Panel(title, values, marks, tuple(map(found_mark, touches)))
+    with matplotlib.rc_context(STYLE):
+        if ax is None:
+            figure = matplotlib.figure.Figure(figsize=(INCHES, INCHES), layout="compressed")
+            matplotlib.backends.backend_agg.FigureCanvasAgg(figure)
+            ax = figure.add_subplot()
+        draw_panel(ax, model.skin, model.grid, panel, small=True)
+    return ax
+
+
+def touches_png(
+    model: Model,
+    touches: Sequence[Touch],
+    image: npt.ArrayLike | None,
+    true: Sequence[TrueTouch] = (),
+) -> bytes:
+    """The same as the bytes of a PNG, for ``_repr_png_``. Raises as ``draw_touches``."""
+    axes, data = draw_touches(model, touches, image, true=true), BytesIO()
+    axes.figure.figure.savefig(data, format="png", dpi=DPI)
+    return data.getvalue()
