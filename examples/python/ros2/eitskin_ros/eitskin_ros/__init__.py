@@ -1,0 +1,1 @@
+"""A skin in ROS 2."""
