@@ -7,13 +7,16 @@ import ipaddress
 import secrets
 import webbrowser
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
     add_device,
+    add_outputs,
     add_scan,
+    opened_outputs,
     read_mode,
     say,
     session_settings,
@@ -51,6 +54,8 @@ def add_parser(subparsers: Any) -> None:
     )
     option(parser, "--token WORD", "that commands need (default: drawn anew, in the address)")
     option(parser, "--folder FOLDER", "where the page's recordings go", Path, default=Path())
+    add_outputs(parser)
+    option(parser, "--overwrite", "write over files that exist, of --to")
     option(parser, "--open", "open the page in this machine's browser")
     add_scan(parser)
     parser.set_defaults(run=run)
@@ -73,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
         )
     if not options.folder.is_dir():
         raise FileError(f"--folder {options.folder}: no such folder; make it, or name another")
-    options.frames, options.overwrite = None, False
+    options.frames = None
     timed = options.device.partition(":")[0] in TIMED
     mode = read_mode(options.mode or ("raw,image,touches" if timed else "image,touches"))
     settings = replace(session_settings(options, mode), quiet_frames=True)
@@ -87,6 +92,7 @@ def run(options: argparse.Namespace) -> int:
         remote=remote,
         folder=options.folder,
         say=say,
+        outputs=partial(opened_outputs, options) if options.to else None,
     )
     address = f"{server.address}#token={token}"
     print(f"open {address}", flush=True)

@@ -271,6 +271,7 @@ class Session:
                 yield from notices
                 if isinstance(item, LiveFrame):
                     self.summary.add(item)
+                    watcher.known = self.known  # another one where a model was uploaded
                     yield Frame(item, watcher.see(item), self.known, now_s, arrived_ns)
                 elif isinstance(item, Fault):
                     self.summary.faults += item.raised

@@ -36,7 +36,7 @@ MAGIC = b"EVF1"
 HEAD = struct.Struct("<4sIII")
 
 
-def text_of(kind: str, **facts: Any) -> str:
+def text_of(kind: str, /, **facts: Any) -> str:
     """A message that is no frame."""
     return json.dumps({"type": kind} | facts, separators=(",", ":"), allow_nan=False)
 

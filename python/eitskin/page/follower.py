@@ -6,10 +6,11 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -22,9 +23,12 @@ from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import PacketType, Stream
 from eitskin.device.wire.packets import RawFrame
 from eitskin.device.wire.payloads import MalformedPacket, parse
-from eitskin.errors import DeviceError, EitskinError, UsageError
+from eitskin.errors import DeviceError, UsageError
 from eitskin.live.frame import Frame, Notice
 from eitskin.live.session import KINDS, TARE_FRAMES, Session, SessionSettings
+
+if TYPE_CHECKING:
+    from eitskin.sinks.outputs import Outputs
 
 FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
 T = TypeVar("T")
@@ -61,8 +65,10 @@ class PageSession(Session):
 
 class Follower:
     """Opens ``url`` and gives what comes to ``on_frame`` and ``on_news``, in its own thread, until
-    ``stop``. ``folder`` is where recordings go. ``state``: "starting", "live", "ended" (the scene
-    or the recording is over), "failed" (``text`` says why), "unplugged".
+    ``stop``; ``outputs`` opens the sinks of a session, ``folder`` is where recordings go.
+
+    ``state``: "starting", "live", "unplugged", "ended" (the scene or the recording is over),
+    "failed" (``text`` says why).
     """
 
     def __init__(
@@ -74,16 +80,16 @@ class Follower:
         folder: Path,
         on_frame: Callable[[Frame], None],
         on_news: Callable[[str, dict[str, Any]], None],
+        outputs: Callable[[Session], Outputs] | None = None,
     ) -> None:
-        self._url, self.settings, self._speed, self._folder = url, settings, speed, folder
-        self._on_frame, self._on_news = on_frame, on_news
+        self._url, self.settings, self._speed, self.folder = url, settings, speed, folder
+        self._on_frame, self._on_news, self._outputs = on_frame, on_news, outputs
         self.session: PageSession | None = None
-        self.state, self.text, self.error = "starting", "", None
+        self.state, self.text = "starting", ""
+        self.error: Exception | None = None
         self.frames = 0
         self._stopping, self._again = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="eitskin view", daemon=True)
-
-    error: EitskinError | None
 
     def start(self) -> None:
         """Begin."""
@@ -110,9 +116,9 @@ class Follower:
             try:
                 self._follow()
                 self._set("ended", "the scene or the recording is over")
-            except EitskinError as error:
+            except Exception as error:  # the page says so, whatever it is
                 self.error = error
-                self._set("failed", str(error))
+                self._set("failed", str(error) or type(error).__name__)
             finally:
                 self.session = None
             self._again.wait()
@@ -121,7 +127,8 @@ class Follower:
         session = PageSession(
             self._url, self.settings, say=self._say, reconnect=FOR_EVER, speed=self._speed
         )
-        with session:
+        with session, nullcontext() if self._outputs is None else self._outputs(session) as outputs:
+            session.start()
             self.session = session
             self._set("live", "")
             frames = session.frames()
@@ -129,6 +136,8 @@ class Follower:
                 for item in frames:
                     if self._stopping.is_set():
                         return
+                    if outputs is not None:
+                        outputs.put(item)
                     if isinstance(item, Notice):
                         self._notice(item)
                     else:
@@ -252,7 +261,7 @@ class Follower:
                     return f"recorded {count} packets in {name}"
             if on:
                 name = f"eitskin-{datetime.now():%Y%m%d-%H%M%S}.eits"
-                session.recorder = Recorder(self._folder / name, device, session.solver)
+                session.recorder = Recorder(self.folder / name, device, session.solver)
                 return f"recording to {name}"
             return "nothing is being recorded"
 

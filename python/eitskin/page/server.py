@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 from eitskin.device.timing import read_speed
 from eitskin.errors import EitskinError, UsageError, missing_extra
 from eitskin.live.frame import Frame
-from eitskin.live.session import SessionSettings
+from eitskin.live.session import Session, SessionSettings
 from eitskin.page.facts import frame_bytes, setup_text, text_of
 from eitskin.page.follower import Follower
 from eitskin.page.hub import Hub, Outgoing, PageClient
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
     from starlette.websockets import WebSocket
+
+    from eitskin.sinks.outputs import Outputs
 
 FILES = {
     "/": ("index.html", "text/html; charset=utf-8"),
@@ -92,18 +94,24 @@ class PageServer:
         speed: float = 1.0,
         folder: Path = Path(),
         say: Callable[[str], None] = lambda text: None,
-        also: Callable[[Frame], None] | None = None,
+        outputs: Callable[[Session], Outputs] | None = None,
     ) -> None:
         _, self._uvicorn = load_server()
         self._listening, self._token, self._remote = listening, token, remote
         self.host, self.port = host, int(listening.getsockname()[1])
-        self._say, self._also = say, also
+        self._say = say
         self.hub, self._loop = Hub(), asyncio.new_event_loop()
         self._waiting: Frame | None = None
         self._frames = 0
         self.skipped = 0  # frames that came while the one before was not taken up yet
         self.follower = Follower(
-            url, settings, speed=speed, folder=folder, on_frame=self._frame, on_news=self._news
+            url,
+            settings,
+            speed=speed,
+            folder=folder,
+            on_frame=self._frame,
+            on_news=self._news,
+            outputs=outputs,
         )
 
     @property
@@ -116,7 +124,7 @@ class PageServer:
         """Until Ctrl-C or ``stop``.
 
         Raises:
-            EitskinError: the device could not be opened at all.
+            EitskinError: the device or a sink could not be opened at all.
         """
         config = self._uvicorn.Config(
             self._app(),
@@ -152,8 +160,6 @@ class PageServer:
             self._loop.call_soon_threadsafe(action)
 
     def _frame(self, frame: Frame) -> None:
-        if self._also is not None:
-            self._also(frame)
         if self._waiting is None:
             self._waiting = frame
             self._call(self._send_frame)

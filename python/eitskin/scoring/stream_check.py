@@ -60,14 +60,14 @@ class Watcher:
     """Turns frames into what they show; ``score`` adds up how far off it is."""
 
     def __init__(self, known: KnownModel | None, truth: SceneTruth | None) -> None:
-        self._known, self._truth = known, truth
+        self.known, self._truth = known, truth
         self.score = TruthScore()
 
     def see(self, frame: LiveFrame) -> ComparedFrame:
         """What ``frame`` shows."""
         view = None
-        if frame.image is not None and self._known is not None and not frame.refused:
-            view = image_view(self._known, frame.image.image)
+        if frame.image is not None and self.known is not None and not frame.refused:
+            view = image_view(self.known, frame.image.image)
         seen = ComparedFrame(frame, view)
         found = seen.found_mm
         if self._truth is None or found is None or frame.refused:

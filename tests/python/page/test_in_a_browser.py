@@ -1,0 +1,322 @@
+"""The page in Chromium: what it shows is what is there, and its buttons do what they say. One
+browser for all tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from served import ALL, TOKEN, Page, serving, until
+
+from board_on_a_port import Wire
+from eitskin.device import ports as ports_module
+from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
+from eitskin.device.ports import Port
+from eitskin.device.simulated import SimBoard
+from eitskin.device.wire.link_table import Stream
+from eitskin.live.session import Session, SessionSettings
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.page.server import PageServer
+from eitskin.scene.board_frames import BoardFrames
+from eitskin.scene.description import load_scene
+
+PLACES = [(-40.0, 10.0), (30.0, -20.0)]
+NEAR_MM = 3.0
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two touches that stay."""
+    path: Path = tmp_path_factory.mktemp("scene") / "two.toml"
+    touches = "".join(f"[[touch]]\nx_mm = {x}\ny_mm = {y}\nradius_mm = 9.0\n" for x, y in PLACES)
+    path.write_text(
+        "[scene]\nframes = 12\nquiet_frames = 16\nelements = 2500\nrate_hz = 50.0\n"
+        f"{touches}[effects.noise]\nsnr_db = 60.0\n"
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    one = Page(tmp_path_factory.mktemp("chromium"))
+    try:
+        yield one
+    finally:
+        one.driver.quit()
+
+
+@pytest.fixture(scope="module")
+def server(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    """A simulated board before the scene, again and again."""
+    folder = tmp_path_factory.mktemp("recordings")
+    with serving(f"sim:{scene}?loop=1", folder=folder) as one:
+        yield one
+
+
+@pytest.fixture
+def live(server: PageServer, page: Page) -> Page:
+    """The simulated board's page, playing."""
+    server.follower.live().pacer.play()
+    page.size(1200, 900)
+    page.open(server)
+    until(page.touches)
+    return page
+
+
+def assert_shown(page: Page) -> None:
+    """Both touches in the table, in the words, and in the image's colours."""
+    until(lambda: len(page.touches()) == 2)
+    assert np.abs(np.array(page.touches()) - PLACES).max() < NEAR_MM
+    assert page.text("n-latency")
+    name = page.run("return document.getElementById('skin').ariaLabel")
+    assert "2 touches" in name
+
+
+def red(page: Page, x_mm: float, y_mm: float) -> int:
+    """How much redder than green the skin is drawn there, beside what marks a touch's middle."""
+    return int(
+        page.run(
+            "const c = document.getElementById('skin'), w = c.clientWidth, h = c.clientHeight;"
+            "const s = Math.min(w - 52, h - 52) / 194, r = c.width / w;"
+            f"const x = w / 2 + ({x_mm} + 5) * s, y = h / 2 - ({y_mm}) * s;"
+            "const p = c.getContext('2d').getImageData(x * r, y * r, 1, 1).data;"
+            "return p[0] - p[1]"
+        )
+    )
+
+
+def test_simulated(live: Page) -> None:
+    assert_shown(live)
+    assert min(red(live, *place) for place in PLACES) > 40
+    assert red(live, -20.0, -60.0) < 25
+    assert "16 electrodes" in live.text("device")
+    assert live.run("return document.getElementById('electrodes').children.length") == 16
+    assert live.text("found") == "nothing found wrong"
+    until(lambda: "touches" in live.text("words"))
+    until(
+        lambda: (
+            "from the reference" in live.run("return document.getElementById('volts').ariaLabel")
+        )
+    )
+    until(lambda: live.text("n-rate").endswith("Hz"))
+
+
+def test_emulated(scene: Path, page: Page) -> None:
+    with serving(f"emu:{scene}?loop=1", Stream.IMAGE | Stream.TOUCHES) as server:
+        page.open(server)
+        until(lambda: len(page.touches()) == 2, 60)
+        assert_shown(page)
+        until(lambda: page.text("n-solve").endswith("ms"))
+
+
+def test_recorded(scene: Path, page: Page, tmp_path: Path) -> None:
+    settings = SessionSettings(ALL, record=tmp_path / "run.eits")
+    with Session(f"sim:{scene}", settings) as session:
+        count = sum(1 for _ in session.items())
+    with serving(f"file:{tmp_path}/run.eits") as server:
+        page.open(server)
+        until(lambda: page.text("state") == "over")
+        assert_shown(page)
+        assert page.text("n-frame").isdigit()
+        assert server.follower.frames == count
+        assert page.run("return document.getElementById('tare').disabled")
+        page.click("play")
+        assert page.answer() == "starting again"
+        until(lambda: server.follower.frames == 2 * count)
+
+
+def test_pause_step_play_and_speed(live: Page, server: PageServer) -> None:
+    live.click("play")
+    assert live.answer() == "paused"
+    until(lambda: live.text("play") == "Play")
+    before = server.follower.frames
+    live.click("step")
+    assert live.answer() == "one frame"
+    until(lambda: server.follower.frames == before + 1)
+    live.choose("speed", "2")
+    assert live.answer().startswith("speed 2")
+    assert server.follower.live().pacer.speed == 2.0
+    live.choose("speed", "1")
+    assert server.follower.frames == before + 1
+    live.run("document.body.dispatchEvent(new KeyboardEvent('keydown', {key: ' ', bubbles: true}))")
+    until(lambda: server.follower.frames > before + 3)
+
+
+def test_tare_solver_and_mode(live: Page, server: PageServer) -> None:
+    session = server.follower.live()
+    live.choose("sign", "decrease")
+    assert live.answer() == "solver: sign decrease"
+    until(lambda: not live.touches())  # they are increases
+    live.choose("sign", "increase")
+    assert live.answer() == "solver: sign increase"
+    live.choose("iterations", "30")
+    assert live.answer() == "solver: iterations 30"
+    assert session.solver is not None
+    assert session.solver.iterations == 30
+    live.choose("iterations", "0")
+    assert "cannot be" in live.answer()
+    live.run("document.querySelector('#mode input[value=raw]').click()")
+    assert live.answer() == "streaming touches, image"
+    until(lambda: "No raw" in live.run("return document.getElementById('volts').ariaLabel"))
+    live.run("document.querySelector('#mode input[value=raw]').click()")
+    until(lambda: "raw voltages" in live.run("return document.getElementById('volts').ariaLabel"))
+    live.click("tare")  # the touches are in the reference then
+    assert live.answer() == "reference taken from 16 frames"
+    until(lambda: not live.touches())
+    begin_again(server)
+
+
+def begin_again(server: PageServer) -> None:
+    """The board switched off and on, and its reference taken before the scene."""
+    session = server.follower.live()
+    session.stop()
+    until(lambda: server.follower.state == "ended")
+    server.follower.again()
+    until(lambda: server.follower.session not in (None, session))
+
+
+def test_record(live: Page, server: PageServer) -> None:
+    live.click("record")
+    name = live.answer().removeprefix("recording to ")
+    until(lambda: live.text("record-text") == "Stop recording")
+    before = server.follower.frames
+    until(lambda: server.follower.frames > before + 3)
+    live.click("record")
+    assert live.answer().endswith(name)
+    until(lambda: live.text("record-text") == "Record")
+    with Session(f"file:{server.follower.folder / name}", SessionSettings(ALL)) as session:
+        assert sum(1 for _ in session.items()) > 2
+
+
+def test_a_model_is_uploaded(live: Page, server: PageServer, tmp_path: Path) -> None:
+    box = live.driver.find_element("id", "model")
+    (tmp_path / "bad.eitm").write_bytes(b"no model")
+    live.run("document.getElementById('answer').textContent = ''")
+    box.send_keys(str(tmp_path / "bad.eitm"))
+    until(lambda: "the uploaded file" in live.text("answer"))
+    (tmp_path / "good.eitm").write_bytes(load_prebuilt()[1])
+    box.send_keys(str(tmp_path / "good.eitm"))
+    until(lambda: "is in use" in live.text("answer"))
+    before = server.follower.frames
+    until(lambda: server.follower.frames > before + 3)
+    begin_again(server)
+
+
+def test_unplugged_and_back(scene: Path, page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    empty = bytes([ERASED]) * BANK_BYTES
+    board = SimBoard(BoardFrames(load_scene(scene)), [bank_bytes(load_prebuilt()[1], 1), empty])
+    first, there = Wire(board, frame_s=0.02), []
+    monkeypatch.setattr(
+        ports_module, "ports", lambda: [Port(path, "", 0x0483, 0x374B, "SERIAL1") for path in there]
+    )
+    there.append(first.path)
+    second = None
+    try:
+        with serving(f"serial:{first.path}", Stream.TOUCHES) as server:
+            page.open(server)
+            until(lambda: server.follower.frames > 3)
+            assert page.run("return document.getElementById('step').hidden")
+            there.clear()
+            first.unplug()
+            until(lambda: "plugged in again" in page.text("state"))
+            assert "unplugged" in page.text("log")
+            second = Wire(board, frame_s=0.02)
+            there.append(second.path)
+            until(lambda: page.text("state") == "live")
+            before = server.follower.frames
+            until(lambda: server.follower.frames > before + 3)
+    finally:
+        for wire in (first, second):
+            if wire is not None:
+                wire.unplug()
+
+
+@pytest.mark.parametrize("width", [360, 768, 2560])
+def test_it_fits(live: Page, width: int) -> None:
+    live.size(width, 900)
+    until(lambda: live.run("return innerWidth") == width)
+    wide, inner = live.run("return [document.documentElement.scrollWidth, innerWidth]")
+    assert wide <= inner
+    outside = live.run(
+        "return [...document.querySelectorAll('button, input, select, canvas, h2, dd')].filter(e =>"
+        " e.getClientRects().length && (e.getBoundingClientRect().right > innerWidth + 0.5 ||"
+        " e.getBoundingClientRect().left < -0.5)).map(e => e.id)"
+    )
+    assert outside == []
+
+
+def test_light_and_dark(live: Page) -> None:
+    shades = []
+    for dark in (False, True):
+        live.size(1200, 900, dark=dark)
+        style = "getComputedStyle(document.body)"
+        shades.append(live.run(f"return [{style}.backgroundColor, {style}.color]"))
+    (light, ink), (dark_ground, light_ink) = shades
+    assert sum(map(int, light[4:-1].split(","))) > 600 > 300 > sum(map(int, ink[4:-1].split(",")))
+    assert sum(map(int, dark_ground[4:-1].split(","))) < 150
+    assert sum(map(int, light_ink[4:-1].split(","))) > 600
+
+
+def test_every_control_has_a_name_and_is_reached_by_keyboard(live: Page) -> None:
+    nodes = live.command("Accessibility.getFullAXTree")["nodes"]
+    roles = ("button", "checkbox", "combobox", "spinbutton", "image", "table", "toolbar")
+    found = [
+        (node["role"]["value"], node.get("name", {}).get("value", ""))
+        for node in nodes
+        if not node["ignored"] and node["role"]["value"] in roles
+    ]
+    names = {name for _, name in found}
+    assert {"Tare", "Record", "Pause", "Step", "Controls", "Sign", "show the truth"} <= names
+    unnamed = [role for role, name in found if not name.strip() and role != "table"]
+    assert unnamed == []
+    reached = live.run(
+        "return [...document.querySelectorAll('button, input, select')].filter(e =>"
+        " e.getClientRects().length && !e.disabled && e.tabIndex < 0).map(e => e.id)"
+    )
+    assert reached == []
+
+
+def test_nothing_comes_from_elsewhere_and_nothing_is_wrong(live: Page, server: PageServer) -> None:
+    names = live.run("return performance.getEntriesByType('resource').map(e => e.name)")
+    assert len(names) >= 3
+    assert all(name.startswith(server.address) for name in names)
+    wrong = [one["message"] for one in live.driver.get_log("browser") if one["level"] == "SEVERE"]
+    assert [text for text in wrong if "/model" not in text] == []
+
+
+def test_without_the_token_it_only_looks_on(live: Page, server: PageServer) -> None:
+    live.open(server, token=None)
+    until(live.touches)
+    assert live.run(
+        "return ['tare', 'record', 'sign', 'model', 'play'].every(i =>"
+        " document.getElementById(i).disabled)"
+    )
+    before = server.follower.live().pacer.paused
+    live.run("document.getElementById('play').disabled = false")
+    live.click("play")
+    assert "needs the token" in live.answer()
+    assert server.follower.live().pacer.paused == before
+    live.open(server, token=TOKEN + "!")
+    until(lambda: "eitskin view printed" in live.text("answer"))
+
+
+def test_frames_go_on_without_end_and_memory_does_not(live: Page, server: PageServer) -> None:
+    """As many frames as in ten minutes at 50 a second, as fast as they come."""
+    live.choose("speed", "max")
+    start = server.follower.frames
+
+    def sizes() -> tuple[float, float]:
+        live.command("HeapProfiler.collectGarbage")
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * 4096 / 1e6, live.run("return performance.memory.usedJSHeapSize") / 1e6
+
+    until(lambda: server.follower.frames > start + 5_000, 300)
+    before = sizes()
+    until(lambda: server.follower.frames > start + 35_000, 600)
+    after = sizes()
+    live.choose("speed", "1")
+    assert after[0] < before[0] + 20
+    assert after[1] < before[1] + 5
+    assert live.run("return document.getElementsByTagName('*').length") < 600
