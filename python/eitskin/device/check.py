@@ -8,6 +8,7 @@ from pathlib import Path
 
 from eitskin import __version__
 from eitskin.device.link import Link
+from eitskin.device.wire.codec import LinkCounters
 from eitskin.device.wire.link_table import LINK_VERSION
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import DeviceError
@@ -36,11 +37,12 @@ def check_board(info: BoardInfo, name: str) -> None:
         )
 
 
-def no_answer(link: Link, what: str, waited_s: float) -> str:
-    """Why nothing answers, from what was counted, in one line."""
+def no_answer(link: Link, before: LinkCounters, what: str, waited_s: float) -> str:
+    """Why nothing answers, from what was counted since ``before``, in one line."""
     name, counters = link.transport.name, link.counters
     other = link.decoder.other_version
-    if other is not None and not counters.packets:
+    packets = counters.packets - before.packets
+    if other is not None and not packets:
         advice = FLASH if other < LINK_VERSION else f"upgrade eitskin, or {FLASH}"
         return (
             f"{name}: the board speaks version {other} of the link protocol and this eitskin"
@@ -48,10 +50,15 @@ def no_answer(link: Link, what: str, waited_s: float) -> str:
         )
     if link.ended and what == "TARE":
         return f"{name}: the scene is over, and a tare waits for frames; open the device again"
-    if counters.packets:
+    if packets:
         return (
             f"{name}: packets arrive, but {what} is not answered within {waited_s:g} s; reset the"
             f" board, or {FLASH}"
+        )
+    if counters.packets:
+        return (
+            f"{name}: the board has fallen silent: {what} is not answered within {waited_s:g} s;"
+            " reset it, or plug it in again"
         )
     if counters.bytes:
         baud = getattr(link.transport, "baud", None)

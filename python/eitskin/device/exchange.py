@@ -6,6 +6,7 @@ from __future__ import annotations
 import random
 import time
 from collections import deque
+from dataclasses import replace
 from types import TracebackType
 from typing import TypeVar
 
@@ -35,6 +36,7 @@ Self = TypeVar("Self", bound="CommandExchange")
 
 TRIES = 3
 ANSWER_S = 1.0
+AWAY_S = 0.2
 INBOX = 1024
 
 
@@ -239,8 +241,11 @@ class CommandExchange:
             raise UsageError(
                 f"{command_name(command.TYPE)}: a number does not fit its field ({error})"
             ) from None
-        for attempt in range(TRIES):
-            if attempt == TRIES - 1:
+        before = replace(self.counters)
+        left = TRIES
+        while left:
+            self._await_port()
+            if left == 1:
                 self.link.decoder.forget_sequence()
             self.link.send(command.TYPE, payload)
             answer = self._await_answer(command, timeout_s)
@@ -248,7 +253,20 @@ class CommandExchange:
                 if refuse and isinstance(answer, Reply) and not answer.ok:
                     raise DeviceError(f"{self.transport.name}: {reply_text(answer)}")
                 return answer
-        raise DeviceError(no_answer(self.link, command_name(command.TYPE), TRIES * timeout_s))
+            left = TRIES if self.link.away else left - 1
+        what = command_name(command.TYPE)
+        raise DeviceError(no_answer(self.link, before, what, TRIES * timeout_s))
+
+    def _await_port(self) -> None:
+        """Wait while the port is gone.
+
+        Raises:
+            DeviceError: it is gone for good.
+        """
+        while self.link.away:
+            item = self.link.next(AWAY_S)
+            if item is not None:
+                self._keep(item)
 
     def _await_answer(self, command: Command, timeout_s: float) -> Answer | None:
         deadline = Deadline(self.transport.synchronous, timeout_s)

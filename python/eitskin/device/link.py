@@ -67,6 +67,10 @@ class Link(Protocol):
     def ended(self) -> bool:
         """No frame will come again, and nothing is left to fetch."""
 
+    @property
+    def away(self) -> bool:
+        """The port is gone and is waited for."""
+
     def close(self) -> None:
         """Stop and let go of the port."""
 
@@ -112,6 +116,10 @@ class PumpedLink:
     def ended(self) -> bool:
         return not self._ready and self.transport.ended
 
+    @property
+    def away(self) -> bool:
+        return False
+
     def close(self) -> None:
         self.transport.close()
 
@@ -120,7 +128,7 @@ class PumpedLink:
 class Reconnect:
     """How long a board that was unplugged is waited for: ``tries`` times, ``every_s`` apart."""
 
-    tries: int = 60
+    tries: int = 240
     every_s: float = 0.5
 
 
@@ -143,6 +151,7 @@ class ThreadedLink:
         self._changed = threading.Condition()
         self._stopping = threading.Event()
         self._failed: EitskinError | None = None
+        self._away = False
         self._dropped = 0
         self._sequence = 0
         self._thread = threading.Thread(
@@ -191,6 +200,10 @@ class ThreadedLink:
     @property
     def ended(self) -> bool:
         return False
+
+    @property
+    def away(self) -> bool:
+        return self._away
 
     def close(self) -> None:
         self._stopping.set()
@@ -245,6 +258,7 @@ class ThreadedLink:
             self._changed.notify_all()
 
     def _open_again(self, error: DeviceError) -> bool:
+        self._away = True
         self._event(LinkEvent("unplugged", text=str(error)))
         for _ in range(self._reconnect.tries):
             if self._stopping.wait(self._reconnect.every_s):
@@ -252,11 +266,12 @@ class ThreadedLink:
             try:
                 there = self.transport.reopen()
             except DeviceError as other:
-                self._fail(other)
-                return False
+                error = other
+                continue  # a port that has just come may not be opened at once
             if there:
                 self.decoder.link_lost()
                 self.counters.reconnects += 1
+                self._away = False
                 self._event(LinkEvent("reconnected", text=self.transport.name))
                 return True
         waited = self._reconnect.tries * self._reconnect.every_s

@@ -21,8 +21,8 @@ from eitskin.device.link import LinkEvent, Reconnect
 from eitskin.device.open import list_devices, open_device, open_transport
 from eitskin.device.ports import Port, SerialTransport
 from eitskin.device.simulated import SimBoard
-from eitskin.device.wire.link_table import Stream, Tare
-from eitskin.device.wire.packets import RawFrame
+from eitskin.device.wire.link_table import GetInfo, Stream, Tare
+from eitskin.device.wire.packets import BoardInfo, RawFrame
 from eitskin.errors import DeviceError, UsageError
 from eitskin.scene.board_frames import BoardFrames
 from small_models import prebuilt
@@ -114,6 +114,63 @@ def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch: pytest.MonkeyPatc
             second.unplug()
 
 
+def test_a_command_waits_for_a_board_that_is_away_longer_than_an_answer_may_take(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Answers may take 3 x 0.05 s here; the board is away for 25 looks, 0.02 s apart."""
+    board, there, looks = sim_board(), [], [0]
+    first = Wire(board)
+    second: Wire | None = None
+
+    def ports() -> list[Port]:
+        nonlocal second
+        if second is None and not there:
+            looks[0] += 1
+            if looks[0] == 25:
+                second = Wire(board)
+                there.append(second.path)
+        return [Port(path, "STLink", 0x0483, 0x374B, "SERIAL1") for path in there]
+
+    monkeypatch.setattr(ports_module, "ports", ports)
+    there.append(first.path)
+    try:
+        url, wait = f"serial:{first.path}", Reconnect(tries=1000, every_s=0.02)
+        with open_device(url, reconnect=wait) as device:
+            there.clear()
+            first.unplug()
+            answer = device.ask(GetInfo(), 0.05)
+            assert isinstance(answer, BoardInfo) and answer.serial == device.board.serial
+            assert device.counters.reconnects == 1 and looks[0] == 25
+    finally:
+        for wire in (first, second):
+            if wire is not None:
+                wire.unplug()
+
+
+def test_a_port_that_comes_back_before_it_may_be_opened_is_tried_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    board, tries = sim_board(), [0]
+    wire = Wire(board)
+    opened = ports_module.open_port
+
+    def forbidden_at_first(path: str, baud: int) -> object:
+        tries[0] += 1
+        if tries[0] < 4:
+            raise DeviceError(f"{path}: no permission to open it")
+        return opened(path, baud)
+
+    try:
+        wait = Reconnect(tries=1000, every_s=0.02)
+        with open_device(f"serial:{wire.path}", reconnect=wait) as device:
+            monkeypatch.setattr(ports_module, "open_port", forbidden_at_first)
+            monkeypatch.setattr(device.transport._port, "read", lambda count: os.read(-1, 1))
+            answer = device.ask(GetInfo(), 0.2)
+            assert isinstance(answer, BoardInfo) and tries[0] == 4
+    finally:
+        wire.unplug()
+
+
 def test_another_board_in_its_place_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     first, there = Wire(sim_board(), frame_s=0.005), []
     monkeypatch.setattr(
@@ -158,7 +215,7 @@ def test_a_board_that_dies_on_a_port_that_stays() -> None:
         with open_device(f"serial:{wire.path}") as device:
             wire._stop.set()
             wire._thread.join(5)
-            with pytest.raises(DeviceError, match="TARE is not answered within"):
+            with pytest.raises(DeviceError, match="has fallen silent: TARE is not answered within"):
                 device.send_command(Tare(4), 0.1)
     finally:
         wire.unplug()
