@@ -1,0 +1,248 @@
+"""Who may look on and who may command, what a slow page costs the others, and what is refused."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from served import ALL, TOKEN, serving, until
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from eitskin.cli.main import main
+from eitskin.page.facts import HEAD, MAGIC
+from eitskin.page.hub import IN_FLIGHT, Hub, Outgoing, PageClient
+from eitskin.page.server import NO_TOKEN, PageServer
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path: Path = tmp_path_factory.mktemp("scene") / "one.toml"
+    path.write_text(
+        "[scene]\nframes = 10\nquiet_frames = 16\nelements = 1500\nrate_hz = 50.0\n"
+        "[[touch]]\nx_mm = 20.0\ny_mm = 0.0\nradius_mm = 9.0\n"
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def server(scene: Path) -> Iterator[PageServer]:
+    with serving(f"sim:{scene}?loop=1") as one:
+        yield one
+
+
+@contextmanager
+def opened(
+    server: PageServer, token: object, origin: str | None = "its own"
+) -> Iterator[ClientConnection]:
+    """A page's WebSocket that has said who it is."""
+    if origin == "its own":
+        origin = f"http://127.0.0.1:{server.port}"
+    url = f"ws://127.0.0.1:{server.port}/live"
+    with connect(url, origin=origin, compression=None) as line:  # type: ignore[arg-type]
+        line.send(json.dumps({"type": "hello", "token": token}))
+        yield line
+
+
+def told(line: ClientConnection, kind: str) -> dict:
+    """The next message of a kind."""
+    while True:
+        said = line.recv(10)
+        if isinstance(said, str) and (message := json.loads(said))["type"] == kind:
+            return dict(message)
+
+
+def got(server: PageServer, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
+    request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", headers=headers)
+    if "X-Eitskin-Token" in headers:
+        request.method, request.data = "POST", b"no model"
+    try:
+        with urllib.request.urlopen(request, timeout=10) as reply:
+            return reply.status, dict(reply.headers), reply.read()
+    except urllib.error.HTTPError as error:
+        return error.code, dict(error.headers), error.read()
+
+
+def test_files_say_that_nothing_else_may_be_loaded(server: PageServer) -> None:
+    for path in ("/", "/page.js", "/drawing.js", "/page.css", "/icon.svg"):
+        status, headers, content = got(server, path)
+        assert status == 200
+        assert content
+        lines = {key.lower(): value for key, value in headers.items()}
+        policy = lines["content-security-policy"]
+        assert policy.startswith("default-src 'none'; script-src 'self'; style-src 'self'")
+        assert "unsafe" not in policy
+        assert lines["x-content-type-options"] == "nosniff"
+        assert b"http://" not in content.replace(b"http://www.w3.org/2000/svg", b"")
+        assert b"https://" not in content
+    assert got(server, "/../server.py")[0] == 404
+
+
+def test_a_frame_is_what_is_documented(server: PageServer) -> None:
+    with opened(server, TOKEN) as line:
+        setup = told(line, "setup")
+        data = line.recv(10)
+        while isinstance(data, str):
+            data = line.recv(10)
+    magic, number, pixels, rows = HEAD.unpack_from(data)
+    assert magic == MAGIC
+    assert number > 0
+    assert pixels == len(setup["skin"]["cells"])
+    assert rows == 208
+    image = np.frombuffer(data, "<f4", pixels, HEAD.size)
+    volts = np.frombuffer(data, "<f4", rows, HEAD.size + 4 * pixels)
+    message = json.loads(data[HEAD.size + 4 * (pixels + rows) :])
+    assert np.isfinite(image).all()
+    assert np.isfinite(volts).all()
+    assert message["type"] == "frame"
+    assert "image_s_per_m" not in message
+    assert "voltage_v" not in message
+    assert len(message["true"]) == 1
+
+
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example:80", ""])
+def test_another_hosts_name_is_refused(server: PageServer, host: str) -> None:
+    assert got(server, "/", Host=host)[0] in (400, 403)
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", None])
+def test_another_sites_page_is_refused(server: PageServer, origin: str | None) -> None:
+    with pytest.raises(InvalidStatus, match="403"), opened(server, TOKEN, origin):
+        pass
+
+
+def test_a_model_needs_the_token_and_the_same_site(server: PageServer) -> None:
+    assert got(server, "/model", **{"X-Eitskin-Token": "guess"})[0] == 401
+    status, _, _ = got(
+        server, "/model", **{"X-Eitskin-Token": TOKEN, "Origin": "http://evil.example"}
+    )
+    assert status == 403
+    status, _, said = got(server, "/model", **{"X-Eitskin-Token": TOKEN})
+    assert status == 400
+    assert "the uploaded file" in json.loads(said)["error"]
+
+
+@pytest.mark.parametrize("token", [None, "", "guess", 7])
+def test_commands_need_the_token(server: PageServer, token: str | None) -> None:
+    with opened(server, token) as line:
+        assert told(line, "setup")["may_command"] is False
+        for what in ("tare", "pause", "record", "sign"):
+            line.send(json.dumps({"type": "do", "do": what, "value": True}))
+            answer = told(line, "answer")
+            assert not answer["ok"]
+            assert "needs the token" in answer["text"]
+    assert not server.follower.live().pacer.paused
+
+
+@pytest.mark.parametrize(
+    "said",
+    ["no json", "[1]", '{"type": "drawn"}', '{"type": "drawn", "number": "x"}'],
+)
+def test_a_page_that_talks_nonsense_is_let_go(server: PageServer, said: str) -> None:
+    with opened(server, TOKEN) as line:
+        told(line, "setup")
+        line.send(said)
+        with pytest.raises(ConnectionClosed):
+            while True:
+                line.recv(10)
+
+
+@pytest.mark.parametrize("what", ["fly", "sign", "iterations", "mode", "speed"])
+def test_an_order_that_cannot_be_is_answered(server: PageServer, what: str) -> None:
+    with opened(server, TOKEN) as line:
+        line.send(json.dumps({"type": "do", "do": what, "value": ["x"]}))
+        answer = told(line, "answer")
+        assert not answer["ok"]
+
+
+def test_from_elsewhere_even_looking_on_needs_the_token(scene: Path) -> None:
+    with serving(f"sim:{scene}?loop=1", remote=True, host="0.0.0.0") as server:
+        with opened(server, "guess") as line, pytest.raises(ConnectionClosed) as end:
+            while True:
+                line.recv(10)
+        assert end.value.rcvd is not None
+        assert end.value.rcvd.code == NO_TOKEN
+        with opened(server, TOKEN) as line:
+            assert told(line, "setup")["may_command"] is True
+        assert got(server, "/", Host=f"evil.example:{server.port}")[0] == 403
+
+
+def test_a_page_that_reads_nothing_disturbs_nobody(server: PageServer) -> None:
+    """It says that it has drawn nothing: it gets a few frames, the rest is dropped and counted."""
+    with opened(server, TOKEN) as slow, opened(server, TOKEN) as quick:
+        told(slow, "setup")
+        seen = 0
+        while seen < 30:
+            said = quick.recv(10)
+            if isinstance(said, bytes):
+                seen += 1
+                number = HEAD.unpack_from(said)[1]
+                quick.send(json.dumps({"type": "drawn", "number": number}))
+        dropped = sorted(page.dropped for page in server.hub.pages)
+        sent = sorted(page.sent for page in server.hub.pages)
+    assert sent[0] == IN_FLIGHT
+    assert dropped[1] > 15
+    assert sent[1] >= 30
+    until(lambda: not server.hub.pages)
+
+
+def test_what_a_page_cannot_take_is_dropped_and_counted() -> None:
+    async def run() -> tuple[list[int], PageClient]:
+        hub, page = Hub(), PageClient()
+        hub.pages.add(page)
+        got_numbers = []
+        for number in range(1, IN_FLIGHT + 1):
+            hub.offer(Outgoing(number, bytes([number]), 0))
+            got_numbers.append((await page.next())[0])
+        for number in range(5, 9):
+            hub.offer(Outgoing(number, bytes([number]), 0))
+        page.drawn(2)
+        got_numbers.append((await page.next())[0])
+        hub.tell("words go first")
+        hub.offer(Outgoing(9, bytes([9]), 0))
+        assert await page.next() == "words go first"
+        return got_numbers, page
+
+    numbers, page = asyncio.run(run())
+    assert numbers == [1, 2, 3, 4, 8]
+    assert (page.sent, page.dropped) == (5, 3)
+
+
+def refused(capsys: pytest.CaptureFixture[str], code: int, *arguments: str) -> str:
+    assert main(["view", "--device", "sim:two_touch", *arguments]) == code
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_a_taken_port(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        line = refused(capsys, 2, "--port", str(taken.getsockname()[1]))
+    assert "in use" in line
+    assert "--port 0" in line
+
+
+def test_other_hosts_without_a_token(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert "--token WORD" in refused(capsys, 2, "--host", "0.0.0.0", "--port", "0")
+    assert "at least 12" in refused(capsys, 2, "--token", "short")
+    assert "no such folder" in refused(capsys, 3, "--folder", str(tmp_path / "none"))
+    assert "cannot listen" in refused(capsys, 2, "--host", "no.such.host.invalid", "--token", TOKEN)
+
+
+def test_a_device_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["view", "--device", "sim:nowhere", "--port", "0"]) == 3
+    assert "no such scene" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_every_kind_is_asked_for(server: PageServer) -> None:
+    with opened(server, TOKEN) as line:
+        assert told(line, "setup")["mode"] == ["raw", "image", "touches"]
+    assert ALL == 7
