@@ -219,21 +219,21 @@ static void test_frames_by_and_by(void)
  * goes. */
 static void test_frames_given(void)
 {
-    float given[ROWS];
+    float given[2 * ROWS] = {0};
     start_given(&a, 20000, true);
     CHECK_EQUAL(a.sim.instrument.engine.open, true);
     stream(&a, EITS_STREAM_RAW, 0);
     for (uint32_t i = 0; i < ROWS; ++i)
-        given[i] = 1e3f * volts[i] + 1e-7f;
+        given[2 * i] = 1e3f * volts[i] + 1e-7f;
     sim_give_frame(&a.sim, given, 21000, 22000);
-    given[3] = INFINITY;
+    given[2 * 3] = INFINITY;
     sim_give_frame(&a.sim, given, 23000, 22000);
     collect(&a);
     CHECK_EQUAL(a.raws, 2);
     CHECK_EQUAL(a.head.time_us, 44000);
     CHECK_EQUAL(a.sim.instrument.settings.frame_period_us, 22000);
     for (uint32_t i = 0; i < ROWS; ++i)
-        CHECK(i == 3 ? isnan(a.raw[i]) : fabsf(a.raw[i]) == fabsf(given[i]));
+        CHECK(i == 3 ? isnan(a.raw[i]) : fabsf(a.raw[i]) == fabsf(given[2 * i]));
     const uint32_t stalled = 1u << EITS_FAULT_SCAN_STALLED;
     sim_let_pass(&a.sim, 1000000);
     CHECK((a.sim.instrument.faults.raised & stalled) != 0);

@@ -399,7 +399,7 @@ bool sim_scan_frame(sim_board *sim)
     return true;
 }
 
-void sim_give_frame(sim_board *sim, const float *volts, uint32_t passed_us, uint32_t period_us)
+void sim_give_frame(sim_board *sim, const float *iq, uint32_t passed_us, uint32_t period_us)
 {
     fw_instrument *instrument = &sim->instrument;
     fw_scan *scan = &instrument->scan;
@@ -417,8 +417,8 @@ void sim_give_frame(sim_board *sim, const float *volts, uint32_t passed_us, uint
                         .volts = frame->volts,
                         .quality = frame->quality};
     for (uint32_t i = 0; i < instrument->engine.model.n_rows; ++i) {
-        const bool usable = isfinite(volts[i]);
-        frame->z[i] = (fw_iq){usable ? volts[i] : 0, 0};
+        const bool usable = isfinite(iq[2 * i]) && isfinite(iq[2 * i + 1]);
+        frame->z[i] = usable ? (fw_iq){iq[2 * i], iq[2 * i + 1]} : (fw_iq){0, 0};
         frame->quality[i] = usable ? 0 : EITS_QUALITY_UNSETTLED;
     }
     ++scan->bursts;

@@ -113,10 +113,11 @@ bool sim_scene_over(const sim_board *sim);
  * a scan would show has not been put before the board: put it, and call again. */
 bool sim_scan_frame(sim_board *sim);
 
-/* Where frames are given: the application gets one, n_rows volts of the model's protocol, as they
- * are but for those that are not finite, which it cannot use. The frame began passed_us after the
- * last one, and frames come about period_us apart. Nothing where there is no model. */
-void sim_give_frame(sim_board *sim, const float *volts, uint32_t passed_us, uint32_t period_us);
+/* Where frames are given: the application gets one, 2 n_rows volts in and out of phase of the
+ * model's protocol, as they are but for rows that are not finite, which it cannot use. The frame
+ * began passed_us after the last one, and frames come about period_us apart. Nothing where there is
+ * no model. */
+void sim_give_frame(sim_board *sim, const float *iq, uint32_t passed_us, uint32_t period_us);
 
 /* Where frames are given: none has come for passed_us more, and the application may miss them. */
 void sim_let_pass(sim_board *sim, uint32_t passed_us);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import copy
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,13 @@ from typing import TYPE_CHECKING
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import DEVICE_HELP
-from eitskin.cli.import_options import add_import_options, floats, read_options, read_protocol
+from eitskin.cli.import_options import (
+    add_import_options,
+    floats,
+    read_options,
+    read_protocol,
+    write_layout,
+)
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -75,7 +82,18 @@ def run(options: argparse.Namespace) -> int:
     if options.touch:
         subject = _with_touches(subject, options.touch, options.touch_in)
     report, case = examine_case(subject)
+    if options.save_layout is not None:
+        repaired = _repaired(options, report.repair)
+        named = read_options(repaired)
+        write_layout(options.save_layout, options.source, named, read_protocol(repaired)[0])
     return _tell(options, report, case)
+
+
+def _repaired(options: argparse.Namespace, repair: str) -> argparse.Namespace:
+    """``options`` with those of the doctor's advice ``repair``, as  eitskin import  takes them."""
+    parser = argparse.ArgumentParser()
+    add_import_options(parser)
+    return parser.parse_args(repair.split(), argparse.Namespace(**copy.deepcopy(vars(options))))
 
 
 def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:

@@ -9,7 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.import_options import add_import_options, read_options, read_protocol
+from eitskin.cli.import_options import (
+    add_import_options,
+    read_options,
+    read_protocol,
+    write_layout,
+)
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -32,11 +37,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(options: argparse.Namespace) -> int:
     """Read, repair, write."""
+    from eitskin.fileio import refuse_unwritable
     from eitskin.frames.frames import save_frames
     from eitskin.frames.importer import import_frames
 
+    refuse_unwritable(options.output, options.save_layout)
     protocol, skin, n_electrodes = read_protocol(options)
-    frames = import_frames(options.source, read_options(options), protocol, skin, n_electrodes)
+    named = read_options(options)
+    frames = import_frames(options.source, named, protocol, skin, n_electrodes)
+    if options.save_layout is not None:
+        write_layout(options.save_layout, options.source, named, protocol)
     save_frames(options.output, frames)
     said: dict[str, Any] = {
         "written": str(options.output),

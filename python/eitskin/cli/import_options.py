@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
     from eitskin.frames.importer import ImportOptions
+    from eitskin.frames.layout import Layout
     from eitskin.skin.protocol import Protocol
     from eitskin.skin.skin import Skin
 
@@ -21,6 +22,9 @@ ORDERS = ("fixed", "rotating", "fixed-all", "rotating-all", "table")
 
 def add_import_options(parser: argparse.ArgumentParser) -> None:
     """Add all of them to ``parser``; defaults change nothing."""
+    known = parser.add_argument_group("a layout: all of these in a file")
+    option(known, "--layout FILE", "how lines are frames (TOML); other options go before it", Path)
+    option(known, "--save-layout FILE", "write that, for import and text: boards", Path)
     _add_protocol(parser.add_argument_group("protocol: the order of the result"))
     _add_place(parser.add_argument_group("where the frames are in the source"))
     _add_repairs(parser.add_argument_group("what differs in the source, and what to repair"))
@@ -46,6 +50,15 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
         )
     if options.skip is not None and options.protocol != "skip":
         raise UsageError("--skip goes with --protocol skip")
+    layout = read_layout(options)
+    if layout is not None and layout.protocol is not None and options.protocol is None:
+        if protocol is None:
+            protocol, count = layout.protocol, layout.protocol.n_electrodes
+        if count != layout.protocol.n_electrodes:
+            raise UsageError(
+                f"{options.layout} is of {layout.protocol.n_electrodes} electrodes, not of {count};"
+                " leave --skin and --electrodes out, or take another layout"
+            )
     if options.protocol is None or options.protocol == "table":
         return protocol, skin, count
     if count is None:
@@ -70,7 +83,9 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
     from eitskin.frames.truth import TruthOptions
 
     named = vars(options)
-    source = SourceOptions(**{f.name: named[f.name] for f in fields(SourceOptions)})
+    # what no option names (comments) is at its default
+    said = {f.name: named[f.name] for f in fields(SourceOptions) if f.name in named}
+    source = SourceOptions(**said)
     extent = options.truth_mask_extent
     truth = TruthOptions(
         touch_frame=options.truth_frame,
@@ -87,7 +102,7 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
     own: dict[str, Any] = {name: named[name] for name in same}
     for name in ("flip_channels", "impute_channels", "drop_channels", "drop_electrodes"):
         own[name] = whole_numbers(named[name], f"--{name.replace('_', '-')}")
-    return ImportOptions(
+    given = ImportOptions(
         source=source,
         truth=truth,
         keep_table=options.protocol == "table",
@@ -96,6 +111,45 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
         swaps=tuple(_pair(text) for text in options.swap),
         **own,
     )
+    layout = read_layout(options)
+    if layout is None:
+        return given
+    source = _over(layout.options.source, given.source)
+    merged: ImportOptions = _over(layout.options, given)
+    return replace(merged, source=source, truth=truth)
+
+
+def read_layout(options: argparse.Namespace) -> Layout | None:
+    """The layout that ``--layout`` names; None without it.
+
+    Raises:
+        EitskinError: it cannot be read.
+    """
+    from eitskin.frames.layout import load_layout
+
+    return None if options.layout is None else load_layout(options.layout)
+
+
+def write_layout(path: Path, source: Path, named: ImportOptions, protocol: Protocol | None) -> None:
+    """Write how ``source`` is read by the options ``named`` as a layout.
+
+    Raises:
+        EitskinError: the source is no text with frames in rows, or it cannot be written.
+    """
+    from eitskin.frames.importer import accepted_counts
+    from eitskin.frames.layout import layout_of, save_layout
+    from eitskin.frames.source import read_source
+
+    raw = read_source(source, named.source, *accepted_counts(named, protocol))
+    save_layout(path, layout_of(raw, named, protocol, str(source)))
+
+
+def _over(base: Any, given: Any) -> Any:
+    """``base`` with what of ``given`` is not at its default."""
+    default = type(given)()
+    pairs = ((f.name, getattr(given, f.name)) for f in fields(given))
+    named = {name: value for name, value in pairs if value != getattr(default, name)}
+    return replace(base, **named)
 
 
 def whole_numbers(text: str | None, option: str) -> tuple[int, ...]:

@@ -121,10 +121,11 @@ class GivenBoard(HostBoard):
         super().__init__(name, serial, banks, period_us=period_us, frames_given=True)
 
     def give(self, voltage_v: Any, passed_us: int, period_us: int) -> None:
-        """One frame, in the rows of the model in use; NaN is a row that cannot be used. It began
-        ``passed_us`` after the last one, and they come about every ``period_us``."""
-        volts = np.ascontiguousarray(voltage_v, dtype=np.float32)
-        self._lib.sim_give_frame(self._sim, self._pointer(volts, "float *"), passed_us, period_us)
+        """One frame (m,), real or complex, in the rows of the model in use; NaN is a row that
+        cannot be used. It began ``passed_us`` after the last one, and they come about every
+        ``period_us``."""
+        iq = np.ascontiguousarray(voltage_v, dtype=np.complex64).view(np.float32)
+        self._lib.sim_give_frame(self._sim, self._pointer(iq, "float *"), passed_us, period_us)
 
     def let_pass(self, passed_us: int) -> None:
         """No frame has come for ``passed_us`` more."""

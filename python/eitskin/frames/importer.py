@@ -19,12 +19,12 @@ from eitskin import __version__
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.frames.frames import Frames, load_frames
 from eitskin.frames.homogeneous import homogeneous
-from eitskin.frames.orders import electrode_map, match_rows, relabel, source_table, swap_map
+from eitskin.frames.orders import match_rows, relabel, source_table, swap_map
+from eitskin.frames.placement import source_rows
 from eitskin.frames.repair import equalising_gains, flipped, imputed, kept_channels, signed
 from eitskin.frames.source import (
     RawFrames,
     SourceOptions,
-    electrode_table,
     is_frames_file,
     read_source,
     refuse_nonfinite,
@@ -44,13 +44,13 @@ ASSUMED_QUIET = "no quiet frames were named; the first frame is taken for one"
 class ImportOptions:
     """How to repair a source; the defaults change nothing.
 
-    ``order``: of ORDERS, or "table" with ``table_file`` (text, four columns). ``keep_table``: keep
-    the source's own table. ``sign``: "reversed" negates, "magnitude" takes each channel's sign from
-    the homogeneous prediction. ``rotate``, ``mirror``: our number of source electrode 0, and
-    whether counting then goes down. ``clockwise``: the source counts clockwise, so mirror if the
-    skin does not. ``swaps``: pairs of our electrodes whose wires were exchanged. ``flip_channels``,
-    ``impute_channels``, ``drop_channels``: channels of the protocol's order to negate, to fill from
-    their reciprocals, and to leave out; ``drop_electrodes``: every channel that uses them.
+    ``order``: of ORDERS, or "table" with ``table_file`` (text, four columns) or ``table`` (rows
+    from 0). ``keep_table``: keep the source's own table. ``sign``: "reversed" negates, "magnitude"
+    takes each channel's sign from the homogeneous prediction. ``rotate``, ``mirror``: our number of
+    source electrode 0, and whether counting then goes down. ``clockwise``: the source counts
+    clockwise, so mirror if the skin does not. ``swaps``: pairs of our electrodes whose wires were
+    exchanged. ``flip_channels``, ``impute_channels``, ``drop_channels``: channels of the protocol's
+    order to negate, to fill from their reciprocals, and to leave out; ``drop_electrodes``: every channel that uses them.
     ``equalise``: give each channel the gain that makes the reference the homogeneous prediction.
     ``current_a``: instead of the protocol's.
     """
@@ -58,6 +58,7 @@ class ImportOptions:
     source: SourceOptions = field(default_factory=SourceOptions)
     order: str = "fixed"
     table_file: str | None = None
+    table: tuple[tuple[int, int, int, int], ...] | None = None
     keep_table: bool = False
     sign: str = "signed"
     rotate: int = 0
@@ -192,6 +193,8 @@ def accepted_counts(
     """
     if options.source.protocol_table is not None:
         return (), "its table"
+    if options.table is not None:
+        return (len(options.table),), "the layout's table"
     if options.table_file is not None:
         rows = read_table(options.table_file).cells
         return (len(rows),), f"the table {options.table_file}"
@@ -223,32 +226,7 @@ def _placed(
 ) -> tuple[IntArray, IntArray, IntArray]:
     """The result's rows (m, 4), and where each comes from: source index and sign (m,)."""
     n = _count(protocol, n_electrodes)
-    given = raw.table
-    if options.table_file is not None:
-        text = read_table(options.table_file)
-        if text.n_columns != 4:
-            raise FrameError(
-                f"{options.table_file}: has {text.n_columns} columns; a table has four: I+, I-,"
-                " V+, V-"
-            )
-        given = electrode_table(
-            text.numbers(range(4)), options.source.table_base, options.table_file
-        )
-    if given is None:
-        if protocol is None:
-            raise UsageError(
-                "say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table"
-            )
-        given = source_table(options.order, protocol)
-    elif given.min(initial=0) < 0 or given.max(initial=0) >= n:
-        raise FrameError(
-            f"{where}: the table names electrodes {given.min()} to {given.max()}, but they are 0 to"
-            f" {n - 1}; if it counts from 1 say --table-base 1"
-        )
-    flipped = options.mirror or (
-        options.clockwise and not (skin is not None and skin.electrodes.clockwise)
-    )
-    ours = relabel(given, electrode_map(n, options.rotate, flipped))
+    ours = source_rows(options, raw.table, protocol, skin, n, where)
     if protocol is None or options.keep_table:
         return ours, np.arange(len(ours)), np.ones(len(ours), dtype=np.int64)
     wanted = np.asarray(protocol.drive_measure, dtype=np.int64)

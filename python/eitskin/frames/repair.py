@@ -39,7 +39,7 @@ def flipped(values: FloatArray, channels: Sequence[int]) -> FloatArray:
     Raises:
         UsageError: a channel is out of range.
     """
-    _check_range(channels, values.shape[1], "--flip-channels")
+    check_range(channels, values.shape[1], "--flip-channels")
     sign = np.ones(values.shape[1])
     sign[list(channels)] = -1.0
     return values * sign
@@ -67,8 +67,8 @@ def kept_channels(
     Raises:
         UsageError: a number is out of range, or nothing stays.
     """
-    _check_range(drop_electrodes, n_electrodes, "--drop-electrodes")
-    _check_range(drop_channels, len(rows), "--drop-channels")
+    check_range(drop_electrodes, n_electrodes, "--drop-electrodes")
+    check_range(drop_channels, len(rows), "--drop-channels")
     keep = ~touching(rows, drop_electrodes)
     keep[list(drop_channels)] = False
     if not keep.any():
@@ -84,7 +84,7 @@ def imputed(
     Raises:
         UsageError: a channel is out of range, or its reciprocal is absent or to be replaced, too.
     """
-    _check_range(channels, len(rows), "--impute-channels")
+    check_range(channels, len(rows), "--impute-channels")
     if not channels:
         return values
     filled, partner = values.copy(), partners(rows, n_electrodes)
@@ -117,7 +117,12 @@ def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArra
     return np.asarray(1 / relative)
 
 
-def _check_range(numbers: Iterable[int], count: int, option: str) -> None:
+def check_range(numbers: Iterable[int], count: int, option: str) -> None:
+    """Refuse ``numbers`` that are not 0 to ``count`` - 1.
+
+    Raises:
+        UsageError: naming the first, and ``option``.
+    """
     for number in numbers:
         if not 0 <= number < count:
             raise UsageError(f"{option} {number}: out of range; there are 0 to {count - 1}")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.arrays import listing, pick, read_arrays
 from eitskin.frames.frames import FORMAT, read_npz
-from eitskin.frames.lines import LineFormat
+from eitskin.frames.lines import COMMENT, LineFormat
 from eitskin.frames.pairs import PAIRS, Paired, all_magnitudes, paired, refuse_parts, to_complex
 from eitskin.frames.tables import TextTable, chosen, read_table
 
@@ -37,7 +37,8 @@ class SourceOptions:
     ``reference_frames`` chooses quiet frames among the frames. ``scale`` turns the source's numbers
     into volts (None: unknown, taken as 1). ``frames_in`` says which side of a table frames are.
     ``complex_part``: what to keep of complex numbers; in text, columns then come in ``pairs``, one
-    of PAIRS (None: as the header says). ``delimiter``, ``label`` as in ``lines.LineFormat``.
+    of PAIRS (None: as the header says). ``delimiter``, ``label``, ``comment`` as in
+    ``lines.LineFormat``; ``cells``: of each line, where that is known.
     """
 
     voltage: str | None = None
@@ -58,6 +59,8 @@ class SourceOptions:
     skip_bad_lines: bool = False
     pairs: str | None = None
     time_scale: float = 1.0
+    comment: tuple[str, ...] = COMMENT
+    cells: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +199,8 @@ def _from_text(
         options.header_rows,
         options.label,
         skip_bad_lines=options.skip_bad_lines,
+        comment=options.comment,
+        cells=options.cells,
     )
     quiet = _columns(table, options.reference_columns, "--reference-columns")
     time = _columns(table, options.time, "--time")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 from eitskin.errors import FrameError, UsageError
 from eitskin.fileio import read_bytes
-from eitskin.frames.lines import DELIMITERS, LineFormat, LineReader, Row, own_labels, parse_cell
+from eitskin.frames.lines import (
+    COMMENT,
+    DELIMITERS,
+    LineFormat,
+    LineReader,
+    Row,
+    own_labels,
+    parse_cell,
+)
 
 MAX_BYTES = 1_000_000_000
 SNIFFED_LINES = 50
@@ -70,6 +78,8 @@ def read_table(
     label: str | None = None,
     *,
     skip_bad_lines: bool = False,
+    comment: tuple[str, ...] = COMMENT,
+    cells: int | None = None,
 ) -> TextTable:
     """Read a text table. ``delimiter`` and ``label`` as in ``LineFormat``; None finds them, as it
     does ``header_rows``. ``skip_bad_lines`` leaves lines of another length than most out.
@@ -85,7 +95,8 @@ def read_table(
     if b"\0" in content[:4096]:
         raise FrameError(f"{path}: not a text table (it holds zero bytes); save it as CSV in UTF-8")
     lines = list(enumerate(decoded(content).splitlines(), 1))
-    form = _found_form([line for _, line in lines], delimiter, label, str(path))
+    given = LineFormat("comma" if delimiter is None else delimiter, label, comment)
+    form = _found_form([line for _, line in lines], delimiter is None, given, str(path))
     reader = LineReader(form)
     rows = [row for number, line in lines for row in reader.feed(number, line)] + reader.finish()
     if not rows:
@@ -101,13 +112,14 @@ def read_table(
             f"{path}: no rows of numbers after {skip} header row(s); check the delimiter"
         )
     if skip_bad_lines:
-        body = _even(body, notes)
-    width = len(body[0].cells)
+        body = _even(body, cells, notes)
+    width = len(body[0].cells) if cells is None else cells
     for row in body:
         if len(row.cells) != width:
             raise FrameError(
-                f"{path}: line {row.line} has {len(row.cells)} cells, line {body[0].line} has"
-                f" {width}; repair it, or leave such lines out with --skip-bad-lines"
+                f"{path}: line {row.line} has {len(row.cells)} cells,"
+                f" {f'line {body[0].line} has' if cells is None else 'the layout says'} {width};"
+                " repair it, or leave such lines out with --skip-bad-lines"
             )
     names = rows[skip - 1].cells if skip else ()
     if len(names) == width + 1 and not names[-1]:
@@ -132,23 +144,22 @@ def decoded(content: bytes) -> str:
 
 
 def _found_form(
-    lines: Sequence[str], delimiter: str | None, label: str | None, where: str
+    lines: Sequence[str], find_delimiter: bool, form: LineFormat, where: str
 ) -> LineFormat:
-    """The form of ``lines``; what is None is found."""
-    plain = LineFormat("comma" if delimiter is None else delimiter)
-    lines = [line for line in lines if not plain.passed_over(line)]
-    if label is None and (found := own_labels(lines)):
+    """``form``, with what of the lines was not named found in them."""
+    lines = [line for line in lines if not form.passed_over(line)]
+    if form.label is None and (found := own_labels(lines)):
         if len(found) > 1:
             counted = ", ".join(f"{name!r} ({count})" for name, count in found.items())
             raise UsageError(
                 f"{where}: lines begin with {_cut(counted)}; say with --label which are the frames"
             )
-        label = next(iter(found))
-    if label is not None:
-        lines = [
-            rest for line in lines if (rest := LineFormat(plain.delimiter, label).labelled(line))
-        ]
-    return LineFormat(_sniffed(lines) if delimiter is None else delimiter, label)
+        form = replace(form, label=next(iter(found)))
+    if not find_delimiter:
+        return form
+    if form.label is not None:
+        lines = [rest for line in lines if (rest := form.labelled(line))]
+    return replace(form, delimiter=_sniffed(lines))
 
 
 def _without_ends(rows: list[Row]) -> list[Row]:
@@ -158,16 +169,19 @@ def _without_ends(rows: list[Row]) -> list[Row]:
     return rows
 
 
-def _even(rows: list[Row], notes: list[str]) -> list[Row]:
-    """The rows of the length that most have; what is left out is noted."""
-    width = Counter(len(row.cells) for row in rows).most_common(1)[0][0]
+def _even(rows: list[Row], cells: int | None, notes: list[str]) -> list[Row]:
+    """The rows of ``cells``, or of the length that most have; what is left out is noted."""
+    width = cells or Counter(len(row.cells) for row in rows).most_common(1)[0][0]
     bad = [row for row in rows if len(row.cells) != width]
     if bad:
         notes.append(
             f"{len(bad)} lines left out that have not {width} cells, first line {bad[0].line} with"
             f" {len(bad[0].cells)}"
         )
-    return [row for row in rows if len(row.cells) == width]
+    left = [row for row in rows if len(row.cells) == width]
+    if not left:
+        raise FrameError(f"no line has {width} cells; line {bad[0].line} has {len(bad[0].cells)}")
+    return left
 
 
 def chosen(spec: str, count: int, names: Sequence[str], option: str) -> tuple[int, ...]:
