@@ -56,7 +56,8 @@ void fw_open_newest(fw_instrument *instrument)
     const fw_scan_table table = fw_engine_table(&instrument->engine);
     const uint64_t min_us =
         (uint64_t)fw_scan_rows(&instrument->settings, &table) * fw_slot_us(&instrument->settings);
-    if (instrument->engine.open && instrument->settings.frame_period_us < min_us)
+    if (instrument->engine.open && !instrument->board->frames_given &&
+        instrument->settings.frame_period_us < min_us)
         instrument->settings.frame_period_us = 0; /* it was for a shorter table */
     fw_report_no_model(instrument);
 }

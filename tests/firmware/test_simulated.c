@@ -134,8 +134,10 @@ static void test_frames_in_order(void)
         CHECK_EQUAL(scan(&a), k % UNTOUCHED);
     const eits_command_tare tare = {.request = 77, .frames = 4};
     send(&a, EITS_PACKET_TARE, &tare, sizeof tare);
+    CHECK(sim_tares(&a.sim));
     for (int k = 0; k < 4; ++k)
         CHECK_EQUAL(scan(&a), k); /* from the first again */
+    CHECK(!sim_tares(&a.sim));
     const uint32_t last_us = a.head.time_us;
     sim_begin_scene(&a.sim);
     for (int k = 0; k < FRAMES; ++k) {

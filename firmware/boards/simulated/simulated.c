@@ -354,6 +354,11 @@ bool sim_wants_frame(const sim_board *sim)
            (instrument->tare.active || instrument->stream.what != 0);
 }
 
+bool sim_tares(const sim_board *sim)
+{
+    return sim->instrument.tare.active;
+}
+
 const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc)
 {
     const fw_instrument *instrument = &sim->instrument;

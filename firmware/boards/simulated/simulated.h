@@ -87,6 +87,7 @@ size_t sim_read(sim_board *sim, uint8_t *bytes, size_t room);
 
 /* Whether the board scans for someone: a stream or a tare waits for frames. */
 bool sim_wants_frame(const sim_board *sim);
+bool sim_tares(const sim_board *sim); /* a tare does */
 
 /* The model that is open, its length and CRC-32; NULL where there is none. */
 const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc);

@@ -65,23 +65,31 @@ def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
         facts["protocol"] = f"{info.protocol_hash:016x}: {rows}"
     else:
         facts["model"] = "none; upload one with  eitskin model upload MODEL.eitm"
-    facts["excitation"] = f"{info.excitation_millihz / 1e3:.3f} Hz"
-    facts["sampling"] = (
-        f"{info.samples} samples at {info.sample_rate_hz} a second, {info.settle_us} us after"
-        " switching"
-    )
-    facts["scan"] = f"{_rows(info)}; {info.slot_us} us a row, {info.frame_us / 1e3:.2f} ms a frame"
+    facts |= _scan(info)
     facts["reference"] = (
         "taken" if info.tared else "none; leave the skin untouched and run  eitskin tare"
     )
     step_uv = info.volts_per_code_nv / 1e3
     facts["converter"] = (
-        f"{step_uv:.1f} uV a step at the electrodes" if step_uv else "none (simulated)"
+        f"{step_uv:.1f} uV a step at the electrodes"
+        if step_uv
+        else ("another instrument's" if info.frames_given else "none (simulated)")
     )
     facts["faults"] = (
         ", ".join(code.name.lower().replace("_", " ") for code in info.fault_codes) or "none"
     )
     return facts
+
+
+def _scan(info: BoardInfo) -> dict[str, str]:
+    if info.frames_given:
+        return {"scan": f"another instrument's; {info.frame_us / 1e3:.2f} ms a frame"}
+    sampling = f"{info.samples} samples at {info.sample_rate_hz} a second"
+    return {
+        "excitation": f"{info.excitation_millihz / 1e3:.3f} Hz",
+        "sampling": f"{sampling}, {info.settle_us} us after switching",
+        "scan": f"{_rows(info)}; {info.slot_us} us a row, {info.frame_us / 1e3:.2f} ms a frame",
+    }
 
 
 def _rows(info: BoardInfo) -> str:

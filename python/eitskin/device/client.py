@@ -15,7 +15,7 @@ from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo, BoardStats
-from eitskin.errors import UsageError
+from eitskin.errors import DeviceError, UsageError
 
 TARE_FRAMES = 16
 
@@ -75,6 +75,11 @@ class Device(CommandExchange):
             DeviceError: the board cannot do it; it keeps what it had.
         """
         now = self.board
+        if now.frames_given:
+            raise DeviceError(
+                f"{self.transport.name}: its frames are another instrument's, whose scan cannot be"
+                " set from here; leave the options of the scan out"
+            )
         command = commands.Scan(
             excitation_millihz=(
                 _asked_millihz(now) if excitation_hz is None else round(1000 * excitation_hz)

@@ -81,6 +81,8 @@ class Events:
 
 def link_text(event: LinkEvent) -> str:
     """An event of the link in a line."""
+    if event.kind == "skipped":
+        return f"lines: {event.text}"
     counted = f" ({event.missing} packets)" if event.missing else ""
     return f"link: {event.kind}{counted}" + (f": {event.text}" if event.text else "")
 

@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from eitskin.device.transport import Transport
 from eitskin.device.wire.codec import Decoder, LinkCounters, Packet, encode
@@ -23,12 +23,21 @@ READ_S = 0.1
 class LinkEvent:
     """Something happened to the link itself. ``kind``: "gap" (``missing`` packets by their numbers,
     at least), "dropped" (``missing`` left out of the host's queue), "unplugged", "reconnected",
-    "restarted" (the board restarted).
+    "restarted" (the board restarted), "skipped" (``missing`` lines of another instrument were no
+    frames; without a text it is only counted).
     """
 
     kind: str
     missing: int = 0
     text: str = ""
+
+
+@runtime_checkable
+class Telling(Protocol):
+    """A transport that has events of its own."""
+
+    def take_events(self) -> list[LinkEvent]:
+        """Those since the last call."""
 
 
 Tap = Callable[[Packet], None]
@@ -84,6 +93,7 @@ class PumpedLink:
         self._taps: list[Tap] = []
         self._last = 0
         self._ready: deque[Packet] = deque()
+        self._events: deque[LinkEvent] = deque()
         self._sequence = 0
 
     def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
@@ -95,9 +105,17 @@ class PumpedLink:
     def end_tap(self, tap: Tap) -> None:
         self._taps = [one for one in self._taps if one != tap]
 
+    def _news(self) -> bool:
+        self._events.extend(_told(self.transport, self.counters))
+        return bool(self._events)
+
     def next(self, timeout_s: float) -> Packet | LinkEvent | None:
+        if self._events:
+            return self._events.popleft()
         while not self._ready:
             data = self.transport.read(timeout_s)
+            if self._news():
+                return self._events.popleft()
             if not data:
                 return None
             for packet in self.decoder.feed(data):
@@ -122,6 +140,15 @@ class PumpedLink:
 
     def close(self) -> None:
         self.transport.close()
+
+
+def _told(transport: Transport, counters: LinkCounters) -> list[LinkEvent]:
+    """What the transport itself has to tell, counted."""
+    if not isinstance(transport, Telling):
+        return []
+    events = transport.take_events()
+    counters.lines_skipped += sum(event.missing for event in events if event.kind == "skipped")
+    return [event for event in events if event.text]
 
 
 @dataclass(frozen=True)
@@ -199,7 +226,7 @@ class ThreadedLink:
 
     @property
     def ended(self) -> bool:
-        return False
+        return self.transport.ended and not self._queue
 
     @property
     def away(self) -> bool:
@@ -214,6 +241,8 @@ class ThreadedLink:
         while not self._stopping.is_set():
             try:
                 data = self.transport.read(READ_S)
+                for event in _told(self.transport, self.counters):
+                    self._event(event)
                 if data:
                     self._put(self.decoder.feed(data))
             except DeviceError as error:

@@ -120,6 +120,8 @@ class LiveSummary:
             " packets missing)"
         )
         text += f", {link.get('dropped', 0)} dropped here"
+        if link.get("lines_skipped"):
+            text += f", {link['lines_skipped']} lines skipped"
         if self.board is not None:
             text += f", {self.board.packets_dropped} dropped by the board"
         lines = [text]

@@ -1,5 +1,6 @@
-"""Devices are URLs: auto, serial:PORT, sim:SCENE, emu:SCENE, file:RUN.eits. The same frames,
-commands and errors behind each. After the last three, ``?speed=1&loop=1`` (``timing``)."""
+"""Devices are URLs: auto, serial:PORT, sim:SCENE, emu:SCENE, file:RUN.eits, text:PORT?layout=FILE,
+and what packages bring (``source``). The same frames, commands and errors behind each. After sim:,
+emu: and file: ``?speed=1&loop=1`` (``timing``)."""
 
 from __future__ import annotations
 
@@ -11,11 +12,12 @@ from eitskin.device.check import check_model
 from eitskin.device.client import Device
 from eitskin.device.link import Reconnect
 from eitskin.device.ports import BAUD, Port, SerialTransport, only_board, ports
+from eitskin.device.source import open_source, source_schemes
 from eitskin.device.timing import split_timing
 from eitskin.device.transport import Transport
 from eitskin.errors import UsageError
 
-SCHEMES = ("auto", "serial", "sim", "emu", "file")
+SCHEMES = ("auto", "serial", "sim", "emu", "file", "text")
 MAX_BAUD = 20_000_000
 
 
@@ -59,12 +61,14 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
     """The bare bytes behind ``url``; raises as ``open_device``."""
     bare, timing = split_timing(url)
     scheme, colon, rest = bare.partition(":")
-    if scheme not in SCHEMES or (scheme == "auto") == bool(colon):
+    brought = scheme not in SCHEMES and scheme in source_schemes()
+    if (scheme not in SCHEMES and not brought) or (scheme == "auto") == bool(colon):
         if scheme.startswith("/") or scheme.upper().startswith("COM"):
             raise UsageError(f"device {url!r}: write  serial:{url}")
         raise UsageError(
-            f"device {url!r}: {nearest(scheme, SCHEMES)}, as in auto, serial:/dev/ttyACM0,"
-            " sim:two_touch, emu:two_touch, file:RUN.eits"
+            f"device {url!r}: {nearest(scheme, (*SCHEMES, *source_schemes()))}, as in auto,"
+            " serial:/dev/ttyACM0, sim:two_touch, emu:two_touch, file:RUN.eits,"
+            " text:/dev/ttyACM0?layout=FILE"
         )
     if scheme == "auto":
         return SerialTransport(only_board().path)
@@ -73,6 +77,12 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
             f"device {url!r}: something must follow the colon, as in serial:/dev/ttyACM0 or"
             " sim:two_touch"
         )
+    if scheme == "text":
+        from eitskin.device.text_source import open_text
+
+        return open_text(url, model=model)
+    if brought:
+        return open_source(url, model=model)
     if scheme == "serial":
         return SerialTransport(*_path_and_baud(url, rest))
     if scheme == "sim":

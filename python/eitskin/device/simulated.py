@@ -127,6 +127,11 @@ class GivenBoard(HostBoard):
         iq = np.ascontiguousarray(voltage_v, dtype=np.complex64).view(np.float32)
         self._lib.sim_give_frame(self._sim, self._pointer(iq, "float *"), passed_us, period_us)
 
+    @property
+    def tares(self) -> bool:
+        """Whether a tare waits for frames."""
+        return bool(self._lib.sim_tares(self._sim))
+
     def let_pass(self, passed_us: int) -> None:
         """No frame has come for ``passed_us`` more."""
         self._lib.sim_let_pass(self._sim, passed_us)

@@ -50,7 +50,8 @@ class ImportOptions:
     source electrode 0, and whether counting then goes down. ``clockwise``: the source counts
     clockwise, so mirror if the skin does not. ``swaps``: pairs of our electrodes whose wires were
     exchanged. ``flip_channels``, ``impute_channels``, ``drop_channels``: channels of the protocol's
-    order to negate, to fill from their reciprocals, and to leave out; ``drop_electrodes``: every channel that uses them.
+    order to negate, to fill from their reciprocals, and to leave out; ``drop_electrodes``: every
+    channel that uses them.
     ``equalise``: give each channel the gain that makes the reference the homogeneous prediction.
     ``current_a``: instead of the protocol's.
     """

@@ -33,7 +33,8 @@ class LinkCounters:
     ``skipped_bytes`` came before the first delimiter, ``malformed`` had a right checksum but a
     payload that is not of its type, ``missing`` packets lie in ``gaps`` gaps (as far as numbers
     tell), ``duplicates`` and ``stale`` (late) packets were refused, ``dropped`` were left out by
-    the host's own queue because nobody fetched them.
+    the host's own queue because nobody fetched them, ``lines_skipped`` of another instrument were
+    no frames.
     """
 
     bytes: int = 0
@@ -51,6 +52,7 @@ class LinkCounters:
     restarts: int = 0
     reconnects: int = 0
     dropped: int = 0
+    lines_skipped: int = 0
 
     def as_dict(self) -> dict[str, int]:
         """For JSON."""

@@ -50,6 +50,11 @@ class BoardInfo(InfoPacket):
         return self.model_bytes > 0
 
     @property
+    def frames_given(self) -> bool:
+        """Its frames are another instrument's, of whose scan nothing is known."""
+        return self.slot_us == 0
+
+    @property
     def measured_rows(self) -> int:
         """Measurements in a frame that is no check: all rows, or only one of each reciprocal
         pair."""

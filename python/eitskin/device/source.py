@@ -1,0 +1,278 @@
+"""Frames of another instrument behind the board's own application: what a source is, and the
+transport that feeds its frames to the application, so that tare, stream, record and all else are
+the same as of a board.
+
+A source of your own is a class with ``read``; the entry point group ``eitskin.sources`` gives it a
+scheme (docs/guide/your-board.md).
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import zlib
+from collections import deque
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Any
+
+from numpy.typing import NDArray
+
+from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
+from eitskin.device.link import LinkEvent
+from eitskin.device.simulated import GivenBoard
+from eitskin.device.transport import Transport
+from eitskin.errors import EitskinError, FrameError, UsageError
+from eitskin.model.model import Model
+
+GROUP = "eitskin.sources"
+POLL_S = 0.02
+PERIOD_US = 20_000  # where nothing else is known
+MAX_GAP_S = 60.0
+SILENT_S, SILENT_PERIODS = 1.0, 4  # until it is a fault that no frame comes
+PERIODS = 16  # whose mean is told
+
+
+@dataclass(frozen=True, eq=False)
+class GivenFrame:
+    """A frame: ``voltage_v`` (m,), real or complex, in the model's rows, NaN where a row cannot be
+    used; ``time_s`` by the instrument's clock, where it tells; ``came_s``: when it came, by
+    ``time.monotonic``, where that is not now."""
+
+    voltage_v: NDArray[Any]
+    time_s: float | None = None
+    came_s: float | None = None
+
+
+class Source:
+    """Frames of an instrument; a source of your own is a subclass with ``read``.
+
+    Attributes:
+        name: in messages and in INFO, where 15 characters of it are shown.
+        synchronous: frames come whenever they are asked for, as from a file.
+        keeps: what nobody wants yet waits, as in a pipe; else it is gone.
+        ended: no frame will come again.
+        period_s: from frame to frame, where it is known.
+    """
+
+    name = "source"
+    synchronous = False
+    keeps = False
+    ended = False
+    period_s: float | None = None
+
+    def use_model(self, model: Model) -> None:
+        """The board uses ``model`` from now on: give frames in its rows.
+
+        Raises:
+            EitskinError: the instrument cannot.
+        """
+
+    def read(self, timeout_s: float) -> list[GivenFrame]:
+        """The frames that have come, after at most ``timeout_s``; at most one of a source that is
+        synchronous or keeps them.
+
+        Raises:
+            DeviceError: the instrument is gone.
+        """
+        raise NotImplementedError
+
+    def take_events(self) -> list[LinkEvent]:
+        """What else is to be told."""
+        return []
+
+    def reopen(self) -> bool:
+        """Try once to find an instrument that is gone again."""
+        return False
+
+    def close(self) -> None:
+        """Let go of it; may be called twice."""
+
+
+class SourceTransport:
+    """The bytes of the application that is given a source's frames. ``model`` goes into its first
+    bank (None: the prebuilt one).
+
+    Raises:
+        EitskinError: the model is none, or the source cannot give its rows.
+    """
+
+    replays = False
+
+    def __init__(self, url: str, source: Source, model: bytes | None = None) -> None:
+        from eitskin.model.prebuilt import load_prebuilt
+
+        self.url, self.source = url, source
+        self._passed: deque[int] = deque(maxlen=PERIODS)
+        blob = load_prebuilt()[1] if model is None else model
+        empty = bytes([ERASED]) * BANK_BYTES
+        serial = f"{zlib.crc32(url.encode()):08X}"
+        short = url.partition(":")[0].encode("ascii", "replace")[:15].decode()
+        self.board = GivenBoard(
+            short, serial, [bank_bytes(blob, 1), empty], period_us=self._period_us()
+        )
+        self._lock = threading.Lock()
+        self._written = threading.Event()
+        self._rows = self._given = 0
+        self._board_s = self._last_s = time.monotonic()  # of the board's clock, of the last frame
+        self._last_time_s: float | None = None
+        try:
+            self._use_model()
+        except BaseException:
+            source.close()
+            raise
+
+    @property
+    def name(self) -> str:
+        return self.source.name
+
+    @property
+    def synchronous(self) -> bool:
+        return self.source.synchronous
+
+    @property
+    def ended(self) -> bool:
+        return self.source.ended
+
+    def read(self, timeout_s: float) -> bytes:
+        with self._lock:
+            output = self.board.take_output()
+            if output or (self.synchronous and not self.board.wanted):
+                return output
+        if self.ended:
+            return self._after_the_end(timeout_s)
+        if self.source.keeps and not self.board.wanted:
+            self._await_command(timeout_s)
+            return self._output()
+        if self.synchronous:
+            while not output and not self.ended and self.board.wanted:
+                self._give(self.source.read(0.0))
+                output = self._output()
+            return output
+        self._give(self.source.read(min(timeout_s, POLL_S)))
+        return self._output()
+
+    def begin(self) -> None:
+        """Give on what has come already, so that the board knows how often frames come."""
+        if not self.synchronous and not self.source.keeps:
+            self._give(self.source.read(0.0))
+
+    def _after_the_end(self, timeout_s: float) -> bytes:
+        """Commands are still answered; a tare fails."""
+        if not self.synchronous:
+            self._await_command(timeout_s)
+        with self._lock:
+            if self.board.tares:
+                self.board.let_pass(round(1e6 * SILENT_S))
+            return self.board.take_output()
+
+    def write(self, data: bytes) -> None:
+        with self._lock:
+            self.board.receive(data)
+        self._written.set()
+
+    def take_events(self) -> list[LinkEvent]:
+        return self.source.take_events()
+
+    def reopen(self) -> bool:
+        return self.source.reopen()
+
+    def begin_scene(self) -> None:
+        """Real skins are touched by real hands."""
+
+    def close(self) -> None:
+        self.source.close()
+
+    def _await_command(self, timeout_s: float) -> None:
+        self._written.wait(timeout_s)
+        self._written.clear()
+
+    def _output(self) -> bytes:
+        with self._lock:
+            return self.board.take_output()
+
+    def _give(self, frames: list[GivenFrame]) -> None:
+        now = time.monotonic()
+        with self._lock:
+            if not frames:
+                self._miss(now)
+                return
+            self._use_model()
+            for frame in frames:
+                if frame.voltage_v.shape != (self._rows,):
+                    raise FrameError(
+                        f"{self.name}: a frame of shape {frame.voltage_v.shape}; the model has"
+                        f" {self._rows} rows"
+                    )
+                came_s = now if frame.came_s is None else frame.came_s
+                passed_us = self._passed_us(frame, came_s)
+                self.board.give(frame.voltage_v, passed_us, self._period_us(passed_us))
+                self._board_s = self._last_s = came_s
+                self._given += 1
+
+    def _use_model(self) -> None:
+        model = self.board.new_model()
+        if model is not None:
+            self.source.use_model(model)
+            self._rows = model.protocol.n_rows
+
+    def _miss(self, now: float) -> None:
+        """The board's clock goes on where frames stay away for long, and it says so."""
+        if self.synchronous:
+            return
+        limit = max(SILENT_S, SILENT_PERIODS * self._period_us() / 1e6)
+        if now - self._last_s > limit and now - self._board_s > SILENT_S:
+            self.board.let_pass(round(1e6 * (now - self._board_s)))
+            self._board_s = now
+
+    def _passed_us(self, frame: GivenFrame, now: float) -> int:
+        """From the frame before, by the instrument's clock where it has one, else by ours."""
+        last, self._last_time_s = self._last_time_s, frame.time_s
+        if frame.time_s is not None and last is not None and 0 < frame.time_s - last < MAX_GAP_S:
+            return round(1e6 * (frame.time_s - last))
+        if self.synchronous or frame.time_s is not None or not self._given:
+            return self._period_us()
+        return max(round(1e6 * (now - self._board_s)), 1)
+
+    def _period_us(self, passed_us: int | None = None) -> int:
+        """The mean time between the last frames, ``passed_us`` the newest."""
+        if self.source.period_s is not None:
+            return max(round(1e6 * self.source.period_s), 1)
+        if passed_us is not None and self._given:
+            self._passed.append(passed_us)
+        return max(round(sum(self._passed) / len(self._passed)), 1) if self._passed else PERIOD_US
+
+
+def source_schemes() -> tuple[str, ...]:
+    """Schemes that installed packages bring."""
+    return tuple(sorted(point.name for point in entry_points(group=GROUP)))
+
+
+def open_source(url: str, *, model: bytes | None = None) -> Transport:
+    """The source behind ``url`` of a scheme that a package brings: what it names is called with
+    what follows the colon, and gives a ``Source`` or a transport.
+
+    Raises:
+        UsageError: it cannot be loaded, fails, or gives something else.
+        EitskinError: as it says itself.
+    """
+    scheme, _, rest = url.partition(":")
+    point = next(iter(entry_points(group=GROUP, name=scheme)))
+    try:
+        made = point.load()(rest)
+    except EitskinError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise UsageError(
+            f"device {url!r}: the source {point.value} failed ({type(error).__name__}: {reason});"
+            " repair it, or leave it to its package's own test"
+        ) from None
+    if isinstance(made, Source):
+        return SourceTransport(url, made, model)
+    if isinstance(made, Transport):
+        return made
+    raise UsageError(
+        f"device {url!r}: {point.value} gives {type(made).__name__}; a source gives"
+        " eitskin.device.source.Source"
+    )

@@ -1,0 +1,225 @@
+"""Where lines come from: a serial port, a file, standard input, a FIFO, a TCP connection."""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import socket
+import stat
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Protocol
+
+from eitskin.device.ports import SerialTransport
+from eitskin.errors import DeviceError, FileError, UsageError
+
+CHUNK = 1 << 16
+CONNECT_S = 5.0
+TCP = "socket://"
+
+
+class LinePort(Protocol):
+    """Bytes of an instrument. ``waits``: they come when the instrument sends, not when they are
+    read. ``keeps``: what is not read yet waits. ``cut``: the first line may be the end of one.
+    ``ended``: nothing will come again."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def waits(self) -> bool: ...
+    @property
+    def keeps(self) -> bool: ...
+    @property
+    def cut(self) -> bool: ...
+    @property
+    def ended(self) -> bool: ...
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has come within ``timeout_s``.
+
+        Raises:
+            DeviceError: the port is gone.
+        """
+
+    def send(self, data: bytes) -> None:
+        """Send ``data`` to the instrument.
+
+        Raises:
+            DeviceError, UsageError: the port is gone, or takes nothing.
+        """
+
+    def reopen(self) -> bool:
+        """Try once to open it again."""
+
+    def close(self) -> None:
+        """Let go of it."""
+
+
+class SerialLines:
+    """A serial port."""
+
+    waits, keeps, cut, ended = True, False, True, False
+
+    def __init__(self, path: str, baud: int) -> None:
+        self._port = SerialTransport(path, baud)
+
+    @property
+    def name(self) -> str:
+        return self._port.name
+
+    def read(self, timeout_s: float) -> bytes:
+        return self._port.read(timeout_s)
+
+    def send(self, data: bytes) -> None:
+        self._port.write(data)
+
+    def reopen(self) -> bool:
+        return self._port.reopen()
+
+    def close(self) -> None:
+        self._port.close()
+
+
+class FileLines:
+    """A file: its lines come as fast as they are asked for."""
+
+    waits, keeps, cut = False, True, False
+
+    def __init__(self, path: str) -> None:
+        self.name, self.ended = path, False
+        try:
+            self._file = Path(path).open("rb")  # noqa: SIM115
+        except OSError as error:
+            raise FileError(f"{path}: cannot read it ({error.strerror}); check the path") from None
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            data = self._file.read(CHUNK)
+        except OSError as error:
+            raise FileError(f"{self.name}: cannot read it ({error.strerror})") from None
+        self.ended = not data
+        return data
+
+    def send(self, data: bytes) -> None:
+        """A file takes nothing."""
+
+    def reopen(self) -> bool:
+        return False
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class PipeLines:
+    """Standard input ("-") or a FIFO. A FIFO that nobody writes to yet is waited for."""
+
+    waits, keeps, cut = True, True, False
+
+    def __init__(self, path: str) -> None:
+        self.name, self.ended = "standard input" if path == "-" else path, False
+        try:
+            self._fd = (
+                os.dup(sys.stdin.fileno())
+                if path == "-"
+                else os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+            )
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"{self.name}: cannot read it ({error})") from None
+        self._begun = path == "-"
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            ready, _, _ = select.select([self._fd], [], [], timeout_s)
+            if not ready:
+                return b""
+            data = os.read(self._fd, CHUNK)
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"{self.name}: is gone ({error})") from None
+        self._begun = self._begun or bool(data)
+        self.ended = self._begun and not data
+        return data
+
+    def send(self, data: bytes) -> None:
+        raise UsageError(f"{self.name}: takes no bytes; leave  send  out of the layout")
+
+    def reopen(self) -> bool:
+        return False
+
+    def close(self) -> None:
+        if self._fd >= 0:
+            with suppress(OSError):
+                os.close(self._fd)
+            self._fd = -1
+
+
+class SocketLines:
+    """A TCP connection, "socket://host:port"."""
+
+    waits, keeps, cut, ended = True, False, False, False
+
+    def __init__(self, url: str) -> None:
+        host, colon, port = url.removeprefix(TCP).rpartition(":")
+        if not colon or not host or not port.isdigit() or not 0 < int(port) < 65536:
+            raise UsageError(f"{url}: write  {TCP}HOST:PORT")
+        self.name, self._address = url, (host.strip("[]"), int(port))
+        self._socket = self._connected()
+
+    def _connected(self) -> socket.socket:
+        try:
+            return socket.create_connection(self._address, CONNECT_S)
+        except OSError as error:
+            raise DeviceError(
+                f"{self.name}: no connection ({error.strerror or error}); check host, port and"
+                " whether the instrument listens"
+            ) from None
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            self._socket.settimeout(max(timeout_s, 1e-3))
+            data = self._socket.recv(CHUNK)
+        except TimeoutError:
+            return b""
+        except OSError as error:
+            if error.errno in (errno.EAGAIN, errno.EINTR):
+                return b""
+            raise DeviceError(f"{self.name}: the connection is gone ({error})") from None
+        if not data:
+            raise DeviceError(f"{self.name}: the other side closed the connection")
+        return data
+
+    def send(self, data: bytes) -> None:
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise DeviceError(f"{self.name}: takes no bytes ({error})") from None
+
+    def reopen(self) -> bool:
+        with suppress(DeviceError):
+            self.close()
+            self._socket = self._connected()
+            return True
+        return False
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def open_port(path: str, baud: int) -> LinePort:
+    """The port behind ``path``.
+
+    Raises:
+        DeviceError, FileError, UsageError: it cannot be opened.
+    """
+    if path.startswith(TCP):
+        return SocketLines(path)
+    if path == "-":
+        return PipeLines(path)
+    with suppress(OSError):
+        mode = Path(path).stat().st_mode
+        if stat.S_ISFIFO(mode):
+            return PipeLines(path)
+        if stat.S_ISREG(mode):
+            return FileLines(path)
+    return SerialLines(path, baud)

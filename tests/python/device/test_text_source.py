@@ -1,0 +1,420 @@
+"""Instruments that send lines: from a file, a pipe, a connection and a pseudo-terminal; lines that
+are no frames; a port that goes away; sources of packages."""
+
+from __future__ import annotations
+
+import os
+import pty
+import socket
+import threading
+import tty
+from collections.abc import Callable, Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import numpy as np
+import pytest
+from device_helpers import frames
+
+from eitskin.device.link import LinkEvent, Reconnect
+from eitskin.device.open import open_device
+from eitskin.device.text_port import FileLines
+from eitskin.device.text_source import TextSource
+from eitskin.device.wire.link_table import FaultCode, Stream
+from eitskin.device.wire.packets import Fault, RawFrame, SolvedTouches
+from eitskin.errors import ConfigError, DeviceError, EitskinError, FrameError, UsageError
+from eitskin.frames.layout import Layout, load_layout, save_layout
+from eitskin.frames.orders import match_rows, source_table
+from eitskin.skin.protocol import adjacent
+from small_models import prebuilt, small_model
+
+EXAMPLES = Path(__file__).parents[3] / "examples" / "python"
+ROTATING = match_rows(adjacent(16).drive_measure, source_table("rotating", adjacent(16))).index
+LAYOUT = """
+[lines]
+cells = 209
+columns = "1:209"
+time = "0"
+time_scale = 0.001
+scale = 0.001
+[channels]
+order = "rotating"
+sign = "reversed"
+"""
+
+
+def volts() -> np.ndarray:
+    """Untouched frames, then touched ones, (18, 208), in our order."""
+    rows = frames().rows(adjacent(16))
+    kept = [rows.around(k) for k in range(18)]
+    return np.array([v[k - first] for k, (first, v) in enumerate(kept)])
+
+
+def lines(values: np.ndarray | None = None) -> list[str]:
+    """As an instrument would write them: milliseconds, then millivolts in rotating order, V+ and V-
+    exchanged."""
+    values = volts() if values is None else values
+    return [
+        ",".join([f"{20 * k}", *(f"{-1e3 * v:.6f}" for v in row[ROTATING])])
+        for k, row in enumerate(values)
+    ]
+
+
+@pytest.fixture
+def layout(tmp_path: Path) -> Path:
+    path = tmp_path / "layout.toml"
+    path.write_text(LAYOUT)
+    return path
+
+
+def written(tmp_path: Path, text: str | bytes) -> Path:
+    path = tmp_path / "lines.csv"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return path
+
+
+def streamed(url: str, what: Stream = Stream.RAW, *, tare: int = 8, count: int = 0) -> list:
+    with open_device(url) as device:
+        device.tare(tare)
+        items = list(device.stream(what, frames=count))
+        return [*items, device.counters]
+
+
+def test_a_file_of_lines_is_streamed_as_a_board_is(tmp_path: Path, layout: Path) -> None:
+    path = written(tmp_path, "\r\n".join(lines()))
+    url = f"text:{path}?layout={layout}"
+    with open_device(url) as device:
+        assert device.board.board == "text" and device.board.frames_given
+        assert device.board.frame_period_us == 20_000
+        device.tare(8)
+        items = list(device.stream(Stream.RAW | Stream.TOUCHES))
+        with pytest.raises(DeviceError, match="its frames are another instrument's"):
+            device.scan(samples=40)
+    raw = [item for item in items if isinstance(item, RawFrame)]
+    assert np.allclose([one.voltage_v for one in raw], volts()[8:], rtol=1e-5, atol=2e-9)
+    assert np.diff([one.time_us for one in raw]).tolist() == [20_000] * 9
+    touches = [item for item in items if isinstance(item, SolvedTouches)][-1].touches
+    assert len(touches) == 1
+    assert np.hypot(touches[0].x_mm + 40, touches[0].y_mm - 10) < 3
+
+
+def test_a_voltage_reaches_the_core_as_it_was_written(tmp_path: Path) -> None:
+    """No converter stands between: float32 of the line's number, whatever its size."""
+    given = volts() * 1e-6
+    given[:, 7] = 1.234567e-9
+    (tmp_path / "l.toml").write_text("[lines]\ncells = 208\n[port]\nrate_hz = 1\n")
+    path = written(tmp_path, "\n".join(" ".join(map(repr, row)) for row in given.tolist()))
+    (tmp_path / "l.toml").write_text('[lines]\ndelimiter = "space"\n[port]\nrate_hz = 1\n')
+    *items, _ = streamed(f"text:{path}?layout={tmp_path / 'l.toml'}")
+    got = np.array([item.voltage_v for item in items if isinstance(item, RawFrame)])
+    assert np.array_equal(np.abs(got), np.abs(given[8:].astype(np.float32)))
+
+
+def test_lines_that_are_no_frames_are_counted_told_once_and_skipped(
+    tmp_path: Path, layout: Path
+) -> None:
+    good = lines()
+    short = [line.rpartition(",")[0] for line in good]
+    holes = good[12].split(",")
+    holes[3], holes[40], holes[41], holes[42] = "nan", "", "-inf", "7..5"
+    bad = ["Board ready", "\xff\xfe\x00 garbage", short[0], short[1], "", "# a comment"]
+    path = written(
+        tmp_path,
+        "\r\n".join([*good[:11], *bad, ",".join(holes), *good[13:]]).encode("latin-1"),
+    )
+    *items, counters = streamed(f"text:{path}?layout={layout}")
+    events = [item for item in items if isinstance(item, LinkEvent)]
+    raw = [item for item in items if isinstance(item, RawFrame)]
+    assert counters.lines_skipped == 4
+    assert [event.kind for event in events] == ["skipped", "skipped"]
+    assert "has 1 numbers where 209" in events[0].text
+    assert "line 14 has 208 numbers where 209 should be" in events[1].text
+    assert len(raw) == 9
+    unusable = [np.flatnonzero(np.isnan(one.voltage_v)).tolist() for one in raw]
+    assert unusable[:3] == [[], [], []] and len(unusable[3]) == 4 and unusable[4:] == [[]] * 5
+
+
+def test_a_tare_of_too_few_lines_is_refused_and_does_not_hang(tmp_path: Path, layout: Path) -> None:
+    path = written(tmp_path, "\n".join(lines()[:5]))
+    with pytest.raises(DeviceError, match="too few frames"):
+        streamed(f"text:{path}?layout={layout}", tare=16)
+
+
+class Board:
+    """A board of few lines: writes its lines over and over to a pseudo-terminal, behind ``path``,
+    until it is unplugged."""
+
+    def __init__(self, path: Path, text: list[str], *, garbage: bytes = b"") -> None:
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        path.unlink(missing_ok=True)
+        path.symlink_to(os.ttyname(self._slave))
+        self._path, self._stop = path, threading.Event()
+        self._data = garbage + "".join(line + "\r\n" for line in text).encode()
+        os.set_blocking(self._master, False)
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        rest = self._data
+        while not self._stop.wait(0.001):
+            try:
+                rest = rest[os.write(self._master, rest) :] or self._data
+            except OSError:
+                continue
+
+    def unplug(self) -> None:
+        self._stop.set()
+        self._thread.join(5)
+        self._path.unlink(missing_ok=True)
+        for end in (self._slave, self._master):
+            os.close(end)
+
+
+@pytest.fixture
+def boards() -> Iterator[Callable[..., Board]]:
+    made: list[Board] = []
+
+    def make(*words: object, **more: object) -> Board:
+        made.append(Board(*words, **more))  # type: ignore[arg-type]
+        return made[-1]
+
+    yield make
+    for board in made:
+        if not board._stop.is_set():
+            board.unplug()
+
+
+def test_a_board_on_a_port_that_goes_away_and_comes_back(
+    tmp_path: Path, layout: Path, boards: Callable[..., Board]
+) -> None:
+    port, text = tmp_path / "port", lines()
+    first = boards(port, text, garbage=b"\x00\xff half a line,1,2\n")
+    url, soon = f"text:{port}?layout={layout}&baud=115200", Reconnect(tries=100, every_s=0.05)
+    with open_device(url, reconnect=soon) as device:
+        device.tare(8)
+        kinds, count = [], 0
+        for item in device.stream(Stream.RAW, frames=40):
+            if isinstance(item, LinkEvent) and item.kind != "skipped":
+                kinds.append(item.kind)
+            if isinstance(item, RawFrame):
+                count += 1
+                assert np.isfinite(item.voltage_v).all()
+            if count == 10 and not kinds:
+                first.unplug()
+                boards(port, text)
+        assert kinds == ["unplugged", "reconnected"] and count == 40
+
+
+def test_a_silent_board_is_a_fault_and_no_hang(
+    tmp_path: Path, layout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from eitskin.device import source
+
+    monkeypatch.setattr(source, "SILENT_S", 0.02)
+    monkeypatch.setattr(source, "SILENT_PERIODS", 0)
+    layout.write_text(LAYOUT + "[port]\nrate_hz = 1000\n")
+    fifo, over = tmp_path / "fifo", threading.Event()
+    os.mkfifo(fifo)
+
+    def write() -> None:
+        with fifo.open("w") as stream:
+            stream.write("\n".join([*lines()[:3], ""]))
+            stream.flush()
+            over.wait(20)
+
+    threading.Thread(target=write, daemon=True).start()
+    with open_device(f"text:{fifo}?layout={layout}") as device:
+        stream = device.stream(Stream.RAW)
+        fault = next(item for item in stream if isinstance(item, Fault))
+        assert fault.code == FaultCode.SCAN_STALLED and fault.raised
+        stream.close()
+        with pytest.raises(DeviceError, match="too few frames"):
+            device.tare(8)
+    over.set()
+
+
+@pytest.mark.parametrize(
+    ("sent", "said"),
+    [
+        (b"\x80\x81" * 40, "no line is a frame: line 1 has 1 numbers where 209 should be"),
+        (b"hello\nhello\n", "no line is a frame: line 1 has 1 numbers where 209 should be"),
+        (b"", "nothing came; check the port"),
+    ],
+    ids=("garbage", "words", "nothing"),
+)
+def test_nothing_of_use_comes(tmp_path: Path, layout: Path, sent: bytes, said: str) -> None:
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    threading.Thread(target=fifo.write_bytes, args=(sent,), daemon=True).start()
+    with pytest.raises(DeviceError, match=said) as caught:
+        open_device(f"text:{fifo}?layout={layout}&wait={0.05 if not sent else 10}")
+    assert "\n" not in str(caught.value)
+
+
+def test_bytes_without_a_line_name_the_baud_rate(tmp_path: Path, layout: Path) -> None:
+    class Noise(FileLines):
+        ended = False
+
+        def read(self, timeout_s: float) -> bytes:
+            return b"\x80" * 40
+
+        def __init__(self) -> None:
+            self.name = "noise"
+
+    source = TextSource(Noise(), load_layout(layout), "layout")
+    with pytest.raises(DeviceError, match="bytes came, but no end of a line; check the baud rate"):
+        source.await_frames(1, 0.01)
+
+
+def test_a_connection_and_a_fifo(tmp_path: Path, layout: Path) -> None:
+    data = "\n".join([*lines(), ""]).encode()
+    server = socket.create_server(("127.0.0.1", 0))
+
+    def serve() -> None:
+        connection, _ = server.accept()
+        with connection:
+            for _ in range(20):
+                try:
+                    connection.sendall(data)
+                except OSError:
+                    return
+
+    threading.Thread(target=serve, daemon=True).start()
+    port = server.getsockname()[1]
+    with open_device(f"text:socket://127.0.0.1:{port}?layout={layout}") as device:
+        assert device.board.tared == 0
+    server.close()
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    threading.Thread(target=fifo.write_bytes, args=(data,), daemon=True).start()
+    *items, _ = streamed(f"text:{fifo}?layout={layout}")  # what nobody wanted yet has waited
+    assert sum(isinstance(item, RawFrame) for item in items) == 10
+    with pytest.raises(DeviceError, match="no connection"):
+        open_device(f"text:socket://127.0.0.1:{port}?layout={layout}")
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "line"),
+    [
+        ("openeit_spectra", "opposite", lambda v: "magnitudes: " + "".join(f"{x:.4f}," for x in v)),
+        ("eit_kit", "adjacent", lambda v: "framei" + "".join(f"{x:.4f}" for x in v)),
+        ("board_of_ten_lines", "adjacent", lambda v: "frame 3: " + ",".join(map(repr, v.tolist()))),
+    ],
+)
+def test_boards_of_others_as_their_sources_print(
+    tmp_path: Path, name: str, kind: str, line: Callable[[np.ndarray], str]
+) -> None:
+    """A banner, then frames; magnitudes get the model's signs."""
+    model = small_model(kind=kind)
+    count = model.protocol.n_rows
+    given = np.round(np.random.default_rng(1).uniform(0.5, 2.0, (4, count)), 4)
+    layout = load_layout(EXAMPLES / f"{name}.toml")
+    text = "\r\n".join(["OpenEIT", "mode 3: imaging", *map(line, given), ""])
+    source = TextSource(FileLines(str(written(tmp_path, text))), layout, name)
+    source.use_model(model)
+    got = [frame.voltage_v for _ in range(6) for frame in source.read(0.0)]
+    scale = layout.options.source.scale or 1.0
+    assert np.allclose(np.abs(got), scale * given)
+    if layout.options.sign == "magnitude":
+        assert np.array_equal(np.sign(got[0]), np.where(model_v(model) < 0, -1, 1))
+
+
+def model_v(model) -> np.ndarray:  # type: ignore[no-untyped-def]
+    expected = np.zeros(model.protocol.n_rows)
+    expected[model.fold.first] = model.v_ref_v
+    second = model.fold.second >= 0
+    expected[model.fold.second[second]] = (model.fold.sign * model.v_ref_v)[second]
+    return expected
+
+
+def test_the_example_of_a_source_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    from eitskin.device import source
+
+    monkeypatch.syspath_prepend(EXAMPLES)
+    points = {
+        "breathing": "own_source:open_source",
+        "broken": "own_source:absent",
+        "wrong": "builtins:str",
+    }
+
+    def found(*, group: str, name: str | None = None) -> list[EntryPoint]:
+        assert group == "eitskin.sources"
+        named = {key: value for key, value in points.items() if name in (None, key)}
+        return [EntryPoint(key, value, group) for key, value in named.items()]
+
+    monkeypatch.setattr(source, "entry_points", found)
+    with open_device("breathing:500") as device:
+        assert (device.board.board, device.board.frame_period_us) == ("breathing", 2000)
+        device.tare(8)
+        raw = list(device.stream(Stream.RAW, frames=3))
+    quiet = prebuilt()[0].golden.reference_v
+    assert np.allclose(np.abs(raw[0].voltage_v), np.abs(quiet), rtol=2e-3)
+    for url, said in (
+        ("breathing:fast", "write frames a second"),
+        ("broken:1", "own_source:absent failed"),
+        ("wrong:1", "builtins:str gives str; a source gives"),
+        ("nowhere:1", "known are|did you mean"),
+    ):
+        with pytest.raises(UsageError, match=said) as caught:
+            open_device(url)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("[lines]\ncolums = 3\n", r"unknown key 'colums'; did you mean 'columns'"),
+        ("[lines]\ncells = 0.5\n", "must be a whole number"),
+        ('[lines]\ndelimiter = "slash"\n', "use one character or one of comma"),
+        ('[lines]\ncells = 208\ncolumns = "1:999"\n', r"columns 1:999: .* there are 0 to 207"),
+        ("[lines]\ncells = 200\n", "line 1 has 208 numbers where 200 should be"),
+        ('[lines]\ncolumns = "0:200"\ncells = 208\n', "have 200 channels, its protocol 208"),
+        ('[lines]\nlabel = "frame"\n', "needs  cells, the numbers of a frame, with a label"),
+        ('[channels]\norder = "backwards"\n', "order = 'backwards' is not known"),
+        ("[channels]\nswaps = [[1, 2, 3]]\n", "every row must be 2 whole numbers"),
+        ("[channels]\nequalise = true\n", "equalise needs a whole file"),
+        ("[channels]\nmirror = 1\n", "mirror must be true or false"),
+        ("[channels]\ntable = [[0, 1, 2, 99]]\n", "the table names electrodes 0 to 99"),
+        ("[channels]\ntable = [[0, 1, 2, 3]]\n", "have not all rows of the model's protocol"),
+        ('[protocol]\nkind = "opposite"\n', "'electrodes' is required"),
+        ("[port]\nrate_hz = 0\n", "out of range"),
+        ("lines = 3\n", r"lines must be a table, \[lines\]"),
+    ],
+)
+def test_a_layout_that_does_not_fit_is_one_line(tmp_path: Path, content: str, said: str) -> None:
+    path = tmp_path / "l.toml"
+    path.write_text(content)
+    source = written(tmp_path, "\n".join(line.partition(",")[2] for line in lines()[:3]))
+    with pytest.raises((ConfigError, FrameError, UsageError, DeviceError), match=said) as caught:
+        open_device(f"text:{source}?layout={path}")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("text:/dev/ttyACM0", r"write  text:PORT\?layout=FILE"),
+        ("text:x.csv?layout=absent.toml", "no such layout"),
+        ("text:x.csv?layout={layout}&baud=fast", "baud must be above 0"),
+        ("text:x.csv?layout={layout}&speed=2", "'speed=2' after"),
+        ("text:absent?layout={layout}", "absent: no such port"),
+        ("text:socket://nowhere?layout={layout}", "write  socket://HOST:PORT"),
+    ],
+)
+def test_a_url_that_cannot_be_is_one_line(layout: Path, url: str, said: str) -> None:
+    with pytest.raises(EitskinError, match=said) as caught:
+        open_device(url.format(layout=layout))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_layout_comes_back_as_it_was_saved(tmp_path: Path, layout: Path) -> None:
+    given = load_layout(layout)
+    save_layout(tmp_path / "again.toml", given)
+    assert load_layout(tmp_path / "again.toml") == given
+    for path in sorted(EXAMPLES.glob("*.toml")):
+        save_layout(tmp_path / "again.toml", load_layout(path))
+        again, before = load_layout(tmp_path / "again.toml"), load_layout(path)
+        assert (again.options, again.send, again.baud) == (before.options, before.send, before.baud)
+    save_layout(tmp_path / "empty.toml", Layout())
+    assert load_layout(tmp_path / "empty.toml") == Layout()
