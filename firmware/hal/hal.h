@@ -144,7 +144,7 @@ typedef struct fw_board {
     void *system_ctx;
     fw_last_reset last_reset;
     bool frames_given; /* by another instrument, of whose scan nothing is known */
-    void *workspace; /* 16-byte aligned: the core's, and the frames' */
+    void *workspace;   /* 16-byte aligned: the core's, and the frames' */
     size_t workspace_bytes;
 } fw_board;
 

@@ -11,7 +11,7 @@ from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
-    from eitskin.frames.importer import ImportOptions
+    from eitskin.frames.import_options import ImportOptions
     from eitskin.frames.layout import Layout
     from eitskin.skin.protocol import Protocol
     from eitskin.skin.skin import Skin
@@ -78,7 +78,7 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
     Raises:
         UsageError: a list or pair cannot be read.
     """
-    from eitskin.frames.importer import ImportOptions
+    from eitskin.frames.import_options import ImportOptions
     from eitskin.frames.source import SourceOptions
     from eitskin.frames.truth import TruthOptions
 

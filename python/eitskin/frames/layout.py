@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from eitskin.config import check_keys, choice, integer, load_toml, number
 from eitskin.errors import ConfigError, EitskinError, UsageError
 from eitskin.fileio import write_bytes
-from eitskin.frames.importer import ImportOptions
+from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.lines import LineFormat, Row, parse_cell
 from eitskin.frames.orders import ORDERS
 from eitskin.frames.pairs import PAIRS, Paired, to_complex

@@ -24,7 +24,7 @@ from eitskin.frames.source import electrode_table
 from eitskin.frames.tables import read_table
 
 if TYPE_CHECKING:
-    from eitskin.frames.importer import ImportOptions
+    from eitskin.frames.import_options import ImportOptions
     from eitskin.model.model import Model
     from eitskin.skin.protocol import Protocol
     from eitskin.skin.skin import Skin

@@ -16,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from eitskin.frames.frames import Frames, load_frames, save_frames
-from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.import_options import ImportOptions
+from eitskin.frames.importer import import_frames
 from eitskin.frames.source import SourceOptions
 from eitskin.skin.protocol import adjacent
 

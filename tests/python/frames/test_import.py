@@ -13,7 +13,8 @@ from injected import healthy_frames
 
 from eitskin.errors import EitskinError, FrameError, ProtocolError, UsageError
 from eitskin.frames.frames import Frames, load_frames, save_frames
-from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.import_options import ImportOptions
+from eitskin.frames.importer import import_frames
 from eitskin.frames.orders import ORDERS, electrode_map, match_rows, relabel, source_table, swap_map
 from eitskin.frames.source import SourceOptions
 from eitskin.frames.truth import TruthOptions

@@ -11,7 +11,8 @@ from injected import healthy_frames
 
 from eitskin.errors import EitskinError, FileError, FrameError, UsageError
 from eitskin.frames.frames import load_frames
-from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.import_options import ImportOptions
+from eitskin.frames.importer import import_frames
 from eitskin.frames.lines import LineFormat, LineReader
 from eitskin.frames.orders import source_table
 from eitskin.frames.source import SourceOptions

@@ -10,7 +10,8 @@ import pytest
 from injected import healthy_frames
 
 from eitskin.errors import UsageError
-from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.import_options import ImportOptions
+from eitskin.frames.importer import import_frames
 from eitskin.frames.pairs import kind_of
 from eitskin.frames.source import SourceOptions
 from eitskin.skin.protocol import adjacent

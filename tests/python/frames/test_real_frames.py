@@ -11,7 +11,8 @@ import pytest
 
 from eitskin.frames.doctor import examine, subject_from_frames, subject_from_source
 from eitskin.frames.frames import Frames, load_frames, save_frames
-from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.import_options import ImportOptions
+from eitskin.frames.importer import import_frames
 from eitskin.frames.source import SourceOptions
 from eitskin.frames.truth import TruthOptions
 from eitskin.skin.electrodes import Electrodes

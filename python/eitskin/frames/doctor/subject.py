@@ -10,7 +10,8 @@ import numpy as np
 
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.frames.frames import Frames, load_frames
-from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.import_options import ImportOptions
+from eitskin.frames.importer import import_frames
 from eitskin.frames.orders import ORDERS, match_rows, source_table
 from eitskin.frames.source import is_frames_file
 from eitskin.skin.protocol import Protocol

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from eitskin.errors import UsageError
 from eitskin.frames.frames import Frames
-from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.import_options import ImportOptions
+from eitskin.frames.importer import import_frames
 from eitskin.frames.source import SourceOptions
 from eitskin.frames.truth import TruthOptions
 from eitskin.scoring.metrics import Raster, mask_on_points
