@@ -47,6 +47,11 @@ class SceneTruth:
         """The board looks for other changes from now on."""
         self._wanted = LOOKED_FOR[sign]
 
+    @property
+    def began_us(self) -> int | None:
+        """The board's clock at the scene's time 0; None where it is not known yet."""
+        return self._began_us
+
     def touches(self, time_us: int) -> tuple[TrueTouch, ...]:
         """What was there when the scan of a frame began at ``time_us``."""
         if self._began_us is None:

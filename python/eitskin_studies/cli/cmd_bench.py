@@ -118,6 +118,20 @@ def add_parser(subparsers: Any) -> None:
     option(scenes, "--elements", "of the mesh", default=3000)
     option(scenes, "--json")
     scenes.set_defaults(run=run_scenes)
+    outputs = what.add_parser(
+        "outputs",
+        help="from a contact to the UDP packet and the TUIO message; load of six sinks",
+        description=(
+            "Tap an emulated board's skin, and say how long each contact takes through scan, solve,"
+            " link, host and sink; then stream to six sinks at once."
+        ),
+    )
+    option(outputs, "--taps", "of the emulated board; about 4 s each", default=24)
+    option(outputs, "--seconds", "of each sink alone", default=20.0)
+    option(outputs, "--load", "seconds of six sinks at once, 0 for none", default=20.0)
+    option(outputs, "--seed", "of contacts and noise", default=1)
+    _add_page(outputs)
+    outputs.set_defaults(run=run_outputs)
     worlds = what.add_parser(
         "worlds",
         help="touches counted in worlds that the model does not share",
@@ -188,6 +202,25 @@ def run_kernels(options: argparse.Namespace) -> int:
     )
     filling = bench_kernels.for_page(result, command)
     return _show(options, result, bench_kernels.as_text(result), filling)
+
+
+def run_outputs(options: argparse.Namespace) -> int:
+    """Time contacts, and load sinks."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import outputs as bench_outputs
+
+    _within("--taps", options.taps, 1, 1000)
+    for name, value in (("--seconds", options.seconds), ("--load", options.load)):
+        if not 0 <= value <= 86_400:
+            raise UsageError(f"{name} {value:g} is out of range; use 0 to 86400")
+    refuse_unwritable(options.page)
+    result = bench_outputs.run(options.taps, options.seconds, options.load, options.seed)
+    command = (
+        f"eitskin bench outputs --taps {options.taps} --seconds {options.seconds:g} --load"
+        f" {options.load:g} --seed {options.seed}"
+    )
+    filling = bench_outputs.for_page(result, command)
+    return _show(options, result, bench_outputs.as_text(result), filling)
 
 
 def run_growth(options: argparse.Namespace) -> int:
