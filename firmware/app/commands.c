@@ -15,6 +15,9 @@ enum {
     MIN_MODEL = 64
 };
 enum { MIN_EXCITATION_MILLIHZ = 1000, MAX_EXCITATION_MILLIHZ = 250000000 };
+/* IEC 60601-1, patient auxiliary current: 100 uA rms up to 1 kHz and in proportion above, so that a
+ * microampere needs 10 Hz; at most 10 mA. */
+enum { SAFE_UA_RMS = 100, MILLIHZ_A_UA = 10000 };
 
 static fw_answer ok(void)
 {
@@ -100,12 +103,19 @@ static fw_answer on_tare(fw_instrument *instrument, const void *payload, size_t 
     return (fw_answer){.later = true};
 }
 
+/* The least excitation at which the board's current is allowed. */
+static uint32_t least_excitation_millihz(const fw_board *board)
+{
+    const uint32_t ua = board->source_ua_rms;
+    return ua <= SAFE_UA_RMS ? MIN_EXCITATION_MILLIHZ : ua * MILLIHZ_A_UA;
+}
+
 /* What is wrong with scan settings by themselves; OK where nothing is. */
 static fw_answer check_scan(const fw_instrument *instrument, const eits_command_scan *c)
 {
     fw_answer bad;
     if (outside(&bad, offsetof(eits_command_scan, excitation_millihz), c->excitation_millihz,
-                MIN_EXCITATION_MILLIHZ, MAX_EXCITATION_MILLIHZ) ||
+                least_excitation_millihz(instrument->board), MAX_EXCITATION_MILLIHZ) ||
         outside(&bad, offsetof(eits_command_scan, sample_rate_hz), c->sample_rate_hz,
                 FW_MIN_RATE_HZ, FW_MAX_RATE_HZ) ||
         outside(&bad, offsetof(eits_command_scan, samples), c->samples, MIN_SAMPLES,
@@ -121,7 +131,7 @@ static fw_answer check_scan(const fw_instrument *instrument, const eits_command_
                          (int32_t)(half_rate_millihz - 1));
     if (fw_ad9833_tuning(instrument->board->mclk_hz, c->excitation_millihz) == 0)
         return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
-                         MIN_EXCITATION_MILLIHZ);
+                         (int32_t)least_excitation_millihz(instrument->board));
     if (!fw_whole_periods(c->excitation_millihz, c->sample_rate_hz, c->samples))
         return fw_refuse(
             EITS_REPLY_PERIODS,

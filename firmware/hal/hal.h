@@ -134,7 +134,10 @@ typedef struct fw_board {
     uint32_t mclk_hz; /* of the generator */
     uint32_t stack_bytes;
     uint32_t frame_period_us; /* of the scan after a start; 0: as fast as it goes */
-    fw_spi generator;         /* AD9833 */
+    /* What the current source drives, as built; 0: none flows. It bounds the excitation from below
+     * (docs/guide/hardware.md, "Safety"). */
+    uint32_t source_ua_rms;
+    fw_spi generator; /* AD9833 */
     /* lines 0-3 A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- */
     fw_lines multiplexers;
     fw_capture capture;

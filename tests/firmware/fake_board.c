@@ -372,6 +372,7 @@ void fake_init(fake_board *f, uint32_t start_us)
                           .f_cpu_hz = 216000000,
                           .mclk_hz = 8000000,
                           .stack_bytes = 8192,
+                          .source_ua_rms = 350,
                           .generator = {&SPI, f},
                           .multiplexers = {&LINES, f},
                           .capture = {&CAPTURE, f, 4095, 3300000, 1000000},

@@ -110,8 +110,15 @@ static void test_tare_ranges(void)
 static void test_scan_ranges(void)
 {
     eits_command_scan s = host_default_scan();
+    s.excitation_millihz = 3499999; /* at 350 uA rms */
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 3500000);
+    b.board.board.source_ua_rms = 100;
     s.excitation_millihz = 999;
     REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 1000);
+    b.board.board.source_ua_rms = 101;
+    s.excitation_millihz = 1009999;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 1010000);
+    b.board.board.source_ua_rms = 350;
     s.excitation_millihz = 250000001;
     REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 250000000);
     s = host_default_scan();

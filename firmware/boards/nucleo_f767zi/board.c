@@ -3,7 +3,12 @@
 
 /* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA
  * and 1.5 would (docs/guide/hardware.md). */
-enum { FULL_SCALE_CODE = 4095, REFERENCE_UV = 3300000, FRONT_END_GAIN_PPM = 1500000 };
+enum {
+    FULL_SCALE_CODE = 4095,
+    REFERENCE_UV = 3300000,
+    FRONT_END_GAIN_PPM = 1500000,
+    SOURCE_UA_RMS = 350
+};
 
 /* No 8 MHz: nothing that follows would be right. The red light blinks, from the 16 MHz oscillator,
  * and that is all. */
@@ -36,6 +41,7 @@ int main(void)
         .mclk_hz = NUCLEO_MCLK_HZ,
         .stack_bytes =
             (uint32_t)((uint8_t *)stack_top - (uint8_t *)stack_bottom) - NUCLEO_STACK_GUARD_BYTES,
+        .source_ua_rms = SOURCE_UA_RMS,
         .generator = {&nucleo_generator_ops, NULL},
         .multiplexers = {&nucleo_multiplexers_ops, NULL},
         .capture = {&nucleo_capture_ops, NULL, FULL_SCALE_CODE, REFERENCE_UV, FRONT_END_GAIN_PPM},

@@ -35,6 +35,7 @@ __attribute__((naked)) void nucleo_fault_irq(void)
 
 void nucleo_crash(const uint32_t *frame)
 {
+    nucleo_multiplexers_off(); /* first: whoever touches the skin has no part in this */
     const uint32_t cfsr = SCB_CFSR;
     /* Nothing was stacked, or nothing can be read, if stacking failed; r0 to r3, r12, lr, pc, xpsr
      * otherwise. */

@@ -6,10 +6,14 @@ enum { ENABLE_PIN = 12, ADDRESS_LINES = 16 };
 #define ADDRESSES 0x0000FFFFu
 #define ENABLES   0x000F0000u
 
+void nucleo_multiplexers_off(void)
+{
+    GPIO_BSRR(GPIOF_BASE) = (ENABLES >> ADDRESS_LINES << ENABLE_PIN) << 16;
+}
+
 void nucleo_multiplexers_start(void)
 {
-    /* off, before they are outputs */
-    GPIO_BSRR(GPIOF_BASE) = (ENABLES >> ADDRESS_LINES << ENABLE_PIN) << 16;
+    nucleo_multiplexers_off(); /* before they are outputs */
     for (uint32_t line = 0; line < 4; ++line)
         nucleo_pin(GPIOF_BASE, ENABLE_PIN + line, PIN_OUTPUT, 0, 1, 0);
     for (uint32_t line = 0; line < ADDRESS_LINES; ++line)

@@ -59,6 +59,7 @@ const char *nucleo_serial(void);
 fw_last_reset nucleo_last_reset(void);
 void nucleo_generator_start(void);
 void nucleo_multiplexers_start(void);
+void nucleo_multiplexers_off(void); /* no current reaches the skin; from any interrupt */
 void nucleo_capture_start(void);
 void nucleo_link_start(void);
 

@@ -149,13 +149,22 @@ def test_a_program_that_hangs_is_restarted_and_says_so(image: bytes) -> None:
     assert FaultCode.WATCHDOG not in device.info().fault_codes
 
 
-def test_a_program_that_crashes_says_where(image: bytes) -> None:
+def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image: bytes) -> None:
     board = power_up(image)
     device = connect(board)
-    board.run_until(board.clock.now + 1000 * TICKS_PER_US, lambda: board._asleep)
+    joined = lambda: None not in board.multiplexers.joined  # noqa: E731
+    board.run_until(board.clock.now + TICKS_PER_S, lambda: joined() and board._asleep)
+    assert joined()
+    at_reset, reset = [], board.reset
     hang(board, LOAD_NOWHERE)
+
+    def noted(cause: str) -> None:
+        at_reset.append(board.multiplexers.joined)
+        reset(cause)
+
+    board.reset = noted  # type: ignore[method-assign]
     board.run_until(board.clock.now + TICKS_PER_S, lambda: len(board.record.resets) > 1)
-    assert board.record.resets == ["power", "software"]
+    assert board.record.resets == ["power", "software"] and at_reset == [(None,) * 4]
     told = [fault for fault in faults_of(device) if fault.code == FaultCode.CRASH]
     assert told
     pc, _, cfsr, _, address = told[0].words
