@@ -6,7 +6,7 @@ from __future__ import annotations
 import difflib
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+MAX_LISTED = 30
 
 MAX_TOML_BYTES = 1_000_000
 MAX_KEY_PARTS = 32  # the parser's time grows with the square of a key's parts
@@ -52,7 +54,13 @@ def nearest(name: str, known: Iterable[str]) -> str:
     near."""
     choices = sorted(known)
     close = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
-    return f"did you mean {close[0]!r}?" if close else f"known are: {', '.join(choices)}"
+    return f"did you mean {close[0]!r}?" if close else f"known are: {listed(choices)}"
+
+
+def listed(items: Sequence[object], most: int = MAX_LISTED) -> str:
+    """ "a, b, c", or of a long list its beginning and how many more there are."""
+    shown = ", ".join(map(str, items[:most]))
+    return shown if len(items) <= most else f"{shown} and {len(items) - most} more"
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:

@@ -45,7 +45,8 @@ class ReconstructSettings:
         engine: "c", "c64" or "numpy".
         changes: options of the solver by name (``core.results.Options``).
         wish: a budget or an accuracy, whose measured settings are taken; or None.
-        track: the frames are a stream: touches are followed as a board does.
+        track: touches are followed from frame to frame, as a board does; None: where the frames
+            are a stream, which their times tell, and threads is 1.
         threads: frames side by side, the same results; 1 with a warm start, tracking or numpy.
         only: names of the frames to reconstruct; None: all.
     """
@@ -54,14 +55,24 @@ class ReconstructSettings:
     engine: str = "c"
     changes: dict[str, Any] = field(default_factory=dict)
     target: Target | None = None
-    track: bool = False
+    track: bool | None = None
     threads: int = 1
     only: tuple[str, ...] | None = None
 
     @property
     def follows(self) -> bool:
         """Whether a frame's result depends on the frames before."""
-        return self.track or bool(self.changes.get("warm_start"))
+        return bool(self.track) or bool(self.changes.get("warm_start"))
+
+    def tracked(self, frames: Frames) -> bool:
+        """Whether touches of ``frames`` are followed."""
+        return is_stream(frames) and self.threads == 1 if self.track is None else self.track
+
+
+def is_stream(frames: Frames) -> bool:
+    """Whether the frames came one after another: they have times that ascend."""
+    times = frames.time_s
+    return times is not None and len(times) > 1 and bool(np.all(np.diff(times) > 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +121,7 @@ def reconstruct_frames(
     check(how, output, picture)
     notes: list[str] = []
     frames, chosen = read(path, how.only)
+    how = replace(how, track=how.tracked(frames))
     reconstructor, blob, name = choose_model(path, frames, how)
     point = apply_options(reconstructor, how, notes)
     reference = take_reference(path, reconstructor, frames, notes)

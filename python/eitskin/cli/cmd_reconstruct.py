@@ -50,12 +50,14 @@ def add_parser(subparsers: Any) -> None:
         "--second-pass",
         "solve again with what touches do to each other taken out of the data",
     )
+    track = parser.add_mutually_exclusive_group()
     option(
-        parser,
+        track,
         "--track",
-        "the frames are a stream, 48 or 96 a second: confirm births, keep ids, smooth places,"
-        " as a board does",
+        "the frames are a stream: confirm births, keep ids, smooth places, as a board does"
+        " (default: where they have times that ascend)",
     )
+    option(track, "--no-track", "each frame by itself")
     option(
         parser,
         "--threads N",
@@ -86,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
         engine=options.engine,
         changes=changes | named_solver(options),
         target=named_target(options, "host"),
-        track=options.track,
+        track=True if options.track else False if options.no_track else None,
         threads=options.threads,
         only=None if options.only is None else tuple(options.only.split(",")),
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.progress import bar
+from eitskin.cli.progress import bar, lines
 from eitskin.errors import FileError, UsageError
 
 SCENE_HELP = "a scene file, or a scene of the library (eitskin scene list)"
@@ -89,9 +89,10 @@ def scene_progress(done: Iterable[int], total: int) -> Iterable[int]:
     """A bar over ``total`` scenes that ``done`` numbers bring nearer."""
     from tqdm import tqdm
 
-    with tqdm(
-        total=total, desc="scenes", unit="", leave=False, disable=not sys.stderr.isatty()
-    ) as shown:
+    if not sys.stderr.isatty():
+        yield from lines(done, "scenes", total, weight=int)
+        return
+    with tqdm(total=total, desc="scenes", unit="", leave=False) as shown:
         for scenes in done:
             shown.update(scenes)
             yield scenes

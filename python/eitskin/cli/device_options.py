@@ -79,11 +79,9 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     start = solver.add_mutually_exclusive_group()
     option(start, "--warm", "begin each frame from the last one's result")
     option(start, "--cold", "begin each frame from nothing (default)")
-    option(
-        solver,
-        "--no-track",
-        "touches of each frame by itself (default: births confirmed, places smoothed)",
-    )
+    track = solver.add_mutually_exclusive_group()
+    option(track, "--track", "confirm births, keep ids, smooth places (default)")
+    option(track, "--no-track", "touches of each frame by itself")
     tare = parser.add_argument_group("reference")
     option(
         tare,
@@ -257,7 +255,7 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
         warm_start=True if options.warm else False if options.cold else None,
         sign=options.sign,
         diagnostics=read_ignored(options.ignore),
-        track=False if options.no_track else None,
+        track=True if options.track else False if options.no_track else None,
         **named_solver(options),
     )
 

@@ -16,7 +16,7 @@ from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = (
     "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate", "recommend",
-    "devices", "info", "tare", "view", "stream", "record", "replay", "flash",
+    "devices", "info", "tare", "view", "stream", "record", "replay", "flash", "completion",
 )  # fmt: skip
 FIRST = "eitskin stream --device sim:swipe"
 ENTRY_POINT_GROUP = "eitskin.commands"  # of other packages; eitskin-studies names its own there

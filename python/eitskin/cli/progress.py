@@ -1,10 +1,14 @@
-"""Bars on stderr where that is a terminal; nothing otherwise."""
+"""How far long work is, and how long it still takes: bars on stderr where that is a terminal, a
+line every ten seconds elsewhere."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+import time
+from collections.abc import Callable, Iterable, Iterator, Sized
 from typing import Any
+
+LINE_S = 10.0
 
 
 def bar(what: str) -> Callable[..., Iterable[Any]]:
@@ -13,10 +17,37 @@ def bar(what: str) -> Callable[..., Iterable[Any]]:
     def shown(items: Iterable[Any], total: int | None = None) -> Iterable[Any]:
         from tqdm import tqdm
 
-        hidden = not sys.stderr.isatty()
-        wrapped: Iterable[Any] = tqdm(
-            items, desc=what, total=total, unit="", leave=False, disable=hidden
-        )
+        number = len(items) if total is None and isinstance(items, Sized) else total
+        if not sys.stderr.isatty():
+            return lines(items, what, number)
+        wrapped: Iterable[Any] = tqdm(items, desc=what, total=number, unit="", leave=False)
         return wrapped
 
     return shown
+
+
+def lines(
+    items: Iterable[Any],
+    what: str,
+    total: int | None,
+    clock: Callable[[], float] = time.monotonic,
+    weight: Callable[[Any], int] = lambda item: 1,
+) -> Iterator[Any]:
+    """``items``; every ten seconds a line on stderr says how many are done, of ``total``, and how
+    long the rest takes. ``weight``: how many an item counts for."""
+    from tqdm import tqdm
+
+    start = said = clock()
+    done = 0
+    for item in items:
+        yield item
+        done += weight(item)
+        now = clock()
+        if now - said < LINE_S:
+            continue
+        said = now
+        rest = "" if total is None else f" of {total}"
+        if total is not None and 0 < done <= total:
+            left = tqdm.format_interval((now - start) * (total - done) / done)
+            rest += f", {left} left"
+        print(f"eitskin: {what}: {done}{rest}", file=sys.stderr, flush=True)

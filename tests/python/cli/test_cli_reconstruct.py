@@ -340,3 +340,17 @@ def test_tracked_frames_keep_ids_and_confirm_births(done: Done, tmp_path: Path) 
     assert tracked[0]["touches"][0]["x_mm"] == alone[0]["touches"][0]["x_mm"]
     assert tracked[7]["touches"][0]["x_mm"] != alone[7]["touches"][0]["x_mm"]
     assert tracked[7]["touches"][0]["x_mm"] == pytest.approx(-6.0, abs=2.0)
+
+
+def test_frames_with_times_are_a_stream(done: Done, tmp_path: Path) -> None:
+    frames = session().as_frames()
+    timed, alone = tmp_path / "timed.npz", tmp_path / "alone.npz"
+    save_frames(timed, replace(frames, time_s=np.arange(frames.n_frames) / 48))
+    save_frames(alone, frames)
+
+    def touches(path: Path, *more: str) -> list[list[dict[str, float]]]:
+        facts = json.loads(done("reconstruct", path, "--json", *more))
+        return [frame["touches"] for frame in facts["frames"]]
+
+    assert touches(timed) == touches(alone, "--track") != touches(alone)
+    assert touches(timed, "--no-track") == touches(alone) == touches(timed, "--threads", "2")

@@ -29,7 +29,6 @@ USAGE, FILE, CONFIG, GEOMETRY, MODEL, PROTOCOL, FRAME, EXTRA, VERIFICATION = ran
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ([], "the following arguments are required: COMMAND"),
         (["recnstruct"], "invalid choice: 'recnstruct'"),
         (["model"], "required: ACTION"),
         (["model", "build", "x.toml"], "required: -o/--output"),
