@@ -68,7 +68,7 @@ def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
     frames = simulate(
         paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=snr_db)
     ).as_frames()
-    step("diagnostic them: C core in float32 and float64, numpy")
+    step("finding them: C core in float32 and float64, numpy")
     model, blob = load_prebuilt()
     results = {}
     for engine in ENGINES:
