@@ -81,6 +81,12 @@ def add_parser(subparsers: Any) -> None:
     option(growth, "--picture PNG", "draw it", Path)
     _add_page(growth)
     growth.set_defaults(run=run_growth)
+    view = what.add_parser(
+        "view", help="the live page: the server's share of a core, frame to pixel in Chromium"
+    )
+    option(view, "--seconds", "for each number of pages", default=30.0)
+    _add_page(view, "live-view")
+    view.set_defaults(run=run_view)
     batches = what.add_parser(
         "batches", help="batches of frames over threads, beside one after another"
     )
@@ -242,6 +248,18 @@ def run_growth(options: argparse.Namespace) -> int:
     command = f"eitskin bench growth --rounds {options.rounds}"
     filling = bench_growth.for_page(result, command)
     return _show(options, result, bench_growth.as_text(result), filling)
+
+
+def run_view(options: argparse.Namespace) -> int:
+    """Look at the live page, once, and with several pages at a time."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import live_view
+
+    _within("--seconds", options.seconds, 1, 3600)
+    refuse_unwritable(options.page)
+    result = live_view.run(options.seconds, progress=lambda text: print(text, file=sys.stderr))
+    filling = live_view.for_page(result, f"eitskin bench view --seconds {options.seconds:g}")
+    return _show(options, result, live_view.as_text(result), filling, "live-view")
 
 
 def run_batches(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""``eitskin draw effect | touch | wiring | examples``: pictures of the documentation, drawings."""
+"""``eitskin draw effect | touch | wiring | live | examples``: the documentation's pictures."""
 
 from __future__ import annotations
 
@@ -27,6 +27,9 @@ def add_parser(subparsers: Any) -> None:
     wiring = what.add_parser("wiring", help="the wiring of board, multiplexers and skin")
     option(wiring, "-o --output PNG", None, Path, required=True)
     wiring.set_defaults(run=run_wiring)
+    live = what.add_parser("live", help="the live page before the emulated board, moving")
+    option(live, "-o --output WEBP", None, Path, required=True)
+    live.set_defaults(run=run_live)
     examples = what.add_parser("examples", help="hand.svg and forearm.dxf")
     option(examples, "-o --output FOLDER", None, Path, required=True)
     examples.set_defaults(run=run_examples)
@@ -59,6 +62,17 @@ def run_wiring(options: argparse.Namespace) -> int:
     from eitskin_studies.pictures.wiring_picture import draw_wiring
 
     draw_wiring(options.output)
+    print(f"picture: {options.output}")
+    return 0
+
+
+def run_live(options: argparse.Namespace) -> int:
+    """Record the live page."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.pictures.live_view_picture import draw_live_view
+
+    refuse_unwritable(options.output)
+    draw_live_view(options.output)
     print(f"picture: {options.output}")
     return 0
 

@@ -66,8 +66,6 @@ export class SkinDrawing {
     });
     const xs = skin.outline_mm.map((p) => p[0]), ys = skin.outline_mm.map((p) => p[1]);
     this.box = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
-    this.canvas.style.aspectRatio = String(
-      Math.min(2, Math.max(0.75, (this.box[2] - this.box[0]) / (this.box[3] - this.box[1]))));
   }
 
   follow(touches, time) {
