@@ -16,7 +16,7 @@ URL = "emu:rotate"
 WIDTH, HEIGHT = 1120, 780
 FRAME_MS = 100  # shown at half of real time
 FIRST, LAST = 8, 48  # of the scene's frames
-QUALITY = 45
+QUALITY = 30
 PATIENCE_S = 180.0
 
 
@@ -48,6 +48,7 @@ def draw_live_view(path: Path) -> None:
         loop=0,
         quality=QUALITY,
         method=6,
+        minimize_size=True,
     )
     write_bytes(path, buffer.getvalue())
 
