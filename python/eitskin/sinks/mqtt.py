@@ -8,7 +8,15 @@ from typing import Any
 from urllib.parse import unquote
 
 from eitskin.errors import SinkError, missing_extra
-from eitskin.sinks.sink import Dropped, Sink, Source, Told, address, nothing_more
+from eitskin.sinks.sink import (
+    Dropped,
+    Sink,
+    Source,
+    Told,
+    address,
+    nothing_more,
+    without_password,
+)
 
 USAGE = "mqtt://HOST or mqtt://HOST:PORT/topic"
 PORT = 1883
@@ -73,7 +81,7 @@ def open_sink(url: str, source: Source) -> Sink:
     client.reconnect_delay_set(1, 10)
     if parts.username is not None:
         client.username_pw_set(unquote(parts.username), unquote(parts.password or ""))
-    shown = url if parts.password is None else url.replace(f":{parts.password}@", ":...@")
+    shown = without_password(url)
     try:
         client.connect(host, port, keepalive=30)
     except (OSError, ValueError) as error:

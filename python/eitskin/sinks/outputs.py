@@ -16,7 +16,7 @@ from eitskin.config import nearest
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame, Notice
 from eitskin.live.message import summary_message
-from eitskin.sinks.sink import Dropped, Sink, Source, Told
+from eitskin.sinks.sink import Dropped, Sink, Source, Told, without_password
 
 ENTRY_POINT_GROUP = "eitskin.sinks"
 ROOM = 64  # frames: more than a second
@@ -128,13 +128,14 @@ class Queue:
     """A sink's queue and thread."""
 
     def __init__(self, url: str, sink: Sink, say: Callable[[str], None], room: int) -> None:
-        self._url, self._sink, self._say, self._room = url, sink, say, room
+        self._url, self._sink = without_password(url), sink
+        self._say, self._room = say, room
         self._waiting: deque[Told] = deque()
         self._changed = threading.Condition()
         self._ending = self._slow = False
         self._sent = self._dropped = self._failed = 0
         self._error: str | None = None
-        self._thread = threading.Thread(target=self._run, name=f"eitskin {url}", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=f"eitskin {self._url}", daemon=True)
         self._thread.start()
 
     def put(self, told: Told, patience_s: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -72,20 +73,26 @@ class Sink(Protocol):
         """Finish files, let go of ports."""
 
 
+def without_password(url: str) -> str:
+    """``url`` as it may be shown."""
+    return re.sub(r"(?<=//)([^/@:]*):[^/@]*@", r"\1:...@", url)
+
+
 def address(url: str, port: int | None, *, usage: str) -> tuple[SplitResult, str, int]:
     """The parts of ``url``, its host (this machine where none is named) and port.
 
     Raises:
         UsageError: it cannot be read, or names no port and there is no usual one.
     """
+    shown = without_password(url)
     try:
         parts = urlsplit(url)
         named = parts.port
     except ValueError:
-        raise UsageError(f"--to {url}: no address; write  {usage}") from None
+        raise UsageError(f"--to {shown}: no address; write  {usage}") from None
     chosen = port if named is None else named
     if not url.startswith(f"{parts.scheme}://") or chosen is None or not 0 <= chosen <= 65535:
-        raise UsageError(f"--to {url}: write  {usage}")
+        raise UsageError(f"--to {shown}: write  {usage}")
     return parts, parts.hostname or THIS_MACHINE, chosen
 
 
@@ -114,7 +121,9 @@ def nothing_more(url: str, parts: SplitResult, usage: str, *, path: bool = False
         UsageError: something does.
     """
     if parts.query or parts.fragment or (parts.path not in ("", "/") and not path):
-        raise UsageError(f"--to {url}: nothing may follow the port; write  {usage}")
+        raise UsageError(
+            f"--to {without_password(url)}: nothing may follow the port; write  {usage}"
+        )
 
 
 def or_nan(value: float | None) -> float:

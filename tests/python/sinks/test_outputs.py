@@ -15,6 +15,7 @@ from swipe_frames import Swipe
 from eitskin.cli.main import main
 from eitskin.errors import EitskinError
 from eitskin.sinks import outputs as module
+from eitskin.sinks.mqtt import open_sink as open_mqtt
 from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import Dropped, Source, Told
 
@@ -142,6 +143,15 @@ def test_what_cannot_be_opened_is_refused_in_a_line(
             Outputs(["udp://127.0.0.1:9", url.format(folder=tmp_path, **ports)], swipe.source)
     assert error.value.exit_code == code and part in str(error.value)
     assert str(error.value).count("\n") == 0
+
+
+def test_passwords_are_not_shown(swipe: Swipe, made: dict[str, Any]) -> None:
+    made["mqtt"] = Heard()
+    with Outputs(["mqtt://me:secret@host/topic"], swipe.source) as outputs:
+        assert outputs.end({})[0]["url"] == "mqtt://me:...@host/topic"
+    with pytest.raises(EitskinError) as error:
+        open_mqtt("mqtt://me:secret@127.0.0.1:99999", swipe.source)
+    assert "secret" not in str(error.value) and "me:...@127.0.0.1" in str(error.value)
 
 
 def test_tuio_needs_the_skin(swipe: Swipe) -> None:

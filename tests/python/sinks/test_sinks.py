@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -177,17 +178,44 @@ def test_a_websocket_client_that_never_reads_is_left_out(swipe: Swipe) -> None:
         assert counts["dropped"] > 0 and counts["failed"] == 0
 
 
-@pytest.fixture
-def broker() -> Iterator[int]:
-    port = free_port()
+@contextlib.contextmanager
+def running_broker(port: int) -> Iterator[None]:
+    """Debian's mosquitto."""
     program = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin")
     assert program, "Debian's mosquitto is missing; scripts/test installs it"
     with subprocess.Popen([program, "-p", str(port), "-v"], stderr=subprocess.PIPE) as running:
         assert running.stderr is not None
         while not running.stderr.readline().endswith(b" running\n"):
             assert running.poll() is None
-        yield port
+        yield
         running.terminate()
+
+
+@pytest.fixture
+def broker() -> Iterator[int]:
+    port = free_port()
+    with running_broker(port):
+        yield port
+
+
+def test_a_broker_that_comes_back_is_told_again(swipe: Swipe) -> None:
+    port = free_port()
+
+    def put_until(count: str) -> None:
+        before, end_s = outputs.counts[0][count], time.monotonic() + WAIT_S
+        while outputs.counts[0][count] == before and time.monotonic() < end_s:
+            outputs.put(swipe.frames[0])
+            time.sleep(0.02)
+        assert outputs.counts[0][count] > before
+
+    with running_broker(port):
+        outputs = Outputs([f"mqtt://127.0.0.1:{port}"], swipe.source)
+        put_until("sent")
+    with outputs:
+        put_until("dropped")
+        with running_broker(port):
+            put_until("sent")
+            assert outputs.end(SUMMARY)[0]["failed"] == 0
 
 
 def test_mqtt(swipe: Swipe, broker: int) -> None:
@@ -240,24 +268,28 @@ def test_csv(swipe: Swipe, tmp_path: Path) -> None:
 
 
 def test_mcap(swipe: Swipe, tmp_path: Path) -> None:
-    from mcap_ros2.reader import read_ros2_messages
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
 
     path = tmp_path / "touches.mcap"
     send(swipe, f"mcap:{path}")
     came: dict[str, list[Any]] = {}
-    for message in read_ros2_messages(str(path)):
-        came.setdefault(message.channel.topic, []).append(message)
-    touches = [message.ros_msg for message in came["/touches"]]
+    stamps = []
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        for _, channel, message, content in reader.iter_decoded_messages():
+            came.setdefault(channel.topic, []).append(content)
+            stamps += [message.log_time / 1e9] if channel.topic == "/touches" else []
+    touches = came["/touches"]
     assert [[(t.id, t.x_mm) for t in one.touches] for one in touches] == [
         [(t.id, t.x_mm) for t in listed] for listed in swipe.touches
     ]
-    stamps = [message.log_time_ns / 1e9 for message in came["/touches"]]
     assert stamps == pytest.approx([frame.time_unix_s for frame in swipe.frames], abs=1e-6)
-    image, grid = came["/image"][20].ros_msg, swipe.source.model.grid  # type: ignore[union-attr]
+    image, grid = came["/image"][20], swipe.source.model.grid  # type: ignore[union-attr]
     picture = np.frombuffer(bytes(image.data), "<f4").reshape(image.height, image.width)[::-1]
     assert image.encoding == "32FC1" and image.step == 4 * image.width
     np.testing.assert_array_equal(grid.values(picture), swipe.frames[20].image)
-    assert [one.level for one in came["/diagnostics"][0].ros_msg.status] == [0]
+    assert [one.level for one in came["/diagnostics"][0].status] == [0]
 
 
 KILLED = """
