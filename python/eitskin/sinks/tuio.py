@@ -46,6 +46,11 @@ class Cursors:
             (PATH, ["fseq", self._frame]),
         ]
 
+    @property
+    def some(self) -> bool:
+        """Whether the last frame had touches."""
+        return bool(self._before)
+
     def _state(self, touch: dict[str, Any], elapsed_s: float) -> State:
         x0, y0, x1, y1 = self._box
         x = min(max((touch["x_mm"] - x0) / (x1 - x0), 0.0), 1.0)
@@ -77,6 +82,8 @@ class TuioSink:
             self._socket.send(data)
 
     def close(self) -> None:
+        if self._cursors.some:  # the stream was cut short: nobody touches any more
+            self._socket.send(bundle(self._cursors.messages([], self._time_s)))
         self._socket.close()
 
 

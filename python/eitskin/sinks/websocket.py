@@ -11,6 +11,7 @@ import contextlib
 import re
 import threading
 from collections.abc import Coroutine
+from concurrent import futures
 from typing import Any
 
 from eitskin.errors import SinkError, missing_extra
@@ -57,7 +58,7 @@ class WebSocketSink:
             self._server.close()
             await self._server.wait_closed()
 
-        with contextlib.suppress(TimeoutError):
+        with contextlib.suppress(futures.TimeoutError):
             self._call(end())
         self._stop()
 

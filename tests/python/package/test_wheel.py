@@ -41,6 +41,8 @@ def test_the_wheel_is_the_package_alone(installed: dict[str, Path]) -> None:
 def test_the_wheel_holds_what_a_user_needs_in_little_room(installed: dict[str, Path]) -> None:
     for name in ("tuning/front.json", "model/paper.eitm", "scene/library/demo.toml", "py.typed"):
         assert f"eitskin/{name}" in installed
+    for name in ("live/message.schema.json", "sinks/msg/TouchArray.msg"):
+        assert f"eitskin/{name}" in installed
     assert sum(Path(name).suffix in BUILT for name in installed) == 3  # two cores and a board
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as wheel:

@@ -133,6 +133,20 @@ def test_tuio(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
         last = {one[0]: (one[1], one[2]) for one in bundle["set"]}
 
 
+def test_tuio_lifts_its_fingers_where_the_stream_is_cut(
+    swipe: Swipe, osc: tuple[int, queue.Queue[Any]]
+) -> None:
+    port, heard = osc
+    touched = next(frame for frame in swipe.frames if frame.touches)
+    with Outputs([f"tuio://127.0.0.1:{port}"], swipe.source) as outputs:
+        outputs.put(touched)
+    alive: list[Any] = []
+    while len(alive) < 2:
+        _, kind, *values = heard.get(timeout=WAIT_S)
+        alive += [values] if kind == "alive" else []
+    assert alive == [[t.id for t in touched.touches], []]
+
+
 def test_websocket_clients(swipe: Swipe) -> None:
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
@@ -238,7 +252,8 @@ def test_mqtt(swipe: Swipe, broker: int) -> None:
 
 
 def test_lsl(swipe: Swipe) -> None:
-    pylsl = pytest.importorskip("pylsl", reason="liblsl is not there", exc_type=ImportError)
+    import pylsl
+
     with Outputs(["lsl:table?touches=2"], swipe.source) as outputs:
         (info,) = pylsl.resolve_byprop("name", "table", timeout=WAIT_S)
         inlet = pylsl.StreamInlet(info)
