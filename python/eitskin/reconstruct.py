@@ -106,19 +106,20 @@ def reconstruct_frames(
     *,
     output: Path | None = None,
     picture: Path | None = None,
+    film: Path | None = None,
     progress: Progress = lambda frames, _: frames,
 ) -> ReconstructOutcome:
     """Reconstruct the frames of the file ``path``; those that cannot be used are named in
     ``refused``, and the others are still done. Images, touches and info go into the file ``output``
-    (.npz), a ``picture`` shows all frames.
+    (.npz), a ``picture`` shows the frames, a ``film`` one after another.
 
     Raises:
         FileError, FrameError, ModelError, ProtocolError, UsageError: a file, an option or the
             reference cannot be used.
-        MissingExtraError: the picture needs matplotlib.
+        MissingExtraError: picture and film need matplotlib.
     """
     how = settings or ReconstructSettings()
-    check(how, output, picture)
+    check(how, output, picture, film)
     notes: list[str] = []
     frames, chosen = read(path, how.only)
     how = replace(how, track=how.tracked(frames))
@@ -131,11 +132,16 @@ def reconstruct_frames(
         frames, reconstructor.model, name, how.engine, point, reference, results, refused, scores,
         tuple(notes),
     )  # fmt: skip
-    write(outcome, output, picture)
+    write(outcome, output, picture, film, progress)
     return outcome
 
 
-def check(how: ReconstructSettings, output: Path | None, picture: Path | None) -> None:
+def check(
+    how: ReconstructSettings,
+    output: Path | None,
+    picture: Path | None,
+    film: Path | None = None,
+) -> None:
     """Refuse what cannot be, before any file is read."""
     if check_threads(how.threads) > 1:
         reasons = {
@@ -151,11 +157,13 @@ def check(how: ReconstructSettings, output: Path | None, picture: Path | None) -
             "--budget and --accuracy are of the C core in float32; leave  --engine"
             f" {how.engine}  out"
         )
-    refuse_unwritable(output, picture)
-    if picture is not None:
-        from eitskin.view.pictures import load_matplotlib
+    refuse_unwritable(output, picture, film)
+    if picture is not None or film is not None:
+        from eitskin.view.film import check_film
+        from eitskin.view.sheets import check_picture
 
-        load_matplotlib()
+        check_picture(picture)
+        check_film(film)
 
 
 def read(path: Path, only: tuple[str, ...] | None) -> tuple[Frames, list[int]]:
@@ -290,12 +298,22 @@ def score(
     return {k: one for k, one in scored.items() if one is not None}
 
 
-def write(outcome: ReconstructOutcome, output: Path | None, picture: Path | None) -> None:
-    """The file of results and the picture, where there is something to show."""
+def write(
+    outcome: ReconstructOutcome,
+    output: Path | None,
+    picture: Path | None,
+    film: Path | None = None,
+    progress: Progress = lambda frames, _: frames,
+) -> None:
+    """The file of results, the film and the picture, where there is something to show."""
     if output is not None and outcome.results:
         from eitskin.frames.results_file import save_results
 
         save_results(output, outcome.model, outcome.frames, outcome.results)
+    if film is not None and outcome.results:
+        from eitskin.view.frame_pictures import film_results
+
+        film_results(film, outcome.model, outcome.frames, outcome.results, progress=progress)
     if picture is not None and outcome.results:
         from eitskin.view.frame_pictures import draw_results
 

@@ -45,12 +45,12 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.fileio import refuse_unwritable
     from eitskin.frames.frames import save_frames
     from eitskin.view.demo_picture import draw_demo
-    from eitskin.view.pictures import load_matplotlib
+    from eitskin.view.sheets import check_picture
 
     refuse_unwritable(options.picture, options.frames)
     if not -20 <= options.snr_db <= 200 or options.seed < 0:
         raise UsageError("demo: --snr-db must be -20 to 200 and --seed at least 0")
-    load_matplotlib()
+    check_picture(options.picture)
     step = _Steps(3 if options.no_board else 4)
     demo = run_demo(options.seed, options.snr_db, step)
     if options.frames is not None:

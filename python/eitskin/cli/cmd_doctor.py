@@ -49,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     option(device, "--frames N", "to be measured, 4 to 1024", default=32)
     option(device, "--model MODEL.eitm", "the board's, where it is not the prebuilt one", Path)
     option(parser, "--json", "print the report as JSON")
-    option(parser, "--picture PNG", "draw what was measured (needs matplotlib)", Path)
+    option(parser, "--picture FILE", "draw what was measured (needs matplotlib)", Path)
     parser.add_argument(
         "--touch",
         action="append",
@@ -72,6 +72,10 @@ def run(options: argparse.Namespace) -> int:
 
     if (options.source is None) == (options.device is None):
         raise UsageError("doctor: name frames to examine, or a board with --device URL, not both")
+    if options.picture is not None:
+        from eitskin.view.sheets import check_picture
+
+        check_picture(options.picture)
     protocol, skin, n_electrodes = read_protocol(options)
     if options.device is not None:
         return _run_device(options, skin)
@@ -127,9 +131,9 @@ def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
 
 def _tell(options: argparse.Namespace, report: Report, case: Case) -> int:
     if options.picture is not None:
-        from eitskin.frames.doctor.picture import draw
+        from eitskin.view.doctor_picture import draw_report
 
-        draw(options.picture, report, case)
+        draw_report(options.picture, report, case)
     if options.json:
         print(json.dumps(report.as_table()))
     else:

@@ -66,7 +66,13 @@ def add_parser(subparsers: Any) -> None:
     )
     option(parser, "--saturation-v V", "leave channels at or beyond +-V out", float)
     option(parser, "-o --output OUT.npz", "write images, touches and solver info", Path)
-    option(parser, "--picture PNG", "draw all frames, with the truth where known", Path)
+    option(
+        parser,
+        "--picture FILE",
+        "all frames, the truth where known (PNG, SVG, PDF)",
+        Path,
+    )
+    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
     option(parser, "--json")
     parser.set_defaults(run=run)
 
@@ -97,6 +103,7 @@ def run(options: argparse.Namespace) -> int:
         settings,
         output=options.output,
         picture=options.picture,
+        film=options.film,
         progress=bar("frames"),
     )
     for note in outcome.notes:

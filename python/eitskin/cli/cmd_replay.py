@@ -28,7 +28,8 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "--mode KIND[,KIND]", "raw, image, touches, or several (default: touches)")
     option(parser, "--first N", "the first N frames only", int)
     option(parser, "--model MODEL.eitm", "the board's model where it is not the prebuilt one", Path)
-    option(parser, "--picture PNG", "draw images and touches, a panel a frame", Path)
+    option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Path)
+    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
     option(parser, "--frames OUT.npz", "write the raw frames for  reconstruct  and  doctor", Path)
     option(parser, "--check", "solve again here and compare; exit code 10 where bits differ")
     add_verbose(parser)
@@ -43,10 +44,11 @@ def run(options: argparse.Namespace) -> int:
     whole("--first", options.first, 1, 2**32 - 1)
     refuse_unwritable(options.picture, options.frames)
     if options.check or options.frames is not None:
-        if options.mode is not None or options.picture is not None or options.first is not None:
+        shown = (options.mode, options.picture, options.film, options.first)
+        if any(one is not None for one in shown):
             raise UsageError(
-                "replay: --mode, --picture and --first show a recording; leave them out with"
-                " --check and --frames"
+                "replay: --mode, --picture, --film and --first show a recording; leave them out"
+                " with --check and --frames"
             )
         if options.frames is not None:
             _export(options)
@@ -58,16 +60,16 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _show(options: argparse.Namespace) -> None:
-    from eitskin.cli.live_output import check_picture, show
+    from eitskin.cli.live_output import check_drawn, show
     from eitskin.live.session import Session, SessionSettings
 
     mode = read_mode(options.mode or "touches")
-    check_picture(options.picture, mode)
+    check_drawn(options, mode)
     settings = SessionSettings(
         mode=mode,
         frames=options.first or 0,
         model=options.model,
-        model_for="" if options.picture is None else "a picture",
+        model_for="a picture" if options.picture or options.film else "",
     )
     with Session(f"file:{options.recording}", settings, say=say) as session:
         show(options, session)

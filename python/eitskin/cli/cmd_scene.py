@@ -44,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
         "picture", help="draw a scene: touches on the skin, voltages over time"
     )
     option(picture, "scene SCENE", SCENE_HELP)
-    option(picture, "-o --output PNG", None, Path, required=True)
+    option(picture, "-o --output FILE", None, Path, required=True)
     picture.set_defaults(run=run_picture)
     names = what.add_parser("list", help="the scenes that come with the package")
     option(names, "--json")
@@ -149,11 +149,11 @@ def run_picture(options: argparse.Namespace) -> int:
     from eitskin.scene.compiler import compile_scene
     from eitskin.scene.library_scenes import find_scene
     from eitskin.scene.runner import run
-    from eitskin.view.pictures import load_matplotlib
     from eitskin.view.scene_pictures import draw_scene
+    from eitskin.view.sheets import check_picture
 
     _check_folder(options.output)
-    load_matplotlib()
+    check_picture(options.output)
     scene = find_scene(options.scene)
     draw_scene(
         options.output, scene, run(compile_scene(scene), truth_pixels=0, progress=bar("solving"))

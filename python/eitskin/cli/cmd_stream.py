@@ -35,7 +35,8 @@ def add_parser(subparsers: Any) -> None:
     )
     add_device(parser)
     add_stream(parser, "touches")
-    option(parser, "--picture PNG", "draw images and touches, a panel a frame", Path)
+    option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Path)
+    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
     option(parser, "--record RUN.eits", "also record every packet, as  eitskin record  does", Path)
     option(parser, "--overwrite", "write over files that exist, of --record and --to")
     add_outputs(parser)
@@ -46,16 +47,15 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Set up, follow, sum up."""
-    from eitskin.cli.live_output import check_picture, show
+    from eitskin.cli.live_output import check_drawn, show
     from eitskin.device.wire.link_table import Stream
-    from eitskin.fileio import refuse_unwritable
     from eitskin.live.session import Session
 
     mode = read_mode(options.mode)
-    needs = "an image" if mode & Stream.IMAGE else "a picture" if options.picture else ""
-    refuse_unwritable(options.picture)
+    drawn = options.picture is not None or options.film is not None
+    needs = "an image" if mode & Stream.IMAGE else "a picture" if drawn else ""
     settings = session_settings(options, mode, record=options.record, model_for=needs)
-    check_picture(options.picture, mode)
+    check_drawn(options, mode)
     with (
         Session(options.device, settings, say=say) as session,
         opened_outputs(options, session) as outputs,

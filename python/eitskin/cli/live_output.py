@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.device_options import say
+from eitskin.cli.progress import bar
 from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.errors import EitskinError, UsageError
 
@@ -20,23 +20,28 @@ HEADER = "  time s  touch    x mm    y mm  radius mm  force g"
 SCORED = "  off mm"
 
 
-def check_picture(path: Path | None, what: Stream) -> None:
-    """Refuse a picture of what cannot be drawn, before anything is done for it.
+def check_drawn(options: argparse.Namespace, what: Stream) -> None:
+    """Refuse ``--picture`` and ``--film`` of what cannot be drawn, before anything is done for it.
 
     Raises:
-        UsageError: neither images nor touches are asked for.
+        UsageError: neither images nor touches are asked for, or a name says no format.
         MissingExtraError: matplotlib is not installed.
     """
     from eitskin.device.wire.link_table import Stream
-    from eitskin.view.pictures import load_matplotlib
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.view.film import check_film
+    from eitskin.view.sheets import check_picture
 
-    if path is None:
+    if options.picture is None and options.film is None:
         return
+    refuse_unwritable(options.picture, options.film)
+    check_picture(options.picture)
+    check_film(options.film)
     if not what & (Stream.IMAGE | Stream.TOUCHES):
         raise UsageError(
-            "--picture draws images and touches; use  --mode image  or  --mode image,touches"
+            "--picture and --film draw images and touches; use  --mode image  or  --mode"
+            " image,touches"
         )
-    load_matplotlib()
 
 
 class Rows:
@@ -76,15 +81,15 @@ class Rows:
 
 
 def show(options: argparse.Namespace, session: Session, outputs: Outputs | None = None) -> None:
-    """Print every frame and all news of ``session``, give them to ``outputs``, draw ``--picture``,
-    print the summary; Ctrl-C ends it in good order.
+    """Print every frame and all news of ``session``, give them to ``outputs``, draw ``--picture``
+    and ``--film``, print the summary; Ctrl-C ends it in good order.
 
     Raises:
         EitskinError: what ended the stream, after everything up to then was summed up.
     """
     from eitskin.live.frame import Notice
     from eitskin.live.message import encoded
-    from eitskin.view.stream_picture import Album, draw_stream
+    from eitskin.view.stream_picture import Album, draw_stream, film_stream
 
     album, broken = Album(), None
     rows = Rows(options.verbose, session.truth is not None)
@@ -96,7 +101,7 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
             if isinstance(item, Notice):
                 say(item.text)
                 continue
-            if options.picture is not None:
+            if options.picture is not None or options.film is not None:
                 album.add(item.compared)
             lines = [encoded(item.message())] if options.json else rows.lines(item)
             print("\n".join(lines), flush=True)
@@ -109,9 +114,12 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
         frames.close()  # the board gets its stop before it is asked what it counted
     if broken is None:
         session.finish()
-    if options.picture is not None and album.count and session.known is not None:
-        board, url = session.device.board.board, session.device.transport.url
-        draw_stream(options.picture, session.known.model, album, title=f"{board} {url}")
+    if album.count and session.known is not None:
+        board, url, model = session.device.board.board, session.device.transport.url, session.known
+        if options.picture is not None:
+            draw_stream(options.picture, model.model, album, title=f"{board} {url}")
+        if options.film is not None:
+            film_stream(options.film, model.model, album, progress=bar("film"))
     if session.summary.frames or broken is None:
         _print_summary(options, session, outputs)
     if broken is not None:

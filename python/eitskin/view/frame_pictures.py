@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from math import ceil, sqrt
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 from eitskin.scoring.score import FrameScore
-from eitskin.view.pictures import Mark, Panel, draw_panels, found_mark
+from eitskin.view.pictures import Mark, Panel, found_mark
+from eitskin.view.sheets import draw_panels
 
 MAX_PANELS = 36
 
@@ -59,9 +61,38 @@ def draw_results(
                 f"\nMIoU {scores[number].miou_image:.2f}, touches {scores[number].miou_touches:.2f}"
             )
         panels.append(Panel(heading, result.image, true_marks(frames, number), found_marks(result)))
-    note = "circles: true touches; crosses and dashed circles: found; ellipses: places, 90 %"
-    if len(results) > MAX_PANELS:
-        note += f"; the first {MAX_PANELS} of {len(results)} frames"
-    draw_panels(
-        path, model.skin, model.grid, panels, ceil(sqrt(len(panels))), title=title, note=note
-    )
+    more = len(results) > MAX_PANELS
+    note = f"the first {MAX_PANELS} of {len(results)} frames" if more else ""
+    draw_panels(path, model.skin, model.grid, panels, title=title, note=note, legend=True)
+
+
+def film_results(
+    path: str | Path,
+    model: Model,
+    frames: Frames,
+    results: dict[int, Reconstruction],
+    *,
+    progress: Callable[..., Iterable[Any]] = lambda items, _: items,
+) -> None:
+    """Image, true and found touches frame by frame, in the frames' time, or ten a second where they
+    have none.
+
+    Raises:
+        MissingExtraError: matplotlib or pillow is not installed.
+        FileError: the file cannot be written.
+    """
+    from eitskin.view.film import draw_film, thinned
+
+    kept = [list(results)[k] for k in thinned(len(results))]
+    panels = [
+        Panel(
+            frames.frame_name[number],
+            results[number].image,
+            true_marks(frames, number),
+            found_marks(results[number]),
+        )
+        for number in kept
+    ]
+    times = frames.time_s
+    shown = [0.1 * k if times is None else float(times[k]) for k in kept]
+    draw_film(path, model, panels, shown, progress=progress)

@@ -8,9 +8,7 @@ less, white no change. matplotlib is imported when a picture is drawn, and needs
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,12 +17,10 @@ import numpy.typing as npt
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import missing_extra
 from eitskin.fem.grid import Grid
-from eitskin.fileio import write_beside
 from eitskin.skin.skin import Skin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 INK = "#1b1b1b"
 RIM = "#4a4a4a"
@@ -32,7 +28,7 @@ ELECTRODE = "#b8860b"
 TRUE = "#111111"
 FOUND = "#00796b"
 COLOURS = "RdBu_r"
-DPI = 150
+MARGIN, SMALL_MARGIN = 0.10, 0.03  # around a skin, of its larger side
 PLACE_90 = 4.605  # chi-squared of two numbers that 90 % lie below
 Place = tuple[float, float, float]
 STYLE = {
@@ -103,99 +99,6 @@ def load_matplotlib() -> Any:
     return matplotlib
 
 
-def draw_frame(
-    path: str | Path,
-    skin: Skin,
-    grid: Grid,
-    values: npt.ArrayLike,
-    *,
-    truth: Sequence[Mark] = (),
-    found: Sequence[Mark] = (),
-    title: str = "",
-    unit: str = "S/m",
-) -> None:
-    """One frame as a PNG: truth (where given) | image | touches, with axes in mm and a colour bar
-    in ``unit``.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written.
-    """
-    image = np.asarray(values, dtype=np.float64)
-    panels = [Panel("image", image), Panel("touches", None, tuple(truth), tuple(found))]
-    if truth:
-        panels.insert(0, Panel("truth", None, tuple(truth), fill_truth=True))
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(
-            figsize=(3.9 * len(panels) + 0.4, 5.2), layout="compressed"
-        )
-        figure.get_layout_engine().set(h_pad=0.08)
-        for k, panel in enumerate(panels):
-            axes = figure.add_subplot(1, len(panels), k + 1)
-            limit = (
-                _limit(image)
-                if panel.values is not None
-                else _limit([m.change or 0.0 for m in panel.truth])
-            )
-            coloured = draw_panel(axes, skin, grid, panel, limit=limit)
-            if k == 0:
-                axes.set_ylabel("y (mm)")
-            bar = figure.colorbar(
-                coloured, ax=axes, location="bottom", shrink=0.85, aspect=32, pad=0.02
-            )
-            if panel.values is not None or panel.fill_truth:
-                bar.set_label(f"change of conductivity ({unit})")
-                bar.locator = matplotlib.ticker.MaxNLocator(5)
-            else:
-                bar.ax.clear()
-                bar.ax.set_axis_off()
-                _legend(bar.ax, panel)
-        if title:
-            figure.suptitle(title, fontsize=11, fontweight="bold", color=INK)
-        save_png(figure, path)
-
-
-def draw_panels(
-    path: str | Path,
-    skin: Skin,
-    grid: Grid,
-    panels: Sequence[Panel],
-    columns: int,
-    *,
-    title: str = "",
-    note: str = "",
-) -> None:
-    """Many small frames as a PNG, row by row, each coloured by its own largest change; ``note``
-    stands below.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written.
-    """
-    matplotlib = load_matplotlib()
-    rows = math.ceil(len(panels) / columns)
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(
-            figsize=(1.75 * columns + 0.7, 1.95 * rows + 0.9), layout="compressed"
-        )
-        axes_of_bar, coloured = [], None
-        for k, panel in enumerate(panels):
-            axes = figure.add_subplot(rows, columns, k + 1)
-            coloured = draw_panel(axes, skin, grid, panel, small=True)
-            axes_of_bar.append(axes)
-        if coloured is not None:
-            bar = figure.colorbar(
-                coloured, ax=axes_of_bar, location="right", shrink=0.5, aspect=30, pad=0.02
-            )
-            bar.set_label("change of conductivity / its largest size in the panel")
-        if title:
-            figure.suptitle(title, fontsize=11, fontweight="bold", color=INK)
-        if note:
-            figure.supxlabel(note, fontsize=8, color=INK)
-        save_png(figure, path)
-
-
 def draw_panel(
     axes: Axes,
     skin: Skin,
@@ -228,7 +131,7 @@ def draw_panel(
         values = np.asarray(panel.values, dtype=np.float64)
         x0, y0 = grid.origin_mm
         extent = (x0, x0 + grid.nx * grid.pixel_mm, y0, y0 + grid.ny * grid.pixel_mm)
-        shown = grid.image(values / _limit(values) if limit is None else values)
+        shown = grid.image(values / largest(values) if limit is None else values)
         colour: dict[str, Any] = {
             "cmap": COLOURS,
             "vmin": -scale,
@@ -237,11 +140,11 @@ def draw_panel(
         }
         picture = axes.imshow(shown, origin="lower", extent=extent, zorder=1, **colour)
         picture.set_clip_path(sheet)
-    largest = _limit([m.change or 0.0 for m in panel.truth])
+    most = largest([m.change or 0.0 for m in panel.truth])
     for mark in panel.truth:
         face: Any = "none"
         if panel.fill_truth and mark.change is not None:
-            part = mark.change / largest if limit is None else mark.change / limit
+            part = mark.change / most if limit is None else mark.change / limit
             face = colour_map(0.5 + 0.5 * part)
         _circle(
             axes,
@@ -298,7 +201,7 @@ def _draw_electrodes(axes: Axes, skin: Skin, small: bool) -> None:
     outline = skin.outline
     x0, y0, x1, y1 = outline.bounding_box_mm
     size = max(x1 - x0, y1 - y0)
-    margin = 0.03 if small else 0.10
+    margin = SMALL_MARGIN if small else MARGIN
     for k, (start, end) in enumerate(skin.electrode_spans_mm()):
         along = outline.points_at(np.linspace(start, end, 9))
         axes.plot(
@@ -319,33 +222,7 @@ def _draw_electrodes(axes: Axes, skin: Skin, small: bool) -> None:
             axes.spines[side].set_visible(False)
 
 
-def _legend(axes: Axes, panel: Panel) -> None:
-    """In place of a colour bar, which keeps panels in line: what circles and crosses mean."""
-    from matplotlib.lines import Line2D
-
-    handles = []
-    if panel.truth:
-        circle: dict[str, Any] = {
-            "markerfacecolor": "none",
-            "markeredgecolor": TRUE,
-            "markersize": 10,
-        }
-        handles.append(Line2D([], [], marker="o", color="none", label="true touch", **circle))
-    if panel.found:
-        cross: dict[str, Any] = {"markeredgecolor": FOUND, "markersize": 8, "markeredgewidth": 1.6}
-        handles.append(Line2D([], [], marker="x", color="none", label="found touch", **cross))
-    if handles:
-        axes.legend(handles=handles, loc="center", ncols=2, frameon=False)
-
-
-def _limit(values: npt.ArrayLike) -> float:
+def largest(values: npt.ArrayLike) -> float:
     """The largest size of ``values``, 1 where all are 0 or there are none."""
     sizes = np.abs(np.asarray(values, dtype=np.float64))
     return float(sizes.max()) if sizes.size and sizes.max() > 0 else 1.0
-
-
-def save_png(figure: Figure, path: str | Path) -> None:
-    """Write a PNG whole or not at all, without the date and versions that would make two runs
-    differ."""
-    with write_beside(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})

@@ -11,7 +11,8 @@ import numpy as np
 from eitskin.fem.grid import grid_for
 from eitskin.frames.frames import Frames
 from eitskin.scene.description import Scene
-from eitskin.view.pictures import INK, STYLE, Panel, draw_panel, load_matplotlib, save_png
+from eitskin.view.pictures import INK, STYLE, Panel, draw_panel, load_matplotlib
+from eitskin.view.sheets import save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +48,7 @@ def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
             wrap=True,
         )
         figure.supxlabel(f"effects: {named}", fontsize=8, color=INK)
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def _draw_touches(axes: Axes, scene: Scene) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from math import ceil, sqrt
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from eitskin.model.model import Model
 from eitskin.scoring.stream_check import ComparedFrame, spread
-from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels, found_mark
+from eitskin.view.pictures import Mark, Panel, found_mark
+from eitskin.view.sheets import draw_frame, draw_panels
 
 MAX_PANELS = 36
 MAX_KEPT = 20 * MAX_PANELS
@@ -36,12 +38,16 @@ class Album:
     @property
     def frames(self) -> list[ComparedFrame]:
         """At most 36, the first and the last among them."""
+        return self.spread(MAX_PANELS)
+
+    def spread(self, most: int) -> list[ComparedFrame]:
+        """At most ``most`` (up to 360), evenly spaced, the first and the last among them."""
         kept = (
             self._kept
             if self._last is None or self._kept[-1] is self._last
             else [*self._kept, self._last]
         )
-        return spread(kept, MAX_PANELS)
+        return spread(kept, most)
 
     @property
     def count(self) -> int:
@@ -74,22 +80,33 @@ def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> 
             title=title,
         )
         return
-    panels = [
-        Panel(
-            f"frame {seen.frame.number}, {seen.frame.time_us / 1e6:.2f} s",
-            None if seen.frame.image is None else seen.frame.image.image,
-            _true_marks(model, seen),
-            _found_marks(seen),
-        )
-        for seen in frames
-    ]
-    note = "crosses: found" + (
-        "; circles: true touches" if any(seen.true for seen in frames) else ""
-    )
-    if album.count > len(frames):
-        note += f"; {len(frames)} of {album.count} frames"
-    draw_panels(
-        path, model.skin, model.grid, panels, ceil(sqrt(len(panels))), title=title, note=note
+    panels = [_panel(model, seen) for seen in frames]
+    thinned = album.count > len(frames)
+    note = f"{len(frames)} of {album.count} frames" if thinned else ""
+    draw_panels(path, model.skin, model.grid, panels, title=title, note=note, legend=True)
+
+
+def film_stream(
+    path: str | Path,
+    model: Model,
+    album: Album,
+    *,
+    progress: Callable[..., Iterable[Any]] = lambda items, _: items,
+) -> None:
+    """The album as a film. Raises as ``draw_stream``."""
+    from eitskin.view.film import MAX_FRAMES, draw_film
+
+    frames = album.spread(MAX_FRAMES)
+    times_s = [seen.frame.time_us / 1e6 for seen in frames]
+    draw_film(path, model, [_panel(model, seen) for seen in frames], times_s, progress=progress)
+
+
+def _panel(model: Model, seen: ComparedFrame) -> Panel:
+    return Panel(
+        f"frame {seen.frame.number}, {seen.frame.time_us / 1e6:.2f} s",
+        None if seen.frame.image is None else seen.frame.image.image,
+        _true_marks(model, seen),
+        _found_marks(seen),
     )
 
 

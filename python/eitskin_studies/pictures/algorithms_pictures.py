@@ -13,7 +13,8 @@ import numpy.typing as npt
 from eitskin.fem.grid import Grid
 from eitskin.scoring import metrics
 from eitskin.skin.skin import Skin
-from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panel, load_matplotlib, save_png
+from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panel, load_matplotlib
+from eitskin.view.sheets import save_picture
 from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD, AlgorithmResult
 from eitskin_studies.experiments.algorithms.scenes import shown_set
 from eitskin_studies.pictures.comparison_pictures import truth_marks
@@ -67,7 +68,7 @@ def draw_images(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Algorit
             " its own largest size; number: MIoU at the method's own t"
         )
         figure.supxlabel(note, fontsize=8)
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_masks(path: Path, *, skin: Skin, grid: Grid, results: Sequence[AlgorithmResult]) -> None:
@@ -109,7 +110,7 @@ def draw_masks(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Algorith
             f"t = {FIXED_THRESHOLD:g}; lower: both chosen on tuning scenes. Number: MIoU",
             fontsize=11,
         )
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_curves(path: Path, *, results: Sequence[AlgorithmResult]) -> None:
@@ -141,7 +142,7 @@ def draw_curves(path: Path, *, results: Sequence[AlgorithmResult]) -> None:
         left.text(0.99, 0.845, "the paper: FISTA 0.84", color=PAPER, fontsize=8, ha="right")
         left.text(0.99, 0.405, "the paper: others 0.4 to 0.5", color=PAPER, fontsize=8, ha="right")
         right.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_bars(path: Path, *, results: Sequence[AlgorithmResult]) -> None:
@@ -208,7 +209,7 @@ def draw_bars(path: Path, *, results: Sequence[AlgorithmResult]) -> None:
         axes.set_title("One rule for all, or each at its best")
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def _kept(results: Sequence[AlgorithmResult]) -> list[AlgorithmResult]:

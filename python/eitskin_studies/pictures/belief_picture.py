@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eitskin.view.pictures import FOUND, INK, STYLE, load_matplotlib, save_png
+from eitskin.view.pictures import FOUND, INK, STYLE, load_matplotlib
+from eitskin.view.sheets import save_picture
 from eitskin_studies.experiments.belief.tables import HIGH, LOW, Sets, coverage, curve
 
 SMALLEST = 1e-3
@@ -46,4 +47,4 @@ def draw_belief(path: Path, sets: Sets) -> None:
         right.set_yticks(range(len(covered)), [name.replace("_", " ") for name, _ in covered])
         right.invert_yaxis()
         right.set(xlabel="true places in their 90 % ellipses, %", xlim=(0, 100))
-        save_png(figure, path)
+        save_picture(figure, path)

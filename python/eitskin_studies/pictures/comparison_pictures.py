@@ -7,7 +7,8 @@ from pathlib import Path
 
 from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
-from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
+from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.compare.run import CompareResult, Comparison
 
 
@@ -100,7 +101,7 @@ def draw_curves(path: str | Path, comparison: Comparison) -> None:
         )
         axes.grid(linewidth=0.4, alpha=0.5)
         axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def _short(name: str) -> str:

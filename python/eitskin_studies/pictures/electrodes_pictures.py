@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from eitskin.view.pictures import STYLE, load_matplotlib, save_png
+from eitskin.view.pictures import STYLE, load_matplotlib
+from eitskin.view.sheets import save_picture
 
 EQUALS = {"noise": "equal noise a row", "time": "equal time, 20.8 ms a frame"}
 COLOURS = {"noise": "#1565c0", "time": "#ef6c00"}
@@ -80,7 +81,7 @@ def draw_counts(path: str | Path, bars: Sequence[Bar]) -> None:
         axes[2].legend(frameon=False, loc="upper left", fontsize=7.5)
         for one in axes[1:]:
             one.set_ylim(-4, 104)
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_patterns(path: str | Path, bars: Sequence[Bar]) -> None:
@@ -141,4 +142,4 @@ def draw_patterns(path: str | Path, bars: Sequence[Bar]) -> None:
         figure.legend(
             handles, labels, loc="outside lower center", ncols=len(patterns), frameon=False
         )
-        save_png(figure, path)
+        save_picture(figure, path)

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.skin.skin import Skin
-from eitskin.view.pictures import INK, RIM, STYLE, load_matplotlib, save_png
+from eitskin.view.pictures import INK, RIM, STYLE, load_matplotlib
+from eitskin.view.sheets import save_picture
 from eitskin_studies.experiments.force.law import LOADS_G
 from eitskin_studies.experiments.force.readouts import INTEGRAL, PEAK, TOUCH
 from eitskin_studies.experiments.force.scenes import RADIUS_SHARES
@@ -52,7 +53,7 @@ def draw_curves(path: Path, curves: dict[str, ForceCurves]) -> None:
             axes.set_ylim(bottom=0)
             axes.grid(alpha=0.25)
         figure.axes[0].legend(frameon=False, title="place")
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_skin(
@@ -98,7 +99,7 @@ def draw_skin(
                 figure.colorbar(
                     shown, ax=figure.axes[-2:] if k else axes, shrink=0.8, label="off by (%)"
                 )
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_detection(path: Path, found: list[Detection]) -> None:
@@ -134,4 +135,4 @@ def draw_detection(path: Path, found: list[Detection]) -> None:
         axes.set_ylabel("smallest load detected with probability 0.9 (g)")
         axes.grid(alpha=0.25, which="both")
         axes.legend(frameon=False, title="place")
-        save_png(figure, path)
+        save_picture(figure, path)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eitskin.view.pictures import INK, STYLE, load_matplotlib, save_png
+from eitskin.view.pictures import INK, STYLE, load_matplotlib
+from eitskin.view.sheets import save_picture
 from eitskin_studies.benchmarks.growth import GrowthTimes, exponent
 
 SOLVE, TOUCHES, MACS = "#1f6fb4", "#d1661f", "#7a7a7a"
@@ -68,4 +69,4 @@ def draw_growth(path: str | Path, result: GrowthTimes) -> None:
                 other.set_yticklabels([])
             if number:
                 axes.set_yticklabels([])
-        save_png(figure, path)
+        save_picture(figure, path)

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from eitskin.view.pictures import COLOURS, INK, STYLE, load_matplotlib, save_png
+from eitskin.view.pictures import COLOURS, INK, STYLE, load_matplotlib
+from eitskin.view.sheets import save_picture
 from eitskin_studies.experiments.homogeneous.cases import IDEAL, MEASURED_TANK, SIMULATED_TANK
 from eitskin_studies.experiments.homogeneous.tables import Row
 from eitskin_studies.experiments.homogeneous.uniformity import deviations_percent
@@ -66,7 +67,7 @@ def draw_waveforms(path: Path, *, rows: Sequence[Row]) -> None:
             "drive (current into this electrode, out of the next); within each the 13 pairs in turn"
         )
         figure.suptitle("An untouched skin: a U for each drive")
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_deviations(path: Path, *, rows: Sequence[Row]) -> None:
@@ -102,4 +103,4 @@ def draw_deviations(path: Path, *, rows: Sequence[Row]) -> None:
             "Distance of each of the 208 values from the mean over drives; each panel has its own"
             " scale"
         )
-        save_png(figure, path)
+        save_picture(figure, path)

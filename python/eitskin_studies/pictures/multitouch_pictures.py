@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
-from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
+from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.experiments.multitouch.ambiguity import ScoredFrame
 from eitskin_studies.experiments.multitouch.ambiguity_tables import found_some, reliabilities
 from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, MAX, MIN, NARROW, RING, WIDE
@@ -79,7 +80,7 @@ def draw_counts(path: str | Path, counted: CountedScenes) -> None:
         figure.legend(
             handles, labels, loc="outside lower center", ncols=6, frameon=False, fontsize=8
         )
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def _line(
@@ -169,7 +170,7 @@ def draw_ambiguity(path: str | Path, ambiguities: Ambiguities) -> None:
         _chances(axes, ambiguities)
         axes = figure.add_subplot(2, 4, 8)
         _trade(axes, ambiguities)
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def _groupings(frames: Sequence[ScoredFrame]) -> list[tuple[str, list[str], npt.NDArray[np.int64]]]:
@@ -307,4 +308,4 @@ def draw_touch_scores(path: str | Path, ambiguities: Ambiguities) -> None:
                 title="area under ROC",
                 title_fontsize=8,
             )
-        save_png(figure, path)
+        save_picture(figure, path)

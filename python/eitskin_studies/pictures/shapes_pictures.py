@@ -11,17 +11,8 @@ import numpy as np
 
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
-from eitskin.view.pictures import (
-    FOUND,
-    INK,
-    RIM,
-    STYLE,
-    Mark,
-    Panel,
-    draw_panel,
-    load_matplotlib,
-    save_png,
-)
+from eitskin.view.pictures import FOUND, INK, RIM, STYLE, Mark, Panel, draw_panel, load_matplotlib
+from eitskin.view.sheets import save_picture
 
 MIN_LOG10 = -3.0
 MISSED = "#c62828"
@@ -127,4 +118,4 @@ def draw_shapes(path: str | Path, shapes: Sequence[ShapePanel]) -> None:
             Line2D([], [], marker="x", color="none", markeredgecolor=MISSED, label="missed"),
         ]
         figure.legend(handles=handles, loc="lower right", frameon=False, labelcolor=INK)
-        save_png(figure, path)
+        save_picture(figure, path)

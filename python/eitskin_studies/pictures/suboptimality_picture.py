@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eitskin.view.pictures import load_matplotlib, save_png
+from eitskin.view.pictures import load_matplotlib
+from eitskin.view.sheets import save_picture
 from eitskin_studies.benchmarks.suboptimality import MIN, GapCurves
 
 COLOURS = {
@@ -64,4 +65,4 @@ def draw(path: Path, curves: GapCurves) -> None:
     )
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, loc="lower right")
-    save_png(figure, path)
+    save_picture(figure, path)

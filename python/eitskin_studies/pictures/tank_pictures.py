@@ -11,7 +11,8 @@ import numpy as np
 
 from eitskin.scoring.metrics import THRESHOLDS
 from eitskin.view.frame_pictures import true_marks
-from eitskin.view.pictures import STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from eitskin.view.pictures import STYLE, Mark, Panel, load_matplotlib
+from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.tanks import tank, touch_like
 
@@ -116,7 +117,7 @@ def draw_curves(path: str | Path, results: Sequence[dict[str, Any]]) -> None:
         axes.flat[0].legend(frameon=False, fontsize=7, loc="lower left")
         figure.supxlabel("threshold t: an object is where x > t max(x)", fontsize=9)
         figure.supylabel("mean MIoU", fontsize=9)
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def _short(name: str) -> str:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eitskin.core.diagnostics_table import Touch
-from eitskin.view.pictures import STYLE, load_matplotlib, save_png
+from eitskin.view.pictures import STYLE, load_matplotlib
+from eitskin.view.sheets import save_picture
 
 if TYPE_CHECKING:
     from eitskin_studies.experiments.tracking.counted import TrackCount
@@ -67,7 +68,7 @@ def draw_stream_told(
         )
         figure.suptitle(f"{fingers}, {note}; grey: true, a colour an id", fontsize=9.5)
         figure.tight_layout()
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_worth(
@@ -111,4 +112,4 @@ def draw_worth(
             axis.set_xticks(snrs_db, [f"{snr_db} dB" for snr_db in snrs_db])
         axes[1].legend(frameon=False, fontsize=7.5)
         figure.tight_layout()
-        save_png(figure, path)
+        save_picture(figure, path)

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.tuning.front import F767_MHZ, Conditions, Front, Point
-from eitskin.view.pictures import INK, STYLE, load_matplotlib, save_png
+from eitskin.view.pictures import INK, STYLE, load_matplotlib
+from eitskin.view.sheets import save_picture
 from eitskin_studies.tradeoff.table import best_points, x_of
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def draw_front(path: Path, front: Front) -> None:
             f"What accuracy costs: {how.get('scenes')} scenes of 1 to 3 random touches, 60 dB, seed"
             f" {how.get('seed')}; line: the front"
         )
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def _draw_one_front(axes: Axes, points: Sequence[Point], where: Conditions, counted: bool) -> None:
@@ -188,7 +189,7 @@ def draw_knobs(path: Path, front: Front) -> None:
             axes.grid(linewidth=0.4, alpha=0.5)
         scenes = f"{front.settings.get('scenes')} scenes of 1 to 3 random touches, 60 dB"
         figure.suptitle(f"One knob at a time: {scenes}; bars: 95 % interval")
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def _draw_knob(axes: Axes, groups: Sequence[Sequence[Point]], knob: str) -> None:
@@ -269,7 +270,7 @@ def draw_noise(path: Path, front: Front) -> None:
             " scenes at"
             " 60 dB"
         )
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_samples(path: Path, front: Front) -> None:
@@ -307,7 +308,7 @@ def draw_samples(path: Path, front: Front) -> None:
         figure.suptitle(
             "SNR against samples; the SNR is that of 80 samples, noise falls with their root"
         )
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_scenes(path: Path, front: Front) -> None:
@@ -358,7 +359,7 @@ def draw_scenes(path: Path, front: Front) -> None:
             "The front of images on every set of scenes, 60 dB; t is that of random training scenes"
             " for all"
         )
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 def draw_objective(path: Path, front: Front) -> None:
@@ -394,4 +395,4 @@ def draw_objective(path: Path, front: Front) -> None:
         )
         if axes.lines:
             axes.legend(frameon=False, fontsize=7)
-        save_png(figure, path)
+        save_picture(figure, path)

@@ -13,7 +13,8 @@ from touch_scenes import frames_of, groups
 
 from eitskin.scene.random_touches import TouchScene
 from eitskin.solve.options import default_options
-from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
+from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
 from eitskin_studies.pictures.comparison_pictures import truth_marks
 from small_models import prebuilt
@@ -79,7 +80,7 @@ def draw_losses(path: Path) -> None:
                 axes.invert_xaxis()
             if k == 0:
                 axes.set_ylabel("change of the image,\nshare of its norm")
-        save_png(figure, path)
+        save_picture(figure, path)
 
 
 DRAWN: dict[str, Callable[[Path], None]] = {

@@ -8,33 +8,30 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.errors import FileError, missing_extra
-from eitskin.fileio import write_beside
 from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.gain import channel_gains
 from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
 from eitskin.frames.doctor.report import FAULT, Report
+from eitskin.view.sheets import check_picture, save_picture, wrapped
 
 MEASURED, EXPECTED, BAD = "#1f5f99", "#b0b7bd", "#c2410c"
 GAIN_SPAN = 0.3
 
 
-def draw(path: str | Path, report: Report, case: Case) -> None:
+def draw_report(path: str | Path, report: Report, case: Case) -> None:
     """Write the picture of an examined ``case`` to ``path`` (.png, .pdf, .svg).
 
     Raises:
         MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written, or its suffix is no picture's.
+        UsageError: its suffix is no picture's.
+        FileError: the file cannot be written.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise missing_extra("plot", "matplotlib") from None
+    check_picture(path)
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(11, 7.5), layout="constrained")
-    canvas = FigureCanvasAgg(figure)
-    if Path(path).suffix.lower().lstrip(".") not in canvas.get_supported_filetypes():
-        raise FileError(f"{path}: not a picture's suffix; use .png, .pdf or .svg")
+    FigureCanvasAgg(figure)
     axes = figure.subplots(2, 2)
     _reference(axes[0, 0], case)
     _gains(figure, axes[0, 1], case)
@@ -48,9 +45,9 @@ def draw(path: str | Path, report: Report, case: Case) -> None:
         if not faults
         else "to repair: " + ", ".join(dict.fromkeys(faults))
     )
-    figure.suptitle(f"{Path(report.source).name}: {verdict}", x=0.01, ha="left", fontsize=11)
-    with write_beside(path) as temporary:
-        figure.savefig(temporary, dpi=110)
+    title = wrapped(f"{Path(report.source).name}: {verdict}", 10.6, 11)
+    figure.suptitle("\n".join(title).replace("$", r"\$"), x=0.01, ha="left", fontsize=11)
+    save_picture(figure, path)
 
 
 def _reference(panel: Any, case: Case) -> None:

@@ -1,0 +1,457 @@
+"""Figures of panels, laid out in inches so that every title, label and legend is whole, whatever
+the outline: panels have its shape, texts are wrapped to the width that there is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import UsageError
+from eitskin.fem.grid import Grid
+from eitskin.fileio import write_beside
+from eitskin.skin.skin import Skin
+from eitskin.view.pictures import (
+    FOUND,
+    INK,
+    MARGIN,
+    SMALL_MARGIN,
+    STYLE,
+    TRUE,
+    Mark,
+    Panel,
+    draw_panel,
+    largest,
+    load_matplotlib,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DPI = 150
+FORMATS = (".png", ".svg", ".pdf")
+ASPECT = 1.5  # of a picture, where the number of columns is free
+EMPTY_COST = 1.5  # of empty places, against an aspect that is off
+MIN_WIDTH = 4.2  # inches, as all below
+EDGE, GAP = 0.12, 0.14
+BAR, TICKS, LINE = 0.12, 0.24, 0.165
+AXIS_LEFT, AXIS_BELOW = 0.62, 0.5
+SMALL_SIDE, BIG_SIDE = 1.65, 3.5  # of a square panel
+MAX_SMALL, MAX_BIG = 3.4, 6.4  # of a long one
+MAX_HEADING = 4  # lines
+UNIT_TEXT = "change of conductivity / its largest size in the panel"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The size of one panel, and what stands around it."""
+
+    width: float
+    height: float
+    left: float
+    below: float
+
+    @property
+    def whole(self) -> float:
+        """The width with what stands beside the panel."""
+        return self.left + self.width + GAP
+
+
+@dataclass
+class Sheet:
+    """A figure under way: ``height`` grows from its top as things are put in."""
+
+    width: float
+    height: float = EDGE
+    texts: list[tuple[float, str, float, str]] = field(default_factory=list)
+
+    def text(self, lines: Sequence[str], size: float, weight: str = "normal") -> None:
+        """Centred lines."""
+        for line in lines:
+            self.texts.append((self.height + LINE / 2, line, size, weight))
+            self.height += LINE * size / 8.5
+
+
+def check_path(
+    path: str | Path | None, formats: Sequence[str] = FORMATS, what: str = "picture"
+) -> None:
+    """Refuse a picture's name that says no format, before anything is done for it.
+
+    Raises:
+        UsageError: naming the formats.
+    """
+    if path is not None and Path(path).suffix.lower() not in formats:
+        suffix = Path(path).suffix
+        said = f"{suffix!r} is no format of a {what}" if suffix else f"a {what} needs a suffix"
+        raise UsageError(f"{path}: {said}; use {', '.join(formats)}")
+
+
+def check_picture(path: str | Path | None) -> None:
+    """Refuse a picture that cannot be drawn, before anything is done for it.
+
+    Raises:
+        UsageError: its name says no format.
+        MissingExtraError: matplotlib is not installed.
+    """
+    if path is not None:
+        check_path(path)
+        load_matplotlib()
+
+
+def save_picture(figure: Figure, path: str | Path) -> None:
+    """Write a PNG, SVG or PDF, as the suffix says, whole or not at all, without dates and versions
+    that would make two runs differ.
+
+    Raises:
+        UsageError: another suffix.
+        FileError: it cannot be written.
+    """
+    check_path(path)
+    kind = Path(path).suffix[1:].lower()
+    nothing = {"png": ("Software",), "svg": ("Date",), "pdf": ("CreationDate", "Producer")}[kind]
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context({"svg.hashsalt": "eitskin"}), write_beside(path) as temporary:
+        figure.savefig(temporary, format=kind, dpi=DPI, metadata=dict.fromkeys(nothing))
+
+
+def draw_panels(
+    path: str | Path,
+    skin: Skin,
+    grid: Grid,
+    panels: Sequence[Panel],
+    columns: int | None = None,
+    *,
+    title: str = "",
+    note: str = "",
+    legend: bool = False,
+) -> None:
+    """``panels_figure`` as a picture.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    figure = panels_figure(skin, grid, panels, columns, title=title, note=note, legend=legend)
+    save_picture(figure, path)
+
+
+def draw_frame(
+    path: str | Path,
+    skin: Skin,
+    grid: Grid,
+    values: npt.ArrayLike,
+    *,
+    truth: Sequence[Mark] = (),
+    found: Sequence[Mark] = (),
+    title: str = "",
+    unit: str = "S/m",
+) -> None:
+    """``frame_figure`` as a picture.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    image = np.asarray(values, dtype=np.float64)
+    figure = frame_figure(skin, grid, image, truth=truth, found=found, title=title, unit=unit)
+    save_picture(figure, path)
+
+
+def panels_figure(
+    skin: Skin,
+    grid: Grid,
+    panels: Sequence[Panel],
+    columns: int | None = None,
+    *,
+    title: str = "",
+    note: str = "",
+    legend: bool = False,
+    limit: float | None = None,
+    large: bool | None = None,
+) -> Figure:
+    """Panels row by row, each coloured by its own largest change, or from -``limit`` to ``limit``
+    S/m; one or two (or as ``large`` says) are large and have axes in mm. ``columns``: None as fits
+    best; ``legend`` says what marks mean; ``note`` stands below.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+    """
+    small = len(panels) > 2 if large is None else not large
+    cell = _cell(skin, small)
+    size = 8.0 if small else 10.0
+    columns = columns or _columns(len(panels), cell, size)
+    rows = math.ceil(len(panels) / columns)
+    width = max(columns * cell.whole + 2 * EDGE, MIN_WIDTH)
+    sheet = Sheet(width)
+    if title:
+        sheet.text(wrapped(title, width - 2 * EDGE, 11, "bold"), 11, "bold")
+    headings = [_heading(panel.title, cell, size) for panel in panels]
+    left = (width - columns * cell.whole) / 2
+    places = []
+    for row in range(rows):
+        here = range(row * columns, min((row + 1) * columns, len(panels)))
+        lines = max(len(headings[k].split("\n")) for k in here)
+        sheet.height += GAP + lines * LINE * size / 8.5
+        for k in here:
+            x = left + (k - row * columns) * cell.whole + cell.left
+            places.append((x, sheet.height, cell.width, cell.height))
+        sheet.height += cell.height + cell.below
+    bar_top = sheet.height = sheet.height + GAP
+    coloured = any(panel.values is not None or panel.fill_truth for panel in panels)
+    if coloured:
+        sheet.height += BAR + TICKS
+        unit = UNIT_TEXT if limit is None else "change of conductivity (S/m)"
+        sheet.text(wrapped(unit, width - 2 * EDGE, 8.5), 8.5)
+    key = _Key(panels, width) if legend else None
+    key_top = sheet.height
+    if key is not None:
+        sheet.height += key.height
+    if note:
+        sheet.height += 0.04
+        sheet.text(wrapped(note, width - 2 * EDGE, 8), 8)
+    figure = _figure(sheet)
+    for k, (panel, place) in enumerate(zip(panels, places, strict=True)):
+        axes = _axes(figure, sheet, place)
+        shown = _titled(panel, headings[k])
+        colours = draw_panel(axes, skin, grid, shown, limit=limit, small=small)
+        _axis_labels(axes, small, k % columns == 0)
+    if coloured:
+        bar_width = min(0.7 * width, 3.2)
+        place = ((width - bar_width) / 2, bar_top, bar_width, BAR)
+        _bar(figure, colours, _axes(figure, sheet, place))
+    if key is not None:
+        key.draw(figure, key_top / sheet.height)
+    return figure
+
+
+def frame_figure(
+    skin: Skin,
+    grid: Grid,
+    image: npt.NDArray[Any],
+    *,
+    truth: Sequence[Mark] = (),
+    found: Sequence[Mark] = (),
+    title: str = "",
+    unit: str = "S/m",
+) -> Figure:
+    """One frame at large: truth (where given), image, touches, beside each other or, of a long
+    skin, below each other, with axes in mm and a colour bar in ``unit`` each.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+    """
+    panels = [Panel("image", image), Panel("touches", None, tuple(truth), tuple(found))]
+    if truth:
+        panels.insert(0, Panel("truth", None, tuple(truth), fill_truth=True))
+    cell = _cell(skin, small=False)
+    columns = 1 if cell.width > 2 * cell.height else len(panels)
+    width = max(columns * cell.whole + 2 * EDGE, MIN_WIDTH)
+    sheet = Sheet(width)
+    if title:
+        sheet.text(wrapped(title, width - 2 * EDGE, 11, "bold"), 11, "bold")
+    label = "\n".join(wrapped(f"change of conductivity ({unit})", cell.whole - GAP, 9))
+    lines = label.count("\n") + 1
+    left, places = (width - columns * cell.whole) / 2, []
+    for row in range(math.ceil(len(panels) / columns)):
+        sheet.height += GAP + LINE * 10 / 8.5
+        for k in range(columns if columns > 1 else 1):
+            x = left + k * cell.whole + cell.left
+            places.append((x, sheet.height, cell.width, cell.height))
+        sheet.height += cell.height + cell.below + GAP + BAR + TICKS + lines * LINE * 9 / 8.5
+        del row
+    figure = _figure(sheet)
+    for k, (panel, place) in enumerate(zip(panels, places, strict=True)):
+        axes = _axes(figure, sheet, place)
+        shows = panel.values is not None or panel.fill_truth
+        changes = [mark.change or 0.0 for mark in panel.truth]
+        limit = largest(image if panel.values is not None else changes)
+        coloured = draw_panel(axes, skin, grid, panel, limit=limit)
+        _axis_labels(axes, False, columns == 1 or k == 0)
+        x, top, wide, high = place
+        bar_top = top + high + cell.below + GAP
+        if shows:
+            bar_width = min(0.9 * wide, 3.2)
+            bar = _axes(figure, sheet, (x + (wide - bar_width) / 2, bar_top, bar_width, BAR))
+            _bar(figure, coloured, bar, label)
+        else:
+            key = _Key([panel], cell.whole)
+            middle = (x + wide / 2) / width
+            key.draw(figure, bar_top / sheet.height, middle)
+    return figure
+
+
+def wrapped(text: str, width: float, size: float, weight: str = "normal") -> list[str]:
+    """``text`` in lines of at most ``width`` inches at ``size`` points; words that are longer are
+    cut."""
+    lines: list[str] = []
+    for part in text.split("\n"):
+        line = ""
+        for word in part.split(" "):
+            for piece in _pieces(word, width, size, weight):
+                longer = f"{line} {piece}" if line else piece
+                if line and _inches(longer, size, weight) > width:
+                    lines.append(line)
+                    line = piece
+                else:
+                    line = longer
+        lines.append(line)
+    return lines
+
+
+def _pieces(word: str, width: float, size: float, weight: str) -> list[str]:
+    if _inches(word, size, weight) <= width:
+        return [word]
+    pieces, piece = [], ""
+    for letter in word:
+        if piece and _inches(piece + letter, size, weight) > width:
+            pieces.append(piece)
+            piece = ""
+        piece += letter
+    return [*pieces, piece]
+
+
+@lru_cache(4096)
+def _inches(text: str, size: float, weight: str) -> float:
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    font = FontProperties(size=size, weight=weight)
+    return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]) / 72
+
+
+def _plain(text: str) -> str:
+    """``text`` that matplotlib does not take for a formula."""
+    return text.replace("$", r"\$")
+
+
+def _cell(skin: Skin, small: bool) -> Cell:
+    x0, y0, x1, y1 = skin.outline.bounding_box_mm
+    margin = 2 * (SMALL_MARGIN if small else MARGIN) * max(x1 - x0, y1 - y0)
+    wide, high = x1 - x0 + margin, y1 - y0 + margin
+    side, most = (SMALL_SIDE, MAX_SMALL) if small else (BIG_SIDE, MAX_BIG)
+    scale = min(side / math.sqrt(wide * high), most / max(wide, high))
+    if small:
+        return Cell(scale * wide, scale * high, 0.0, 0.0)
+    return Cell(scale * wide, scale * high, AXIS_LEFT, AXIS_BELOW)
+
+
+def _columns(count: int, cell: Cell, size: float) -> int:
+    """As many columns as bring a picture near ASPECT."""
+    high = cell.height + cell.below + GAP + LINE * size / 8.5
+
+    def off(columns: int) -> float:
+        rows = math.ceil(count / columns)
+        aspect = columns * cell.whole / (rows * high)
+        return abs(math.log(aspect / ASPECT)) + EMPTY_COST * (rows * columns - count) / count
+
+    return min(range(1, count + 1), key=off)
+
+
+def _heading(title: str, cell: Cell, size: float) -> str:
+    lines = wrapped(title, max(cell.whole - 0.06, 0.9), size)
+    if len(lines) > MAX_HEADING:
+        lines = [*lines[: MAX_HEADING - 1], "..."]
+    return "\n".join(lines)
+
+
+def _titled(panel: Panel, heading: str) -> Panel:
+    return Panel(_plain(heading), panel.values, panel.truth, panel.found, panel.fill_truth)
+
+
+def _figure(sheet: Sheet) -> Figure:
+    matplotlib = load_matplotlib()
+    sheet.height += EDGE
+    with matplotlib.rc_context(STYLE):
+        figure: Figure = matplotlib.figure.Figure(figsize=(sheet.width, sheet.height))
+        matplotlib.backends.backend_agg.FigureCanvasAgg(figure)
+        for top, text, size, weight in sheet.texts:
+            figure.text(
+                0.5, 1 - top / sheet.height, _plain(text), ha="center", va="center",
+                fontsize=size, fontweight=weight, color=INK,
+            )  # fmt: skip
+    return figure
+
+
+def _axes(figure: Figure, sheet: Sheet, place: tuple[float, float, float, float]) -> Axes:
+    """Axes at ``place``: left, top, width and height in inches from the sheet's upper left."""
+    left, top, width, height = place
+    bottom = sheet.height - top - height
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context(STYLE):
+        return figure.add_axes(
+            (
+                left / sheet.width,
+                bottom / sheet.height,
+                width / sheet.width,
+                height / sheet.height,
+            )
+        )
+
+
+def _axis_labels(axes: Axes, small: bool, first: bool) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    if small:
+        return
+    width, height = axes.get_figure().get_size_inches() * axes.get_position().size  # type: ignore[union-attr]
+    axes.xaxis.set_major_locator(MaxNLocator(max(min(int(width / 0.6), 7), 2)))
+    axes.yaxis.set_major_locator(MaxNLocator(max(min(int(height / 0.35), 7), 1)))
+    if first:
+        axes.set_ylabel("y (mm)")
+
+
+def _bar(figure: Figure, coloured: Any, axes: Axes, label: str = "") -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    bar = figure.colorbar(coloured, cax=axes, orientation="horizontal")
+    bar.locator = MaxNLocator(4)
+    bar.update_ticks()
+    axes.tick_params(labelsize=8.5)
+    if label:
+        bar.set_label(label, fontsize=9)
+
+
+class _Key:
+    """What the marks of ``panels`` mean, in as many rows as ``width`` inches need."""
+
+    SAMPLE = 0.62  # inches of a mark and the room around it
+
+    def __init__(self, panels: Sequence[Panel], width: float) -> None:
+        from matplotlib.lines import Line2D
+
+        found = [mark for panel in panels for mark in panel.found]
+        cross: dict[str, Any] = {"marker": "x", "markersize": 7, "markeredgewidth": 1.6}
+        ring: dict[str, Any] = {"marker": "o", "markersize": 9, "markerfacecolor": "none"}
+        kinds = (
+            ("true touch", any(panel.truth for panel in panels), TRUE, ring),
+            ("found touch", bool(found), FOUND, cross),
+            ("its size", any(m.radius_mm for m in found), FOUND, {"linestyle": (0, (3, 2))}),
+            ("its place, 90 %", any(m.place_mm2 for m in found), FOUND, {"linestyle": "-"}),
+        )
+        self.handles = [
+            Line2D([], [], label=label, markeredgecolor=colour,
+                   color=colour if "linestyle" in style else "none", **style)
+            for label, there, colour, style in kinds if there
+        ]  # fmt: skip
+        widest = max(
+            (_inches(str(one.get_label()), 8, "normal") for one in self.handles), default=0.0
+        )
+        self._columns = max(min(int(width / (widest + self.SAMPLE)), len(self.handles)), 1)
+        rows = math.ceil(len(self.handles) / self._columns)
+        self.height = 0.08 + 0.19 * rows if self.handles else 0.0
+
+    def draw(self, figure: Figure, top: float, middle: float = 0.5) -> None:
+        """With its upper edge at ``top`` of the figure's height, from above, around ``middle``."""
+        if self.handles:
+            figure.legend(
+                handles=self.handles, loc="upper center", bbox_to_anchor=(middle, 1 - top),
+                ncols=self._columns, frameon=False, fontsize=8, borderaxespad=0.1,
+                borderpad=0.1, columnspacing=1.0, handlelength=1.6, handletextpad=0.4,
+            )  # fmt: skip
