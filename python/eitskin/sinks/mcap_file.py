@@ -2,7 +2,7 @@
 
 /touches eitskin_msgs/msg/TouchArray, /image sensor_msgs/msg/Image where images are streamed,
 /diagnostics diagnostic_msgs/msg/DiagnosticArray when they change. The file is written in chunks of
-16 kB: a killed program loses the last, less than a second of touches.
+about a second: a killed program loses the last. The list of chunks stays in memory until the end.
 """
 
 from __future__ import annotations
@@ -14,24 +14,25 @@ from eitskin.sinks import ros2
 from eitskin.sinks.csv_file import new_file
 from eitskin.sinks.sink import Sink, Source, Told
 
-CHUNK_BYTES = 1 << 14
+CHUNK_BYTES, IMAGES_BYTES = 1 << 14, 1 << 18  # of touches alone, and with images
 FRAME_ID = "skin"
 
 
 class McapSink:
     """One open file."""
 
-    def __init__(self, stream: Any, writer: Any, source: Source) -> None:
-        self._stream, self._writer, self._source = stream, writer, source
-        self._types = {
-            name: writer.register_msgdef(name, text) for name, text in ros2.definitions().items()
-        }
+    def __init__(self, stream: Any, source: Source) -> None:
+        self._stream, self._source = stream, source
+        self._writer: Any = None
+        self._types: dict[str, Any] = {}
         self._status: Any = None
 
     def write(self, told: Told) -> None:
         message = told.message
         if message["type"] == "summary":
             return
+        if self._writer is None:
+            self._begin(told.frame is not None and told.frame.image is not None)
         time_s = message["time_unix_s"] if message["time_unix_s"] is not None else message["time_s"]
         now = round(1e9 * (time_s or 0.0))
         if told.frame is not None:
@@ -47,8 +48,19 @@ class McapSink:
         self._stream.flush()
 
     def close(self) -> None:
+        if self._writer is None:
+            self._begin(False)
         self._writer.finish()
         self._stream.close()
+
+    def _begin(self, images: bool) -> None:
+        from mcap_ros2.writer import Writer
+
+        self._writer = Writer(self._stream, chunk_size=IMAGES_BYTES if images else CHUNK_BYTES)
+        self._types = {
+            name: self._writer.register_msgdef(name, text)
+            for name, text in ros2.definitions().items()
+        }
 
     def _put(self, topic: str, kind: str, table: ros2.Table, time_ns: int) -> None:
         self._writer.write_message(topic, self._types[kind], table, time_ns, time_ns)
@@ -57,8 +69,7 @@ class McapSink:
 def open_sink(url: str, source: Source) -> Sink:
     """See the module. Raises as ``new_file``; MissingExtraError where mcap is not installed."""
     try:
-        from mcap_ros2.writer import Writer
+        import mcap_ros2.writer  # noqa: F401
     except ImportError:
         raise missing_extra("mcap", "mcap-ros2-support") from None
-    stream = new_file(url, source)
-    return McapSink(stream, Writer(stream, chunk_size=CHUNK_BYTES), source)
+    return McapSink(new_file(url, source), source)

@@ -240,7 +240,7 @@ def _load(place: Path, scene: Path, seconds: float) -> Load:
                 client = _reading(f"ws://127.0.0.1:{port}")
                 for frame in session.frames():
                     outputs.put(frame)
-                    count += 1
+                    count += isinstance(frame, Frame)
                     if count == settings.frames // 10:
                         early = _memory_mb()
                 late, lasted = _memory_mb(), time.perf_counter() - start
