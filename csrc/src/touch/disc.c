@@ -196,21 +196,12 @@ eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc)
     return pixels * pixel * pixel;
 }
 
-/* Nine cells around the centre suffice: a disc whose centre is further from the skin than that
- * is no touch, however large. */
 int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc)
 {
     const eits_model *model = ctx->model;
     const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / (eits_real)model->pixel_mm;
     const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / (eits_real)model->pixel_mm;
-    if (!(x >= -1 && y >= -1 && x < (eits_real)model->nx + 1 && y < (eits_real)model->ny + 1))
+    if (!(x >= 0 && y >= 0 && x < (eits_real)model->nx && y < (eits_real)model->ny))
         return 0;
-    const uint32_t x1 = (uint32_t)(x + 1), y1 = (uint32_t)(y + 1); /* its cell, counted from 1 */
-    for (uint32_t iy = y1 > 2 ? y1 - 2 : 0; iy <= y1 && iy < model->ny; ++iy) {
-        for (uint32_t ix = x1 > 2 ? x1 - 2 : 0; ix <= x1 && ix < model->nx; ++ix) {
-            if (ctx->cell[(size_t)iy * model->nx + ix] != EITS_NO_PIXEL)
-                return 1;
-        }
-    }
-    return 0;
+    return ctx->cell[(size_t)(uint32_t)y * model->nx + (uint32_t)x] != EITS_NO_PIXEL;
 }
