@@ -16,7 +16,7 @@ set(EITSKIN_CORE_SOURCES
     touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c
     touch/touch.c touch/tracker.c
     evidence/covariance.c evidence/shape.c evidence/likelihood.c evidence/elimination.c
-    evidence/confidence.c evidence/pair.c
+    evidence/confidence.c evidence/ellipse.c evidence/pair.c
     api/setup.c api/access.c api/save.c api/frame_stage.c api/reference.c api/reconstruct.c
     api/touches.c api/batch.c api/self_test.c
     link/link.c)

@@ -54,6 +54,9 @@ void fw_diagnostics_reference(fw_faults *faults, uint32_t frame, const eits_info
     fw_fault_observe(faults, EITS_FAULT_STALE_REFERENCE,
                      (info->diagnostics & EITS_DIAGNOSTIC_STALE_REFERENCE) != 0,
                      (fw_fault_detail){.frame = frame});
+    fw_fault_observe(faults, EITS_FAULT_UNLIKE_MODEL,
+                     (info->diagnostics & EITS_DIAGNOSTIC_UNLIKE_MODEL) != 0,
+                     (fw_fault_detail){.frame = frame});
 }
 
 void fw_diagnostics_head(eits_packet_solved *head, const eits_info *info, const fw_quality *quality,

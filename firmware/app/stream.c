@@ -70,8 +70,9 @@ static void take_tare(fw_instrument *instrument, const fw_frame *frame)
     if (step == FW_TARE_TAKEN || step == FW_TARE_DONE)
         send_raw(instrument, frame, EITS_RAW_REFERENCE);
     if (step == FW_TARE_DONE) {
-        fw_fault_set(&instrument->faults, EITS_FAULT_STALE_REFERENCE, false,
-                     (fw_fault_detail){.frame = frame->number});
+        const fw_fault_detail detail = {.frame = frame->number};
+        fw_fault_set(&instrument->faults, EITS_FAULT_STALE_REFERENCE, false, detail);
+        fw_fault_set(&instrument->faults, EITS_FAULT_UNLIKE_MODEL, false, detail);
         fw_send_tare_reply(instrument, (fw_answer){0});
     }
     if (step == FW_TARE_FAILED)
@@ -121,7 +122,9 @@ static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_p
                                           .confidence = t.confidence,
                                           .x_variance_mm2 = t.x_variance_mm2,
                                           .xy_covariance_mm2 = t.xy_covariance_mm2,
-                                          .y_variance_mm2 = t.y_variance_mm2};
+                                          .y_variance_mm2 = t.y_variance_mm2,
+                                          .long_x_mm = t.long_x_mm,
+                                          .long_y_mm = t.long_y_mm};
         }
         head->count = (uint16_t)count;
         head->age_us = fw_now_us(instrument) - frame->end_us;

@@ -112,6 +112,23 @@ static void crowds_on_both_sides_of_the_limit(void)
     dense_bench_close(&b);
 }
 
+/* ---- a reference that is another skin's ---- */
+
+static void a_reference_unlike_the_model_is_named_where_that_is_asked_for(void)
+{
+    static dense_bench bench;
+    eits_context *ctx =
+        dense_bench_open(&bench, (small_spec){.rank = 13, .side = 6, .shape = SMALL_WHITENED}, 0);
+    for (uint32_t k = 0; k < 4; ++k) {
+        ctx->reference.far = k & 1u;
+        ctx->options.diagnostics = k & 2u ? EITS_DIAGNOSTICS_ALL : EITS_DIAGNOSTIC_CROWDED;
+        ctx->info.diagnostics = 0;
+        eits_check_unlike_model(ctx);
+        CHECK_EQUAL(ctx->info.diagnostics, k == 3 ? EITS_DIAGNOSTIC_UNLIKE_MODEL : 0);
+    }
+    dense_bench_close(&bench);
+}
+
 /* ---- a stale reference ---- */
 
 static void stale_references_on_both_sides_of_the_limit(void)
@@ -368,6 +385,7 @@ static void noise_of_any_size(void)
 int main(void)
 {
     crowds_on_both_sides_of_the_limit();
+    a_reference_unlike_the_model_is_named_where_that_is_asked_for();
     stale_references_on_both_sides_of_the_limit();
     mismatches_on_both_sides_of_the_limits();
     a_gain_that_counts_costs_nothing();

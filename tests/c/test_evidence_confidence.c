@@ -126,6 +126,49 @@ static void pairs_bulge_where_their_dipole_does_not(void)
     CHECK(eits_pair_score(&scratch, &answer, &likelihood, 0) == -1);
 }
 
+/* An axis at some angle, told by its dipole's evidence: its direction, and its length by hand; an
+ * insulating touch lies across. */
+static void an_ellipse_lies_along_its_dipole(void)
+{
+    enum { N = EITS_SHAPE_PARAMETERS };
+    eits_likelihood likelihood = {.count = N};
+    eits_scratch scratch = ctx->scratch;
+    eits_real square[N * N] = {0}, axis[2];
+    scratch.square = square;
+    square[6 * N + 6] = R(0.001);
+    square[7 * N + 7] = R(0.002);
+    square[6 * N + 7] = square[7 * N + 6] = R(0.0005);
+    const double d = 0.15, e = (double)EITS_ELLIPSE_MOST * d / (d + (double)EITS_ELLIPSE_HALF),
+                 determinant = 0.001 * 0.002 - 0.0005 * 0.0005;
+    for (int k = -17; k <= 18; ++k) {
+        const double angle = k * 3.14159265358979 / 36, u = d * cos(2 * angle),
+                     v = d * sin(2 * angle),
+                     rise = (0.002 * u * u - 2 * 0.0005 * u * v + 0.001 * v * v) / determinant;
+        for (int sign = -1; sign <= 1; sign += 2) {
+            eits_answer answer = {.count = 1, .parameters = N};
+            answer.disc[0].polarity = (eits_real)sign;
+            answer.shape[0][2] = R(0.05);
+            likelihood.step[6] = (eits_real)(sign * u - 0.05);
+            likelihood.step[7] = (eits_real)(sign * v);
+            const double enough = rise / (double)EITS_ELLIPSE_EVIDENCE;
+            eits_long_axis(&scratch, &answer, &likelihood, 0, (eits_real)(1.01 * enough), axis);
+            CHECK(axis[0] == 0 && axis[1] == 0);
+            eits_long_axis(&scratch, &answer, &likelihood, 0, (eits_real)(0.99 * enough), axis);
+            const double along = (double)axis[0] * cos(angle) + (double)axis[1] * sin(angle);
+            CHECK_NEAR(fabs(along), sqrt((1 + e) / (1 - e)), 1e-3);
+            CHECK_NEAR((double)axis[0] * sin(angle), (double)axis[1] * cos(angle), 2e-3);
+        }
+    }
+    eits_answer without = {.count = 1, .parameters = EITS_EDGE_PARAMETERS};
+    axis[0] = axis[1] = 1;
+    eits_long_axis(&scratch, &without, &likelihood, 0, 0, axis);
+    CHECK(axis[0] == 0 && axis[1] == 0);
+    eits_answer unknown = {.count = 1, .parameters = N};
+    square[6 * N + 6] = 0;
+    eits_long_axis(&scratch, &unknown, &likelihood, 0, 0, axis);
+    CHECK(axis[0] == 0 && axis[1] == 0);
+}
+
 int main(void)
 {
     static dense_bench bench;
@@ -134,6 +177,7 @@ int main(void)
     places_get_factor_floor_distance_and_what_the_test_would_move();
     what_is_not_known_is_zero();
     pairs_bulge_where_their_dipole_does_not();
+    an_ellipse_lies_along_its_dipole();
     crowded_where_one_may_be_two_or_none();
     dense_bench_close(&bench);
     return checks_report("evidence_confidence");

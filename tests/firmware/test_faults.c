@@ -132,7 +132,8 @@ static void test_hysteresis(void)
         uint32_t shown;
     } kinds[] = {{EITS_FAULT_ELECTRODE_OPEN, 1}, {EITS_FAULT_SATURATED, 1},
                  {EITS_FAULT_BRIDGED, 1},        {EITS_FAULT_ELECTRODE_NOISY, 3},
-                 {EITS_FAULT_MODEL_MISMATCH, 3}, {EITS_FAULT_STALE_REFERENCE, 3}};
+                 {EITS_FAULT_MODEL_MISMATCH, 3}, {EITS_FAULT_STALE_REFERENCE, 3},
+                 {EITS_FAULT_UNLIKE_MODEL, 3}};
     bench_start(&b, NULL);
     fw_faults *faults = &b.host.instrument.faults;
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; ++k) {

@@ -35,9 +35,12 @@ typedef enum eits_diagnostic {
     /* images the frame, which changes the way touches cannot */
     EITS_DIAGNOSTIC_STALE_REFERENCE = 64,
     /* eits_find_touches reports more touches than can be told apart */
-    EITS_DIAGNOSTIC_CROWDED = 128
+    EITS_DIAGNOSTIC_CROWDED = 128,
+    /* images the frame with the strongest regularisation: its reference is further from the
+     * model's, or from its own reciprocals, than an uneven skin's is */
+    EITS_DIAGNOSTIC_UNLIKE_MODEL = 256
 } eits_diagnostic;
-#define EITS_DIAGNOSTICS_ALL 255u
+#define EITS_DIAGNOSTICS_ALL 511u
 
 /* Bits: why a row is left out of a frame; 0 for a row in use. */
 typedef enum eits_row_state {
@@ -161,6 +164,11 @@ typedef struct eits_touch {
     eits_real x_variance_mm2;
     eits_real xy_covariance_mm2;
     eits_real y_variance_mm2;
+    /* half of the long axis as a vector, mm, of the ellipse of area pi radius_mm^2 that the touch
+     * is found to be; the short one is radius_mm^2 over its length. 0, 0: a disc, or the data do
+     * not tell */
+    eits_real long_x_mm;
+    eits_real long_y_mm;
 } eits_touch;
 
 /* A name for one bit of eits_diagnostic ("electrode open", "outlier"...), never NULL. */

@@ -16,7 +16,7 @@ extern "C" {
 #endif
 
 /* The first byte of every packet; a packet of another version is rejected. */
-#define EITS_LINK_VERSION     4u
+#define EITS_LINK_VERSION     5u
 #define EITS_LINK_MAX_PAYLOAD 16384u
 
 /* Below 0x80 from the board, from there on to it. */
@@ -150,12 +150,14 @@ typedef enum eits_fault {
     /* value: parts per thousand of the data; 0: from signs, not a fraction */
     EITS_FAULT_MODEL_MISMATCH = 13,
     /* only solved frames raise it; a tare ends it */
-    EITS_FAULT_STALE_REFERENCE = 14
+    EITS_FAULT_STALE_REFERENCE = 14,
+    /* likewise */
+    EITS_FAULT_UNLIKE_MODEL = 15
 } eits_fault;
-#define EITS_FAULTS 15u
+#define EITS_FAULTS 16u
 
 /* ELECTRODE_OPEN, SATURATED and BRIDGED rise in the frame that shows them, MODEL_MISMATCH,
- * ELECTRODE_NOISY and STALE_REFERENCE with the third in a row, since a touch that lands within a
+ * ELECTRODE_NOISY, STALE_REFERENCE and UNLIKE_MODEL with the third in a row, since a touch that lands within a
  * scan gives one such frame; all these are gone after so many frames in a row without them. */
 #define EITS_FAULT_RAISE_FRAMES 3u
 #define EITS_FAULT_CLEAR_FRAMES 8u
@@ -354,6 +356,9 @@ typedef struct eits_packet_touch {
     float x_variance_mm2;
     float xy_covariance_mm2;
     float y_variance_mm2;
+    /* half of the long axis as a vector; 0, 0: a disc, or not known */
+    float long_x_mm;
+    float long_y_mm;
 } eits_packet_touch;
 
 /* Stages that are timed. */

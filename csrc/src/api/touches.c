@@ -46,9 +46,11 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     /* Judged by what this frame shows; tracking may hide some of it and add others. */
     const uint32_t reported = eits_track(ctx, found, finite);
     ctx->info.touches = reported;
-    for (uint32_t k = 0; k < reported; ++k)
+    for (uint32_t k = 0; k < reported; ++k) {
+        eits_bring_onto_skin(ctx, &found[k].x_mm, &found[k].y_mm);
         found[k].force_n =
             eits_force_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
+    }
     /* Last, since it overwrites image, info and scratch. */
     if (ctx->options.second_pass && ctx->options.mac_limit == 0 && f.count > 1 &&
         f.data == ctx->touch.y_separate)

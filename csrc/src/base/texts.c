@@ -20,6 +20,8 @@ const char *eits_diagnostic_text(eits_diagnostic diagnostic)
         return "stale reference";
     case EITS_DIAGNOSTIC_CROWDED:
         return "crowded";
+    case EITS_DIAGNOSTIC_UNLIKE_MODEL:
+        return "unlike the model";
     }
     return "unknown diagnostic";
 }

@@ -72,6 +72,9 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
  * known. */
 void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient);
 
+/* Whether the reference is further from the model's than an uneven skin's. */
+void eits_check_unlike_model(eits_context *ctx);
+
 /* The variance of a fold's datum by the noise that was learned, summed over the folds in use;
  * copied reciprocals are one measurement. */
 eits_real eits_noise_energy(const eits_context *ctx);

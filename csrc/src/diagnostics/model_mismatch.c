@@ -121,3 +121,9 @@ void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
     if (min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
 }
+
+void eits_check_unlike_model(eits_context *ctx)
+{
+    if (ctx->reference.far && eits_wants(ctx, EITS_DIAGNOSTIC_UNLIKE_MODEL))
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_UNLIKE_MODEL;
+}

@@ -25,6 +25,7 @@ typedef struct verdict {
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
     eits_real best_mm[EITS_MAX_TOUCHES][2]; /* where the linearisation has the disc */
     eits_real pair[EITS_MAX_TOUCHES];       /* log odds that it is two (pair.c) */
+    eits_real axis[EITS_MAX_TOUCHES][2];    /* half of its long axis over its radius */
     int changed;                            /* 1: discs were dropped or merged */
     int fitted;                             /* 1: in Sigma's metric */
     int linear; /* 1: what the linearisation can do without is to be left out at once */
@@ -99,10 +100,15 @@ static uint32_t weakest_of(const eits_scratch *scratch, const eits_answer *answe
     return weakest;
 }
 
-static void pairs_of(const eits_scratch *scratch, const eits_likelihood *likelihood, verdict *v)
+/* What its shape says of each disc. */
+static void shapes_of(const eits_context *ctx, const eits_scratch *scratch,
+                      const eits_likelihood *likelihood, verdict *v)
 {
-    for (uint32_t k = 0; k < v->answer.count; ++k)
+    const eits_real unit = excess(ctx, v->answer.misfit, v->answer.count);
+    for (uint32_t k = 0; k < v->answer.count; ++k) {
         v->pair[k] = eits_pair_score(scratch, &v->answer, likelihood, k);
+        eits_long_axis(scratch, &v->answer, likelihood, k, unit, v->axis[k]);
+    }
 }
 
 /* How well each place is known: the inverse's blocks, times what the data fit worse. */
@@ -121,7 +127,7 @@ static void places_of(const eits_context *ctx, const eits_scratch *scratch,
         v->best_mm[k][0] = eits_fma(pixel, likelihood->step[k * p + 1], v->answer.disc[k].x_mm);
         v->best_mm[k][1] = eits_fma(pixel, likelihood->step[k * p + 2], v->answer.disc[k].y_mm);
     }
-    pairs_of(scratch, likelihood, v);
+    shapes_of(ctx, scratch, likelihood, v);
 }
 
 /* Set what is known of each disc by the linearisation. Returns the weakest. */
@@ -286,7 +292,7 @@ static int is_clear(eits_context *ctx, const eits_scratch *scratch, verdict *v, 
     if (clear && all > EITS_PLACE_PARAMETERS &&
         v->answer.misfit > EITS_PAIR_MISFIT * (eits_real)ctx->model->rank) {
         *macs += eits_linearise(ctx, scratch, &v->answer, &now);
-        pairs_of(scratch, &now, v);
+        shapes_of(ctx, scratch, &now, v);
     }
     return clear;
 }
@@ -347,6 +353,8 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
         f->apart_mm[k][0] = v.best_mm[k][0] - reported->x_mm;
         f->apart_mm[k][1] = v.best_mm[k][1] - reported->y_mm;
         f->pair[k] = v.pair[k];
+        f->long_mm[k][0] = reported->radius_mm * v.axis[k][0];
+        f->long_mm[k][1] = reported->radius_mm * v.axis[k][1];
     }
     if (!v.changed)
         return;

@@ -101,6 +101,15 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
 eits_real eits_pair_score(const eits_scratch *scratch, const eits_answer *answer,
                           const eits_likelihood *likelihood, uint32_t k);
 
+/* ellipse.c */
+
+/* Half of disc k's long axis over its radius, as a vector, by the shape that the linearisation
+ * gives it; 0, 0 where it is a disc as far as the data tell. `excess`: how much worse than Sigma
+ * says the data fit. */
+void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
+                    const eits_likelihood *likelihood, uint32_t k, eits_real excess,
+                    eits_real axis[2]);
+
 /* confidence.c */
 
 /* What the test's numbers have meant on scenes with a truth: f->confidence, and f->place_mm2 as

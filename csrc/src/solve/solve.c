@@ -132,6 +132,7 @@ eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int
         return EITS_E_NOT_FINITE;
     }
     eits_check_stale_reference(ctx, ctx->solver.gradient);
+    eits_check_unlike_model(ctx);
     if (square > 0 && ctx->info.lambda_max < eits_detection_threshold(ctx)) {
         eits_answer_zero(ctx, EITS_STOP_BELOW_THRESHOLD);
         return EITS_OK;

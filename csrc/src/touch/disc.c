@@ -196,12 +196,57 @@ eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc)
     return pixels * pixel * pixel;
 }
 
+/* Nine cells around the centre suffice: a disc whose centre is further from the skin than that
+ * is no touch, however large. */
 int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc)
 {
     const eits_model *model = ctx->model;
     const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / (eits_real)model->pixel_mm;
     const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / (eits_real)model->pixel_mm;
-    if (!(x >= 0 && y >= 0 && x < (eits_real)model->nx && y < (eits_real)model->ny))
+    if (!(x >= -1 && y >= -1 && x < (eits_real)model->nx + 1 && y < (eits_real)model->ny + 1))
         return 0;
-    return ctx->cell[(size_t)(uint32_t)y * model->nx + (uint32_t)x] != EITS_NO_PIXEL;
+    const uint32_t x1 = (uint32_t)(x + 1), y1 = (uint32_t)(y + 1); /* its cell, counted from 1 */
+    for (uint32_t iy = y1 > 2 ? y1 - 2 : 0; iy <= y1 && iy < model->ny; ++iy) {
+        for (uint32_t ix = x1 > 2 ? x1 - 2 : 0; ix <= x1 && ix < model->nx; ++ix) {
+            if (ctx->cell[(size_t)iy * model->nx + ix] != EITS_NO_PIXEL)
+                return 1;
+        }
+    }
+    return 0;
+}
+
+/* The range of one cell along an axis, and where in it `at` is nearest; all in pixels. */
+static eits_real nearest(eits_real at, uint32_t cell)
+{
+    const eits_real low = (eits_real)cell;
+    return at < low ? low : (at > low + 1 ? low + 1 : at);
+}
+
+void eits_bring_onto_skin(const eits_context *ctx, eits_real *x_mm, eits_real *y_mm)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm;
+    const eits_real x = (*x_mm - (eits_real)model->origin_x_mm) / pixel,
+                    y = (*y_mm - (eits_real)model->origin_y_mm) / pixel;
+    eits_real best = -1, best_x = x, best_y = y;
+    uint32_t x0, x1, y0, y1;
+    cell_range(x, R(1.5), model->nx, &x0, &x1);
+    cell_range(y, R(1.5), model->ny, &y0, &y1);
+    for (uint32_t iy = y0; iy <= y1 && iy < model->ny; ++iy) {
+        for (uint32_t ix = x0; ix <= x1 && ix < model->nx; ++ix) {
+            if (ctx->cell[(size_t)iy * model->nx + ix] == EITS_NO_PIXEL)
+                continue;
+            const eits_real there_x = nearest(x, ix), there_y = nearest(y, iy), dx = there_x - x,
+                            dy = there_y - y, apart = eits_fma(dx, dx, dy * dy);
+            if (best >= 0 && apart >= best)
+                continue;
+            best = apart;
+            best_x = there_x;
+            best_y = there_y;
+        }
+    }
+    if (best > 0) { /* a place on the skin keeps its bits */
+        *x_mm = eits_fma(best_x, pixel, (eits_real)model->origin_x_mm);
+        *y_mm = eits_fma(best_y, pixel, (eits_real)model->origin_y_mm);
+    }
 }

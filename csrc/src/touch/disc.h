@@ -40,4 +40,7 @@ eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc);
  * far beyond the rim. */
 int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc);
 
+/* The nearest place on a kept pixel to one that is next to it. */
+void eits_bring_onto_skin(const eits_context *ctx, eits_real *x_mm, eits_real *y_mm);
+
 #endif

@@ -20,6 +20,8 @@ typedef struct eits_fit {
     eits_real apart_mm[EITS_MAX_TOUCHES][2];
     /* logarithm of the odds that the disc is two touches (evidence/pair.c) */
     eits_real pair[EITS_MAX_TOUCHES];
+    /* half of its long axis, as a vector; 0, 0: as far as the data tell a disc */
+    eits_real long_mm[EITS_MAX_TOUCHES][2];
     /* probability that the disc is one touch (evidence/confidence.c) */
     eits_real confidence[EITS_MAX_TOUCHES];
     const eits_real *data; /* stride: what the discs are to explain */

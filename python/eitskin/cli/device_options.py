@@ -73,8 +73,8 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
         solver,
         "--ignore NAME[,NAME]",
         "do not look for saturated, electrode-open, electrodes-bridged, outlier,"
-        " electrode-noisy, model-mismatch, stale-reference, crowded, or all (default: look for"
-        " all)",
+        " electrode-noisy, model-mismatch, stale-reference, crowded, unlike-the-model, or all"
+        " (default: look for all)",
     )
     start = solver.add_mutually_exclusive_group()
     option(start, "--warm", "begin each frame from the last one's result")

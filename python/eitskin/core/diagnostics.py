@@ -61,6 +61,7 @@ def words(found: DiagnosticFields) -> tuple[str, ...]:
         else "model mismatch",
         "stale reference": "stale reference: tare again",
         "crowded": "crowded: more touches than can be told apart",
+        "unlike the model": "unlike the model: see  eitskin doctor",
     }
     return tuple(details[name] for name in names(found.diagnostics))
 

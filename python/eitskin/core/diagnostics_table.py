@@ -15,8 +15,9 @@ DIAGNOSTICS = (
     "model mismatch",
     "stale reference",
     "crowded",
+    "unlike the model",
 )
-ALL_DIAGNOSTICS = 255
+ALL_DIAGNOSTICS = 511
 # eits_stop: Why the solver stopped.
 STOPS = (
     "iterations",
@@ -109,3 +110,8 @@ class Touch:
     x_variance_mm2: float | None = None
     xy_covariance_mm2: float | None = None
     y_variance_mm2: float | None = None
+    # half of the long axis as a vector, mm, of the ellipse of area pi radius_mm^2 that the touch is
+    # found to be; the short one is radius_mm^2 over its length. 0, 0: a disc, or the data do not
+    # tell
+    long_x_mm: float | None = None
+    long_y_mm: float | None = None

@@ -136,7 +136,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "touch_sweeps": (0, 1000),
     "follow_mm": (0, 1e30),
     "mac_limit": (0, 2**32 - 1),
-    "diagnostics": (0, 255),
+    "diagnostics": (0, 511),
     "touch_fit": (0, 7),
     "track_confirm": (0, MAX_TRACK_FRAMES),
     "track_hold": (0, MAX_TRACK_FRAMES),

@@ -136,6 +136,8 @@ def known_touch(values: Sequence[Any]) -> Touch:
         whole[first] = None
     if not whole[first + 1]:
         whole[first + 1 :] = [None] * (len(known) - first - 1)
+    if not any(whole[-2:]):  # no long axis: a disc, as far as the data tell
+        whole[-2:] = [None, None]
     return Touch(*whole)
 
 

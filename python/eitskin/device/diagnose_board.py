@@ -19,7 +19,13 @@ from eitskin.frames.doctor.subject import AS_GIVEN, Subject
 from eitskin.skin.skin import Skin
 
 NOT_FOR_THE_SKIN = frozenset(
-    (FaultCode.DEADLINE, FaultCode.WATCHDOG, FaultCode.CRASH, FaultCode.STALE_REFERENCE)
+    (
+        FaultCode.DEADLINE,
+        FaultCode.WATCHDOG,
+        FaultCode.CRASH,
+        FaultCode.STALE_REFERENCE,
+        FaultCode.UNLIKE_MODEL,
+    )
 )
 
 

@@ -23,6 +23,7 @@ _NAMES = {
     FaultCode.ELECTRODE_NOISY: "electrode noisy",
     FaultCode.MODEL_MISMATCH: "model mismatch",
     FaultCode.STALE_REFERENCE: "stale reference",
+    FaultCode.UNLIKE_MODEL: "unlike the model",
 }
 _DOUBTFUL = frozenset(_NAMES[code] for code in DOUBTFUL_FAULTS)
 _OF_ELECTRODES = {

@@ -55,6 +55,9 @@ def save_results(
             ],
             dtype=float,
         ).reshape(-1, 3),
+        "touch_long_mm": np.array(
+            [(touch.long_x_mm or 0.0, touch.long_y_mm or 0.0) for _, touch in touches]
+        ).reshape(-1, 2),
         "info": np.array(json.dumps([results[number].info.as_dict() for number in numbers])),
     }
     with write_beside(path) as temporary, temporary.open("wb") as stream:

@@ -404,6 +404,11 @@ class Examiner:
         if against > STALE_RATIO * lambda_max and against > STALE_NOISE * lambda_noise:
             self.found.names.add("stale reference")
 
+    def unlike(self, *, far: bool) -> None:
+        """Whether the reference is ``far`` from the model's."""
+        if far and "unlike the model" in self.wanted:
+            self.found.names.add("unlike the model")
+
     def crowd(
         self,
         touches: tuple[Touch, ...],

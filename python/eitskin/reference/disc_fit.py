@@ -162,10 +162,10 @@ class Fit:
         )
 
     def on_skin(self, disc: Disc) -> bool:
-        """Whether a kept pixel is there."""
+        """Whether a kept pixel is there or next to it."""
         grid = self.model.grid
         cell = np.floor((np.array([disc.x_mm, disc.y_mm]) - grid.origin_mm) / grid.pixel_mm)
-        return bool((grid.index == cell).all(axis=1).any())
+        return bool((np.abs(grid.index - cell) <= 1).all(axis=1).any())
 
     def move(self, k: int) -> float:
         """One damped Gauss-Newton step of disc k, others held; returns how far it went, mm."""

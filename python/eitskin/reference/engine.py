@@ -57,7 +57,7 @@ from eitskin.reference.problem import (
 )
 from eitskin.reference.reference_outliers import clean
 from eitskin.reference.row_gains import row_gains
-from eitskin.reference.touches import find_touches
+from eitskin.reference.touches import brought_onto_skin, find_touches
 from eitskin.reference.tracker import Tracker
 from eitskin.reference.whitening import Whitening, form_of, whiten
 from eitskin.solve.options import default_options
@@ -430,6 +430,7 @@ class ReferenceEngine:
         lambda_noise = self._lambda_noise * self._noise_ratio
         correlation = self.seen.T @ y
         self._examiner.stale(correlation, o.sign, greatest(correlation, o.sign), lambda_noise)
+        self._examiner.unlike(far=self._far)
         result, lam, lambda_max = self._solve(
             y, basis, lambda_noise, self._warm if o.warm_start else None
         )
@@ -451,7 +452,9 @@ class ReferenceEngine:
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
             self._examiner.crowd(found, o, clearness, doubtful=doubtful)
             many = len(found) > 1
-            found = self._loaded(self._tracker.step(found, o, lambda_max, lambda_noise))
+            followed = self._tracker.step(found, o, lambda_max, lambda_noise)
+            grid = self.model.grid
+            found = self._loaded(tuple(brought_onto_skin(grid, one) for one in followed))
             if o.second_pass and many and added is not None and o.touch_sweeps > 0:
                 first = result.iterations
                 result, lam, lambda_max = self._solve(coupled, basis, lambda_noise, None)

@@ -33,6 +33,7 @@ from eitskin.core.constants_table import (
     TOUCH_EVIDENCE,
 )
 from eitskin.reference.disc_fit import Disc, Fit
+from eitskin.reference.ellipse import long_axis
 from eitskin.reference.pair import pair_scores
 from eitskin.reference.split_merge import merged
 
@@ -64,12 +65,14 @@ class DataErrors:
 class Tested:
     """For each disc that stays, minus twice the logarithm of the ratio of likelihoods without and
     with it (k,), the covariance xx, xy, yy of its place (k, 3), mm^2, where the test would have it
-    less where it is (k, 2), mm, and the log odds that it is two touches (k,)."""
+    less where it is (k, 2), mm, the log odds that it is two touches (k,), and half of its long
+    axis (k, 2), mm, zeros where it is a disc as far as the data tell."""
 
     rise: FloatArray
     place_mm2: FloatArray
     apart_mm: FloatArray
     pair: FloatArray
+    long_mm: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +204,7 @@ class Hypothesis:
         self.columns_made = 0
         self.rise, self.place_mm2 = np.zeros(count), np.zeros((count, 3))
         self.best_mm, self.pair = np.zeros((count, 2)), np.zeros(count)
+        self.axis = np.zeros((count, 2))
 
     @property
     def evidence(self) -> float:
@@ -339,9 +343,20 @@ class Hypothesis:
         )
         self.best_mm = np.array([(disc.x_mm, disc.y_mm) for disc in answer.discs])
         self.best_mm += self.fit.model.grid.pixel_mm * now.step.reshape(count, p)[:, 1:3]
-        self.pair = pair_scores(answer.offsets(), now.step, np.diag(now.inverse))
+        self.look_at_shapes(now)
         self.rise = np.array([now.rise(answer, k) for k in range(count)])
         return int(np.argmin(self.rise))
+
+    def look_at_shapes(self, now: Likelihood) -> None:
+        """Set what its shape says of each disc."""
+        answer, p = self.answer, self.answer.parameters
+        unit = self.excess(answer.misfit, len(answer.discs))
+        self.pair = pair_scores(answer.offsets(), now.step, np.diag(now.inverse))
+        self.axis = np.zeros((len(answer.discs), 2))
+        for k, disc in enumerate(answer.discs if p == ALL else ()):
+            own = slice(k * p + EDGE, (k + 1) * p)
+            dipole = answer.offsets()[k, EDGE:] + now.step[own]
+            self.axis[k] = long_axis(dipole, now.inverse[own, own], disc.polarity, unit)
 
     def drop_linearly(self, now: Likelihood, weakest: int) -> tuple[Answer, Likelihood | None]:
         """The answer without whatever the linearisation can do without, one after another from the
@@ -438,7 +453,7 @@ class Hypothesis:
         rank = self.fit.model.rank
         if self.clear and parameters > PLACE and self.answer.misfit > PAIR_MISFIT * rank:
             now = self.linearise(self.answer)
-            self.pair = pair_scores(self.answer.offsets(), now.step, np.diag(now.inverse))
+            self.look_at_shapes(now)
         return self.clear
 
 
@@ -464,9 +479,11 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
     if best.changed:
         fit.discs = list(best.answer.discs)
     reported = np.array([(disc.x_mm, disc.y_mm) for disc in fit.discs]).reshape(-1, 2)
+    radius_mm = np.array([disc.radius_mm for disc in fit.discs]).reshape(-1, 1)
     return Tested(
         best.rise[:count] / unit,
         best.place_mm2[:count],
         best.best_mm[:count] - reported,
         best.pair[:count],
+        best.axis[:count] * radius_mm,
     )

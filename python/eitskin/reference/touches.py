@@ -19,6 +19,7 @@ from eitskin.core.constants_table import (
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import SPLIT_MERGE
 from eitskin.core.results import Options
+from eitskin.fem.grid import Grid
 from eitskin.model.model import Model
 from eitskin.reference.confidence import miscounted, rated
 from eitskin.reference.disc_fit import Disc, Fit, Reduced
@@ -78,6 +79,18 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
     return fit.keep_real()
 
 
+def brought_onto_skin(grid: Grid, touch: Touch) -> Touch:
+    """``touch``, its place the nearest one on a kept pixel if it is next to it."""
+    place = np.array([touch.x_mm, touch.y_mm])
+    low = grid.origin_mm + grid.pixel_mm * grid.index
+    there = np.clip(place, low, low + grid.pixel_mm)
+    apart = np.hypot(*(there - place).T)
+    nearest = int(apart.argmin())
+    if apart[nearest] == 0:
+        return touch
+    return replace(touch, x_mm=float(there[nearest, 0]), y_mm=float(there[nearest, 1]))
+
+
 def find_touches(
     model: Model,
     frame: Reduced,
@@ -110,8 +123,12 @@ def find_touches(
                 x_variance_mm2=float(xx),
                 xy_covariance_mm2=float(xy),
                 y_variance_mm2=float(yy),
+                long_x_mm=float(x) if x or y else None,
+                long_y_mm=float(y) if x or y else None,
             )
-            for touch, one, (xx, xy, yy) in zip(found, sure, places, strict=True)
+            for touch, one, (xx, xy, yy), (x, y) in zip(
+                found, sure, places, tested.long_mm, strict=True
+            )
         ]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
     unexplained = fit.left() / fit.whole if fit.whole > 0 and np.abs(image).max() > 0 else 0.0

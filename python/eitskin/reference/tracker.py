@@ -112,9 +112,9 @@ class _Frame:
     grid: Grid
 
     def on_skin(self, x_mm: float, y_mm: float) -> bool:
-        """Whether a kept pixel is there."""
+        """Whether a kept pixel is there or next to it."""
         cell = np.floor((np.array([x_mm, y_mm]) - self.grid.origin_mm) / self.grid.pixel_mm)
-        return bool((self.grid.index == cell).all(axis=1).any())
+        return bool((np.abs(self.grid.index - cell) <= 1).all(axis=1).any())
 
     def newborn(self, touch: Touch) -> Followed:
         own = self.lambda_max * math.sqrt(touch.explained)

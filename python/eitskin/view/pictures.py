@@ -47,20 +47,23 @@ STYLE = {
 @dataclass(frozen=True)
 class Mark:
     """A touch in a picture: its centre, its radius where known, its change of conductivity where
-    known, the covariance of its place (xx, xy, yy) where known."""
+    known, the covariance of its place (xx, xy, yy) where known, half of its long axis where it is
+    an ellipse."""
 
     x_mm: float
     y_mm: float
     radius_mm: float | None = None
     change: float | None = None
     place_mm2: Place | None = field(default=None, kw_only=True)
+    long_mm: tuple[float, float] | None = field(default=None, kw_only=True)
 
 
 def found_mark(touch: Touch) -> Mark:
     """The mark of a touch that was found."""
     xx, xy, yy = touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2
     place = None if xx is None or xy is None or yy is None else (xx, xy, yy)
-    return Mark(touch.x_mm, touch.y_mm, touch.radius_mm, place_mm2=place)
+    long_mm = None if touch.long_x_mm is None else (touch.long_x_mm, touch.long_y_mm or 0.0)
+    return Mark(touch.x_mm, touch.y_mm, touch.radius_mm, place_mm2=place, long_mm=long_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +74,7 @@ class Panel:
         title: above it.
         values: (n,) pixel values, or None for none.
         truth: touches that were there: circles, filled with their change where ``fill_truth``.
-        found: touches that were found: crosses, dashed circles where the radius is known, and
+        found: touches that were found: crosses, dashed discs or ellipses where that is known, and
             ellipses in which the true centre lies with 90 % where that is.
         fill_truth: show the truth as an image would.
     """
@@ -165,7 +168,7 @@ def draw_panel(
             _place_ellipse(axes, mark, mark.place_mm2, edgecolor=FOUND, zorder=4, **ellipse)
         if mark.radius_mm is not None:
             dashes = {"linestyle": (0, (3, 2)), "linewidth": width, "path_effects": halo}
-            _circle(
+            _shape(
                 axes, mark, mark.radius_mm, facecolor="none", edgecolor=FOUND, zorder=4, **dashes
             )
     width = 0.7 if small else 1.2
@@ -181,6 +184,17 @@ def _circle(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
     from matplotlib.patches import Circle
 
     axes.add_patch(Circle((mark.x_mm, mark.y_mm), radius_mm, **style))
+
+
+def _shape(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
+    """The disc, or the ellipse, that a touch was found to be."""
+    from matplotlib.patches import Ellipse
+
+    x, y = mark.long_mm or (radius_mm, 0.0)
+    half = math.hypot(x, y)
+    turn = math.degrees(math.atan2(y, x))
+    size = 2 * half, 2 * radius_mm**2 / half
+    axes.add_patch(Ellipse((mark.x_mm, mark.y_mm), *size, angle=turn, **style))
 
 
 def _place_ellipse(axes: Axes, mark: Mark, place_mm2: Place, **style: Any) -> None:

@@ -19,7 +19,7 @@ FIELDS = {
     "format", "version", "frame", "frame_name", "image_s_per_m", "pixel_mm", "image_origin_mm",
     "touch_frame", "touch_id",
     "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_explained",
-    "touch_force_n", "touch_confidence", "touch_place_mm2", "info",
+    "touch_force_n", "touch_confidence", "touch_place_mm2", "touch_long_mm", "info",
 }  # fmt: skip
 
 
@@ -64,6 +64,8 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
         assert saved[f"touch_{name}"].tolist() == [getattr(touch, field) for _, touch in touches]
     place = [(t.x_variance_mm2, t.xy_covariance_mm2, t.y_variance_mm2) for _, t in touches]
     np.testing.assert_array_equal(saved["touch_place_mm2"], np.array(place, dtype=float))
+    long_mm = [(t.long_x_mm or 0, t.long_y_mm or 0) for _, t in touches]
+    np.testing.assert_array_equal(saved["touch_long_mm"], np.array(long_mm, dtype=float))
     known = [touch.confidence for _, touch in touches]
     np.testing.assert_array_equal(saved["touch_confidence"], np.array(known, dtype=float))
     info = json.loads(str(saved["info"]))

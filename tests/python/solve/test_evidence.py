@@ -82,6 +82,12 @@ def covariance_mm2(touch: Touch) -> list[float | None]:
     return [touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2]
 
 
+def long_mm(touch: Touch) -> np.ndarray:
+    """Half of its long axis, the end with x > 0; zeros of a disc."""
+    axis = np.array([touch.long_x_mm or 0.0, touch.long_y_mm or 0.0])
+    return axis if axis[0] > 0 else -axis
+
+
 def agree(results: dict[str, Reconstruction], loose: float = 0.0) -> int:
     """How many touches all engines found, alike; numbers but places to ``loose`` at least."""
     expected = results["numpy"]
@@ -101,6 +107,8 @@ def agree(results: dict[str, Reconstruction], loose: float = 0.0) -> int:
                 # what the test would move a place by is in its covariance, squared
                 moved = 2 * bound * np.sqrt(here.max())
                 assert np.abs(here[0] - here[1]).max() <= 2 * rel * here.max() + moved
+            assert (ours.long_x_mm is None) == (other.long_x_mm is None)
+            assert np.abs(long_mm(ours) - long_mm(other)).max() <= 10 * bound
     return len(expected.touches)
 
 
@@ -110,6 +118,29 @@ def test_all_engines_find_the_same_touches_in_other_worlds(name: str) -> None:
     for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
         count = agree({engine: one(engine, quiet_v, frame_v) for engine in ENGINES})
         assert (count == 0) == (name in UNTOUCHED)
+
+
+def test_long_touches_are_ellipses_and_discs_are_not() -> None:
+    """By the angle of the true long axis, or said to be a disc."""
+    told = 0
+    for name in ("ellipses", "fingers", "eight_at_4_radii", "uneven_20_percent"):
+        scenes = world(name)
+        for scene, quiet_v, frame_v in zip(
+            scenes.scenes, scenes.quiet_v, scenes.frames_v, strict=True
+        ):
+            for touch in one("c", quiet_v, frame_v).touches:
+                near = min(
+                    scene.touches, key=lambda t: np.hypot(t.x_mm - touch.x_mm, t.y_mm - touch.y_mm)
+                )
+                if touch.long_x_mm is None:
+                    continue
+                assert near.shape is not None, name
+                x, y = long_mm(touch)
+                off = (np.degrees(np.arctan2(y, x)) - near.shape.angle_deg + 90) % 180 - 90
+                assert abs(off) <= 15
+                assert 1 < (x * x + y * y) / touch.radius_mm**2 < 4.5
+                told += 1
+    assert told >= 4
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -185,6 +216,7 @@ def test_row_gains_undo_what_multiplies_rows(engine: str) -> None:
     few, many = row_factors(0.12), row_factors(0.4)
     undone = one(engine, few * quiet_v, few * frame_v)
     assert np.abs(sizes_mm(undone) - sizes_mm(straight)).max() <= 0.05
+    assert "unlike the model" not in undone.info.diagnostics_by_name
     left = one(engine, few * quiet_v, few * frame_v, row_gains=0)
     assert len(left.touches) != len(straight.touches) or (
         np.abs(sizes_mm(left) - sizes_mm(straight)).max() > 0.2
@@ -198,6 +230,7 @@ def test_row_gains_undo_what_multiplies_rows(engine: str) -> None:
         )
         assert (with_.image == without.image).all()
         assert with_.info.regularisation == pytest.approx(1.0)
+        assert "unlike the model" in with_.info.diagnostics_by_name
         tested = one(engine, factors * quiet_v, factors * frame_v)
         assert 1 <= len(tested.touches) <= max(1, len(with_.touches))
 

@@ -118,6 +118,7 @@ def found_name(fault: Fault) -> str:
             else "model mismatch"
         ),
         FaultCode.STALE_REFERENCE: "stale reference",
+        FaultCode.UNLIKE_MODEL: "unlike the model",
     }
     return names[FaultCode(fault.code)]
 
@@ -132,6 +133,10 @@ _FOUND = {
     ),
     FaultCode.STALE_REFERENCE: (
         "the skin has changed since it was taken; leave it untouched and run  eitskin tare"
+    ),
+    FaultCode.UNLIKE_MODEL: (
+        "the reference is not this model's; check order, signs and skin (eitskin doctor), or build"
+        " the model with  --data normalised"
     ),
 }
 

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from eitskin.device.wire.layout import Command, Layout, Payload
 
-LINK_VERSION = 4
+LINK_VERSION = 5
 LINK_MAX_PAYLOAD = 16384
 FAULT_RAISE_FRAMES = 3
 FAULT_CLEAR_FRAMES = 8
@@ -161,6 +161,8 @@ class FaultCode(IntEnum):
     MODEL_MISMATCH = 13
     # only solved frames raise it; a tare ends it
     STALE_REFERENCE = 14
+    # likewise
+    UNLIKE_MODEL = 15
 
 
 class RawFlags(IntFlag):
@@ -442,6 +444,8 @@ class TouchPacket(Payload):
         ("x_variance_mm2", "f", ""),
         ("xy_covariance_mm2", "f", ""),
         ("y_variance_mm2", "f", ""),
+        ("long_x_mm", "f", ""),
+        ("long_y_mm", "f", ""),
     )
     # from 1; stays with a touch from frame to frame
     id: int
@@ -463,6 +467,9 @@ class TouchPacket(Payload):
     x_variance_mm2: float
     xy_covariance_mm2: float
     y_variance_mm2: float
+    # half of the long axis as a vector; 0, 0: a disc, or not known
+    long_x_mm: float
+    long_y_mm: float
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,15 @@ from eitskin.device.wire.link_table import (
 FOUND_FAULTS = frozenset(
     (FaultCode.ELECTRODE_OPEN, FaultCode.SATURATED, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY,
     FaultCode.MODEL_MISMATCH,
-     FaultCode.STALE_REFERENCE)
+     FaultCode.STALE_REFERENCE, FaultCode.UNLIKE_MODEL)
 )  # fmt: skip
 DOUBTFUL_FAULTS = frozenset(
-    (FaultCode.ELECTRODE_NOISY, FaultCode.MODEL_MISMATCH, FaultCode.STALE_REFERENCE)
+    (
+        FaultCode.ELECTRODE_NOISY,
+        FaultCode.MODEL_MISMATCH,
+        FaultCode.STALE_REFERENCE,
+        FaultCode.UNLIKE_MODEL,
+    )
 )  # rise after RAISE_FRAMES
 ELECTRODE_FAULTS = frozenset(
     (FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY)

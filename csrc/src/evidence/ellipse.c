@@ -1,0 +1,46 @@
+/* Whether a disc is an ellipse, and which: where the data tell it.
+ *
+ * An ellipse of conductivity answers the field along its long axis as a stronger dipole than the
+ * field across. The two dipole terms of the test (shape.c), u = d cos 2 phi and v = d sin 2 phi for
+ * a long axis at phi, say so far better than the two of its edge. Held at zero they make F rise by
+ * u'B^-1 u with B their block of the linearisation's inverse. Where that is more than an error of
+ * the model gives, phi is known to some degrees, and d grows with the aspect s:
+ *
+ *     (s - 1) / (s + 1) = MOST d / (d + HALF)
+ *
+ * fitted on scenes of ellipses and fingers (docs/results/other-worlds.md): the dipole of an ellipse
+ * with a finite contrast, less what the prior holds back. An insulating touch is weaker along its
+ * long axis. */
+#include "evidence/evidence.h"
+
+#include "base/vec.h"
+#include "evidence/constants.h"
+
+void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
+                    const eits_likelihood *likelihood, uint32_t k, eits_real excess,
+                    eits_real axis[2])
+{
+    const uint32_t first = k * answer->parameters + EITS_EDGE_PARAMETERS;
+    const size_t stride = EITS_STRIDE(likelihood->count);
+    axis[0] = axis[1] = 0;
+    if (answer->parameters < EITS_SHAPE_PARAMETERS)
+        return;
+    const eits_real *row = scratch->square + stride * first + first, *next = row + stride,
+                    *shape = &answer->shape[k][EITS_EDGE_PARAMETERS - EITS_PLACE_PARAMETERS],
+                    u = shape[0] + likelihood->step[first],
+                    v = shape[1] + likelihood->step[first + 1],
+                    determinant = eits_fma(row[0], next[1], -(row[1] * row[1])),
+                    rise = u * eits_fma(next[1], u, -(row[1] * v)) +
+                           v * eits_fma(row[0], v, -(row[1] * u)),
+                    d = eits_sqrt(eits_fma(u, u, v * v));
+    if (!(determinant > 0) || !(rise > EITS_ELLIPSE_EVIDENCE * excess * determinant))
+        return;
+    const eits_real e = EITS_ELLIPSE_MOST * d / (d + EITS_ELLIPSE_HALF),
+                    length = eits_sqrt((1 + e) / (1 - e)),
+                    cosine = answer->disc[k].polarity * u / d;
+    /* half the angle, between -90 and 90 degrees */
+    axis[0] = length * eits_sqrt(cosine < -1 ? 0 : (1 + cosine) / 2);
+    axis[1] = length * eits_sqrt(cosine > 1 ? 0 : (1 - cosine) / 2);
+    if (answer->disc[k].polarity * v < 0)
+        axis[1] = -axis[1];
+}
