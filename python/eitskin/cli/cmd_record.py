@@ -16,6 +16,7 @@ from eitskin.cli.device_options import (
     add_stream,
     read_mode,
     say,
+    say_progress,
     session_settings,
 )
 from eitskin.errors import UsageError
@@ -55,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     settings = session_settings(options, read_mode(options.mode), record=options.output)
     if options.seconds is not None and not 0 < options.seconds <= 1e6:
         raise UsageError(f"--seconds {options.seconds:g} is out of range; use above 0 to 1000000")
-    with Session(options.device, settings, say=say) as session:
+    with Session(options.device, settings, say=say, progress=say_progress) as session:
         items = session.items()
         try:
             _count(_until(items, options.seconds), session.summary, settings.frames)

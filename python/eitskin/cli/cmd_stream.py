@@ -17,6 +17,7 @@ from eitskin.cli.device_options import (
     opened_outputs,
     read_mode,
     say,
+    say_progress,
     session_settings,
 )
 
@@ -57,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     settings = session_settings(options, mode, record=options.record, model_for=needs)
     check_drawn(options, mode)
     with (
-        Session(options.device, settings, say=say) as session,
+        Session(options.device, settings, say=say, progress=say_progress) as session,
         opened_outputs(options, session) as outputs,
     ):
         session.start()

@@ -349,6 +349,12 @@ def session_settings(
     )
 
 
+def say_progress(text: str) -> None:
+    """The same where somebody sits before a terminal."""
+    if sys.stderr.isatty():
+        say(text)
+
+
 def print_table(facts: dict[str, Any]) -> None:
     """Names and values in two columns."""
     width = max(len(name) for name in facts) + 2

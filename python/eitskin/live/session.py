@@ -89,7 +89,8 @@ class SessionSettings:
 class Session:
     """A board, set up and followed. ``with`` opens it and lets go of it; ``start`` sets it up,
     takes the reference and begins the scene, and where nobody called it the first frame does.
-    ``say`` gets lines for whoever looks on. ``speed``: of what is simulated, emulated or recorded,
+    ``say`` gets lines for whoever looks on, ``progress`` how far and how slow an emulated board is.
+    ``speed``: of what is simulated, emulated or recorded,
     where the URL does not say; 0 is as fast as it can.
 
     ``ask``, ``tare`` and ``stop`` may be called from any thread; all else belongs to the one that
@@ -113,11 +114,13 @@ class Session:
         settings: SessionSettings | None = None,
         *,
         say: Say = lambda text: None,
+        progress: Say = lambda text: None,
         reconnect: Reconnect | None = None,
         speed: float = 0.0,
         clock: WaitingClock | None = None,
     ) -> None:
         self.url, self.settings, self._say = url, settings or SessionSettings(), say
+        self._progress = progress
         named = split_timing(url)[1]
         self._loops = named.loop
         self.pacer = Pacer(speed if named.speed is None else named.speed, clock)
@@ -266,7 +269,7 @@ class Session:
                     last = item.time_us / 1e6
                     if self.url.startswith("emu:"):
                         for text in self._slowness.lines(item.time_us):
-                            self._say(text)
+                            self._progress(text)
                 notices = [Notice(_kind(item), text, last, now_s) for text in events.lines(item)]
                 yield from notices
                 if isinstance(item, LiveFrame):
@@ -338,7 +341,7 @@ class Session:
             start = time.monotonic()
 
             def looking_on(board_s: float) -> None:
-                self._say(
+                self._progress(
                     f"the emulated board starts: {board_s:.2f} s of its time in"
                     f" {time.monotonic() - start:.0f} s"
                 )

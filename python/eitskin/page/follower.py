@@ -125,7 +125,12 @@ class Follower:
 
     def _follow(self) -> None:
         session = PageSession(
-            self._url, self.settings, say=self._say, reconnect=FOR_EVER, speed=self._speed
+            self._url,
+            self.settings,
+            say=self._say,
+            progress=self._say,
+            reconnect=FOR_EVER,
+            speed=self._speed,
         )
         with session, nullcontext() if self._outputs is None else self._outputs(session) as outputs:
             session.start()

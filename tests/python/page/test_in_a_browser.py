@@ -21,6 +21,7 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.page.server import PageServer
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import load_scene
+from eitskin.skin.protocol import adjacent
 
 PLACES = [(-40.0, 10.0), (30.0, -20.0)]
 NEAR_MM = 3.0
@@ -109,6 +110,7 @@ def test_emulated(scene: Path, page: Page) -> None:
         until(lambda: len(page.touches()) == 2, 60)
         assert_shown(page)
         until(lambda: page.text("n-solve").endswith("ms"))
+        until(lambda: "slower than real time" in page.text("log"))
 
 
 def test_recorded(scene: Path, page: Page, tmp_path: Path) -> None:
@@ -125,6 +127,19 @@ def test_recorded(scene: Path, page: Page, tmp_path: Path) -> None:
         page.click("play")
         assert page.answer() == "starting again"
         until(lambda: server.follower.frames == 2 * count)
+
+
+def test_lines_of_an_instrument(scene: Path, page: Page, tmp_path: Path) -> None:
+    rows = BoardFrames(load_scene(scene)).voltage_v(adjacent(16))
+    text = "\n".join(",".join(map(repr, row)) for row in rows.tolist())
+    (tmp_path / "lines.csv").write_text(text)
+    (tmp_path / "layout.toml").write_text("[lines]\ncells = 208\n[port]\nrate_hz = 50\n")
+    url = f"text:{tmp_path}/lines.csv?layout={tmp_path}/layout.toml"
+    with serving(url) as server:
+        page.open(server)
+        until(lambda: page.text("state") == "over")
+        assert_shown(page)
+        assert server.follower.frames == 12
 
 
 def test_pause_step_play_and_speed(live: Page, server: PageServer) -> None:
