@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -46,28 +47,33 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError("flash: --model and --no-model contradict each other")
     if options.json and not options.dry_run:
         raise UsageError("flash: --json goes with --dry-run; without it the tool itself talks")
-    image = options.image if options.image is not None else _prebuilt_image()
     model = None
     if not options.no_model:
         model = (load_prebuilt() if options.model is None else load_model(options.model))[1]
-    plan = plan_flash(
-        image, model, tool=options.tool, serial=options.serial, installed=not options.dry_run
-    )
-    if options.dry_run:
+    folder = Path(tempfile.mkdtemp(prefix="eitskin-flash-"))
+    try:
+        image = options.image if options.image is not None else _prebuilt_image(folder)
+        tool, serial, dry = options.tool, options.serial, options.dry_run
+        plan = plan_flash(image, model, folder, tool=tool, serial=serial, installed=not dry)
+        if not options.dry_run:
+            run_flash(plan, lambda line: print(line, file=sys.stderr, flush=True))
+    except BaseException:
+        shutil.rmtree(folder)
+        raise
+    if options.dry_run:  # the files stay: the commands name them
         facts = {"tool": plan.tool, "commands": [list(command) for command in plan.commands]}
         print(json.dumps(facts, indent=2) if options.json else "\n".join(plan.lines()))
         return 0
-    run_flash(plan, lambda line: print(line, file=sys.stderr, flush=True))
+    shutil.rmtree(folder)
     print("done; ask the board with  eitskin info")
     return 0
 
 
-def _prebuilt_image() -> Path:
-    """The image that ships with the package, as a file that a tool can read."""
+def _prebuilt_image(folder: Path) -> Path:
+    """The image that ships with the package, as a file in ``folder`` that a tool can read."""
     from eitskin.fileio import write_bytes
     from eitskin.firmware.prebuilt import BOARD, load_image
 
-    image, manifest = load_image()
-    path = Path(tempfile.gettempdir()) / f"eitskin-{BOARD}-{manifest.image_sha256[:12]}.bin"
-    write_bytes(path, image)
+    path = folder / f"{BOARD}.bin"
+    write_bytes(path, load_image()[0])
     return path

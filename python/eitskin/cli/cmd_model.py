@@ -89,7 +89,7 @@ def run_build(options: argparse.Namespace) -> int:
     from eitskin.skin.skin import load_skin, paper_skin
 
     if (options.skin is None) == (not options.paper):
-        raise UsageError("model build: name a SKIN.toml, or give --paper, not both")
+        raise UsageError("model build: name a SKIN.toml, or give --paper: one of the two")
     refuse_unwritable(options.output)
     if not 100 <= options.elements <= 500_000:
         raise UsageError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import sys
 from collections.abc import Sequence
 from importlib.metadata import entry_points
@@ -12,6 +13,7 @@ from typing import NoReturn
 
 from eitskin import __version__
 from eitskin.cli.arguments import option
+from eitskin.config import nearest
 from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = (
@@ -19,6 +21,9 @@ COMMANDS = (
     "devices", "info", "tare", "view", "stream", "record", "replay", "flash", "completion",
 )  # fmt: skip
 FIRST = "eitskin stream --device sim:swipe"
+INVALID_CHOICE = re.compile(  # as argparse words it, quoted before Python 3.12
+    r"argument (?P<what>.*?): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)"
+)
 ENTRY_POINT_GROUP = "eitskin.commands"  # of other packages; eitskin-studies names its own there
 
 
@@ -26,7 +31,13 @@ class Parser(argparse.ArgumentParser):
     """What cannot be parsed is refused in one line, as everything else is."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise UsageError instead of printing the usage and leaving."""
+        """Raise UsageError instead of printing the usage and leaving; a choice that is none gets
+        the nearest one."""
+        found = INVALID_CHOICE.fullmatch(message)
+        if found:
+            known = re.findall(r"'([^']+)'", found["known"]) or found["known"].split(", ")
+            message = f"{found['what']}: {found['given']!r} is unknown; "
+            message += nearest(found["given"], known)
         raise UsageError(f"{message}; see  {self.prog} --help")
 
 

@@ -7,7 +7,6 @@ import shlex
 import shutil
 import struct
 import subprocess
-import tempfile
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -64,14 +63,16 @@ def find_tool(wanted: str | None = None, *, installed: bool = True) -> str:
 
 def plan_flash(
     image: str | Path,
-    model: bytes | None = None,
+    model: bytes | None,
+    folder: Path,
     *,
     tool: str | None = None,
     serial: str | None = None,
     installed: bool = True,
 ) -> FlashPlan:
     """The commands that put the firmware ``image`` (.bin) on a board and, where given, ``model`` in
-    its first bank; the record of the second bank is then erased, so that the first one counts.
+    its first bank; the record of the second bank is then erased, so that the first one counts. What
+    the commands read beside ``image`` is written into ``folder``.
     ``serial``: the ST-LINK's, where several boards are plugged in. ``installed``: the tool must be
     there; not to show only what would be run.
 
@@ -86,7 +87,6 @@ def plan_flash(
     pieces = [(path, FIRMWARE_ADDRESS)]
     bank_file = None
     if model is not None:
-        folder = Path(tempfile.gettempdir())
         bank_file, no_record = (
             folder / f"eitskin-bank-{zlib.crc32(model):08x}.bin",
             folder / "eitskin-no-record.bin",
@@ -167,6 +167,7 @@ def _pyocd(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tuple
             "load",
             "--target",
             "stm32f767zi",
+            "--no-wait",
             *which,
             "--format",
             "bin",

@@ -17,6 +17,13 @@ from eitskin.device.timing import split_timing
 from eitskin.device.transport import Transport
 from eitskin.errors import UsageError
 
+AS_IN = {
+    "serial": "serial:/dev/ttyACM0",
+    "sim": "sim:two_touch",
+    "emu": "emu:two_touch",
+    "file": "file:RUN.eits",
+    "text": "text:/dev/ttyACM0?layout=FILE",
+}
 SCHEMES = ("auto", "serial", "sim", "emu", "file", "text")
 MAX_BAUD = 20_000_000
 
@@ -65,6 +72,11 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
     if (scheme not in SCHEMES and not brought) or (scheme == "auto") == bool(colon):
         if scheme.startswith("/") or scheme.upper().startswith("COM"):
             raise UsageError(f"device {url!r}: write  serial:{url}")
+        if scheme in SCHEMES:
+            raise UsageError(
+                f"device {url!r}: "
+                + ("nothing follows  auto" if colon else f"write  {AS_IN[scheme]}")
+            )
         raise UsageError(
             f"device {url!r}: {nearest(scheme, (*SCHEMES, *source_schemes()))}, as in auto,"
             " serial:/dev/ttyACM0, sim:two_touch, emu:two_touch, file:RUN.eits,"

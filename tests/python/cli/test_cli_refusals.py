@@ -29,14 +29,20 @@ USAGE, FILE, CONFIG, GEOMETRY, MODEL, PROTOCOL, FRAME, EXTRA, VERIFICATION = ran
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["recnstruct"], "invalid choice: 'recnstruct'"),
+        (["recnstruct"], "COMMAND: 'recnstruct' is unknown; did you mean 'reconstruct'?"),
         (["model"], "required: ACTION"),
         (["model", "build", "x.toml"], "required: -o/--output"),
-        (["model", "build", "x.toml", "-o", "x", "--storage", "f64"], "invalid choice: 'f64'"),
+        (
+            ["model", "build", "x.toml", "-o", "x", "--storage", "f64"],
+            "--storage: 'f64' is unknown; did you mean 'f16'?",
+        ),
         (["model", "build", "x.toml", "-o", "x", "--rank", "many"], "invalid int value: 'many'"),
         (["model", "info", "--verbose"], "unrecognized arguments: --verbose"),
         (["reconstruct"], "required: FRAMES.npz"),
-        (["reconstruct", "x.npz", "--engine", "gpu"], "invalid choice: 'gpu'"),
+        (
+            ["reconstruct", "x.npz", "--engine", "gpu"],
+            "--engine: 'gpu' is unknown; known are: c, c64, numpy",
+        ),
         (["reconstruct", "x.npz", "--gap", "1e"], "invalid float value: '1e'"),
     ],
 )
@@ -403,7 +409,7 @@ def test_options_of_reconstruct(
         (["--touch-change", "-1"], "--touch-change -1 is out of range"),
         (["--touch-change", "nan"], "--touch-change nan is out of range"),
         (["--regularisation", "-1", "--elements", "800", "--pixels", "8"], "regularisation"),
-        (["skin.toml"], "name a SKIN.toml, or give --paper, not both"),
+        (["skin.toml"], "name a SKIN.toml, or give --paper: one of the two"),
     ],
 )
 def test_options_of_model_build(

@@ -40,7 +40,7 @@ def image(tmp_path: Path) -> Path:
 
 
 def test_openocd(image: Path, tools: Path) -> None:
-    plan = plan_flash(image, tool="openocd")
+    plan = plan_flash(image, None, image.parent, tool="openocd")
     assert plan.commands == (
         (
             "openocd", "-f", "board/st_nucleo_f7.cfg", "-c",
@@ -52,7 +52,7 @@ def test_openocd(image: Path, tools: Path) -> None:
 
 
 def test_st_flash(image: Path, tools: Path) -> None:
-    plan = plan_flash(image, tool="st-flash", serial="0667FF")
+    plan = plan_flash(image, None, image.parent, tool="st-flash", serial="0667FF")
     assert plan.commands == (
         ("st-flash", "--serial", "0667FF", "--reset", "write", str(image), "0x08000000"),
     )
@@ -60,13 +60,14 @@ def test_st_flash(image: Path, tools: Path) -> None:
 
 
 def test_pyocd(image: Path, tools: Path) -> None:
-    plan = plan_flash(image, tool="pyocd")
+    plan = plan_flash(image, None, image.parent, tool="pyocd")
     assert plan.commands == (
         (
             "pyocd",
             "load",
             "--target",
             "stm32f767zi",
+            "--no-wait",
             "--format",
             "bin",
             "--base-address",
@@ -80,7 +81,7 @@ def test_pyocd(image: Path, tools: Path) -> None:
 def test_a_model_goes_into_the_first_bank_and_the_other_loses_its_record(
     tool: str, image: Path, tools: Path
 ) -> None:
-    plan = plan_flash(image, tiny_blob(), tool=tool)
+    plan = plan_flash(image, tiny_blob(), image.parent, tool=tool)
     assert plan.bank_file is not None
     assert plan.bank_file.read_bytes() == bank_bytes(tiny_blob(), 1)
     text = " ".join(plan.lines())
@@ -114,7 +115,7 @@ def test_the_first_tool_that_is_there_is_taken(tools: Path) -> None:
 @pytest.mark.parametrize("tool", TOOLS)
 def test_the_plan_is_what_is_run(tool: str, image: Path, tools: Path, tmp_path: Path) -> None:
     said: list[str] = []
-    plan = plan_flash(image, tiny_blob(), tool=tool)
+    plan = plan_flash(image, tiny_blob(), image.parent, tool=tool)
     assert not (tmp_path / "called").exists()  # planning runs nothing
     run_flash(plan, said.append)
     assert said == plan.lines()
@@ -130,7 +131,7 @@ def test_a_tool_that_fails_is_said(
     with pytest.raises(
         DeviceError, match=r"flashing failed: st-flash .* ended with 3; is the board plugged in"
     ) as caught:
-        run_flash(plan_flash(image, tool="st-flash"))
+        run_flash(plan_flash(image, None, image.parent, tool="st-flash"))
     assert "\n" not in str(caught.value)
     with pytest.raises(DeviceError, match="cannot be run"):
         run_flash(FlashPlan("pyocd", (("/no/such/pyocd",),), image))
@@ -156,17 +157,17 @@ def test_what_is_no_firmware_is_refused(
 ) -> None:
     (tmp_path / "bad.bin").write_bytes(content)
     with pytest.raises(DeviceError, match=message):
-        plan_flash(tmp_path / "bad.bin")
+        plan_flash(tmp_path / "bad.bin", None, tmp_path)
 
 
 def test_an_image_that_is_not_there(tmp_path: Path, tools: Path) -> None:
     with pytest.raises(FileError, match="no such firmware image"):
-        plan_flash(tmp_path / "none.bin")
+        plan_flash(tmp_path / "none.bin", None, tmp_path)
 
 
 def test_a_model_too_large_is_refused(image: Path, tools: Path) -> None:
     with pytest.raises(DeviceError, match="a bank of the board holds 524256"):
-        plan_flash(image, bytes(600_000))
+        plan_flash(image, bytes(600_000), image.parent)
 
 
 def test_the_map_is_the_firmwares() -> None:

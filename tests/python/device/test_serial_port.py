@@ -339,7 +339,7 @@ def test_devices_are_listed_boards_first(monkeypatch: pytest.MonkeyPatch) -> Non
         ("COM3", "write  serial:COM3"),
         ("serial", "serial:/dev/ttyACM0"),
         ("serial:", "something must follow the colon"),
-        ("auto:x", "as in auto"),
+        ("auto:x", "nothing follows  auto"),
         ("sim:", "something must follow the colon"),
         ("serial:/dev/ttyACM0?baud=0", "baud=N"),
         ("serial:/dev/ttyACM0?baud=fast", "baud=N"),
