@@ -4,6 +4,7 @@ written whole as it comes, so that a killed program leaves a readable file."""
 from __future__ import annotations
 
 import csv
+from contextlib import suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -70,4 +71,10 @@ def new_file(url: str, source: Source) -> Any:
 
 def open_sink(url: str, source: Source) -> Sink:
     """See the module. Raises as ``new_file``."""
-    return CsvSink(new_file(url, source))
+    stream = new_file(url, source)
+    try:
+        return CsvSink(stream)
+    except OSError as error:
+        with suppress(OSError):
+            stream.close()
+        raise FileError(f"--to {url}: cannot write it ({error.strerror})") from None

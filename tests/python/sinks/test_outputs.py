@@ -6,6 +6,7 @@ import socket
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +144,20 @@ def test_what_cannot_be_opened_is_refused_in_a_line(
             Outputs(["udp://127.0.0.1:9", url.format(folder=tmp_path, **ports)], swipe.source)
     assert error.value.exit_code == code and part in str(error.value)
     assert str(error.value).count("\n") == 0
+
+
+@pytest.mark.parametrize("kind", ["csv", "mcap"])
+def test_a_full_disk_is_said(swipe: Swipe, kind: str) -> None:
+    """Where the file is opened, or by its counts."""
+    source, said = replace(swipe.source, overwrite=True), list[str]()
+    try:
+        with Outputs([f"{kind}:/dev/full"], source, say=said.append) as outputs:
+            for frame in swipe.frames:
+                outputs.put(frame)
+            (counts,) = outputs.end({})
+            assert counts["failed"] > 0 and "No space left" in counts["error"] and len(said) == 1
+    except EitskinError as error:
+        assert error.exit_code == 3 and "No space left" in str(error)
 
 
 def test_passwords_are_not_shown(swipe: Swipe, made: dict[str, Any]) -> None:
