@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from eitskin.sinks.outputs import Outputs
 
 DEVICE_HELP = (
-    "auto (the one board that is plugged in), serial:/dev/ttyACM0, sim:SCENE (simulated),"
-    " emu:SCENE (the firmware on an emulated board), file:RUN.eits (a recording); SCENE is a file"
-    " or a scene of  eitskin scene list; after these, ?speed=1&loop=1"
+    "auto (the one board that is plugged in), serial:/dev/ttyACM0, text:PORT?layout=FILE (another"
+    " instrument's lines), sim:SCENE (simulated), emu:SCENE (the firmware on an emulated board),"
+    " file:RUN.eits (a recording); SCENE is a file or a scene of  eitskin scene list; after the"
+    " last three, ?speed=1&loop=1"
 )
 KINDS = ("raw", "image", "touches")
 TARE_FRAMES = 16

@@ -21,6 +21,7 @@ PAGES = (
     "docs/guide/calibration.md",
     "docs/guide/board.md",
     "docs/guide/touches-out.md",
+    "docs/guide/your-board.md",
     "docs/reference/python-api.md",
     "docs/guide/emulated-board.md",
     "docs/reference/frames-format.md",

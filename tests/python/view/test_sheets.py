@@ -51,7 +51,7 @@ def boxes(figure: Any) -> dict[str, Any]:
     """Every text that is seen, with its box in pixels."""
     from matplotlib.text import Text
 
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     unseen = set()  # ticks beyond their axes, and all of axes that are switched off
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
