@@ -31,6 +31,7 @@ def python_modules(tables: Tables) -> Iterator[tuple[str, Lines]]:
     yield "python/eitskin/core/options_table.py", _options_module(tables)
     yield "python/eitskin/core/diagnostics_table.py", _diagnostics_module(tables)
     yield "python/eitskin/core/constants_table.py", _constants_module(tables)
+    yield "python/eitskin/core/gestures_table.py", _gestures_module(tables)
     if "link" in tables:
         yield "python/eitskin/device/wire/link_table.py", _link_module(tables)
 
@@ -207,6 +208,15 @@ def _diagnostics_module(tables: Tables) -> Lines:
     yield from _dataclass(types["eits_touch"])
 
 
+def _gestures_module(tables: Tables) -> Lines:
+    types = types_of(tables["gestures"])
+    yield from list(_head("Events from touches in time.", "gestures", "from enum import IntEnum"))[
+        :-1
+    ]
+    yield from _class(types["eits_event_kind"] | {"python": "IntEnum EventKind"})
+    yield from _class(types["eits_event_phase"] | {"python": "IntEnum EventPhase"})
+
+
 def _constants_module(tables: Tables) -> Lines:
     yield from docstring(
         "The core's numbers that are a choice; docs/reference/constants.md has their reasons."
@@ -275,4 +285,4 @@ def _command(struct: Table, packet: str, doc: str, python: str) -> Lines:
     yield from ("", f"    TYPE: ClassVar[PacketType] = PacketType.{packet}")
     yield from (*_layout(struct), *_fields(struct, struct["rows"][1:]))
     if struct.get("bytes_follow"):
-        yield "    data: bytes = b\"\""
+        yield '    data: bytes = b""'

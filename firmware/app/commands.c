@@ -73,7 +73,8 @@ static fw_answer on_stream(fw_instrument *instrument, const void *payload, size_
     fw_answer bad;
     (void)size;
     memcpy(&c, payload, sizeof c);
-    const uint32_t all = EITS_STREAM_RAW | EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES;
+    const uint32_t all =
+        EITS_STREAM_RAW | EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS;
     if (outside(&bad, offsetof(eits_command_stream, what), c.what, 0, all) ||
         outside(&bad, offsetof(eits_command_stream, every), c.every, 1, UINT16_MAX))
         return bad;

@@ -49,6 +49,10 @@ typedef struct fw_instrument {
     fw_engine engine;
     fw_tare tare;
     fw_stream stream;
+    eits_gestures gestures;
+    /* of the frame under way, as they come and as they are sent: too much for the stack */
+    eits_event events[EITS_MAX_EVENTS];
+    eits_packet_event events_sent[EITS_MAX_EVENTS];
     fw_upload upload;
     fw_record record; /* of the open model's bank */
     uint32_t bank;

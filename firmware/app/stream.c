@@ -70,6 +70,7 @@ static void take_tare(fw_instrument *instrument, const fw_frame *frame)
     if (step == FW_TARE_TAKEN || step == FW_TARE_DONE)
         send_raw(instrument, frame, EITS_RAW_REFERENCE);
     if (step == FW_TARE_DONE) {
+        (void)eits_gestures_init(&instrument->gestures, NULL); /* ids begin again, too */
         const fw_fault_detail detail = {.frame = frame->number};
         fw_fault_set(&instrument->faults, EITS_FAULT_STALE_REFERENCE, false, detail);
         fw_fault_set(&instrument->faults, EITS_FAULT_UNLIKE_MODEL, false, detail);
@@ -133,6 +134,32 @@ static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_p
     }
 }
 
+/* What the touches of a frame amounted to; of a rejected one nothing is known. */
+static void send_events(fw_instrument *instrument, const fw_frame *frame, eits_status status,
+                        const eits_touch *touches, uint32_t count)
+{
+    eits_packet_event *body = instrument->events_sent;
+    eits_packet_events head = {.frame = frame->number, .time_us = frame->time_us};
+    if ((instrument->stream.what & EITS_STREAM_EVENTS) == 0)
+        return;
+    if (status == EITS_OK)
+        (void)eits_gestures_update(&instrument->gestures, touches, count, frame->time_us,
+                                   instrument->events, EITS_MAX_EVENTS, &head.count);
+    for (uint32_t k = 0; k < head.count; ++k) {
+        const eits_event *e = &instrument->events[k];
+        body[k] = (eits_packet_event){.kind = (uint16_t)e->kind,
+                                      .phase = (uint16_t)e->phase,
+                                      .first_id = e->first_id,
+                                      .second_id = e->second_id,
+                                      .x_mm = e->x_mm,
+                                      .y_mm = e->y_mm,
+                                      .direction_deg = e->direction_deg,
+                                      .value = e->value};
+    }
+    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_EVENTS, &head, sizeof head, body,
+                           head.count * sizeof body[0]);
+}
+
 /* Returns the microseconds that the solver took, touches included. */
 static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw_quality *quality)
 {
@@ -143,7 +170,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
     const eits_status status =
         eits_reconstruct(ctx, frame->volts, instrument->engine.model.n_rows, NULL, NULL);
     const uint32_t solved_us = fw_now_us(instrument);
-    const bool wanted = (instrument->stream.what & EITS_STREAM_TOUCHES) != 0;
+    const bool wanted = (instrument->stream.what & (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS)) != 0;
     if (wanted && status == EITS_OK)
         (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
     const uint32_t done_us = fw_now_us(instrument);
@@ -175,6 +202,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
                  (fw_fault_detail){.frame = frame->number, .value = (int32_t)status});
     send_diagnostics(instrument, frame, info, status == EITS_OK);
     send_solved(instrument, frame, &head, touches, count);
+    send_events(instrument, frame, status, touches, count);
     return done_us - began_us;
 }
 
@@ -193,8 +221,7 @@ void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
     fw_engine *engine = &instrument->engine;
     fw_stream *stream = &instrument->stream;
     const bool untouched = fw_tare_wants(&instrument->tare, frame);
-    const bool solved =
-        engine->tared && (stream->what & (EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES)) != 0;
+    const bool solved = engine->tared && (stream->what & ~(uint32_t)EITS_STREAM_RAW) != 0;
     fw_quality quality;
     instrument->last_frame = frame->number;
     fw_quality_prepare(engine, frame);

@@ -12,6 +12,7 @@ from eitskin.device.wire.link_table import Stream
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame, Notice
 from eitskin.live.session import KINDS, Session, SessionSettings
+from eitskin.live.zones import load_zones
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.sinks.outputs import Outputs
@@ -38,6 +39,7 @@ def stream(
     tare: int | None = None,
     to: Sequence[str] = (),
     record: str | Path | None = None,
+    zones: str | Path | None = None,
     speed: float = 0.0,
     **solver: Any,
 ) -> Iterator[Frame]:
@@ -47,13 +49,14 @@ def stream(
     Args:
         url: as ``eitskin stream --device``: "auto", "serial:PORT", "sim:SCENE", "emu:SCENE",
             "file:RUN.eits".
-        mode: "touches", "image", "raw", or several: "touches,image".
+        mode: "touches", "image", "raw", "events", or several: "touches,image".
         model: a file, where the board's model is not the prebuilt one.
         frames: stop after so many; 0: go on until the scene or the recording ends.
         every: every n-th frame; 0: as many as the line carries.
         tare: take the reference from so many frames of the untouched skin.
         to: sinks, such as "udp://127.0.0.1:9000" (docs/guide/touches-out.md).
         record: a new recording of every packet.
+        zones: a file of named places, whose presses are told (docs/guide/gestures.md).
         speed: of what is simulated, emulated or recorded; 1 is as it was, 0 as fast as it can.
         solver: ``sign``, ``iterations``, ``track`` and what else SolverSettings has.
 
@@ -69,6 +72,7 @@ def stream(
         solver=_solver(solver),
         tare=tare,
         record=None if record is None else Path(record),
+        zones=() if zones is None else load_zones(zones),
     )
     with Session(url, settings, speed=speed) as session:
         known = None if session.known is None else session.known.model

@@ -13,8 +13,8 @@
  *     forget
  *
  * A frame's line says why the solve stopped, iterations, MACs and instructions of the solve and of
- * the touches, the stack that they took, the image's CRC-32, info and touches. Floats are printed
- * as bits: there is nothing to round. */
+ * the touches, instructions of the gestures made of them, the stack that they took, the image's
+ * CRC-32, info and touches. Floats are printed as bits: there is nothing to round. */
 #include "eitskin/eitskin.h"
 
 #include <stdio.h>
@@ -29,7 +29,11 @@ static eits_model model;
 static eits_context *ctx;
 static eits_options options;
 static unsigned portable;
+static eits_gestures gestures;
+static eits_event events[EITS_MAX_EVENTS];
 static FILE *numbers;
+
+enum { FRAME_US = 20833 }; /* 48 frames a second */
 
 /* CMSDK timer 0 at 25 MHz counts down; QEMU's -icount shift=6 makes it 1.6 ticks an instruction. */
 #define TIMER_CTRL   (*(volatile uint32_t *)0x40000000u)
@@ -121,6 +125,7 @@ static int load(const char *name)
         status = eits_use_portable_kernels(ctx, (int)portable);
     if (status == EITS_OK)
         options = *eits_get_options(ctx);
+    (void)eits_gestures_init(&gestures, NULL);
     printf("model status %d workspace %lu kernels %s\n", (int)status, (unsigned long)need,
            status == EITS_OK ? eits_kernels_name(ctx) : "none");
     return status == EITS_OK;
@@ -208,11 +213,16 @@ static int solve_one(unsigned k, int reduced)
     start_timer();
     (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &found);
     const unsigned long touch = instructions_since_start();
+    uint32_t told = 0;
+    start_timer();
+    (void)eits_gestures_update(&gestures, touches, found, gestures.time_us + FRAME_US, events,
+                               EITS_MAX_EVENTS, &told);
+    const unsigned long gesture = instructions_since_start();
     const unsigned long stack = stack_used(painted);
     printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu "
-           "stack %lu image %08lx",
+           "gesture %lu stack %lu image %08lx",
            k, (int)status, (int)info->stop, (unsigned long)info->iterations,
-           (unsigned long)info->macs, (unsigned long)info->touch_macs, solve, touch, stack,
+           (unsigned long)info->macs, (unsigned long)info->touch_macs, solve, touch, gesture, stack,
            (unsigned long)eits_crc32(0, image, (size_t)model.n_pixels * sizeof image[0]));
     print_info(info);
     print_touches(touches, found);

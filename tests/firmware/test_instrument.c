@@ -13,7 +13,10 @@ static struct mirror {
     eits_context *ctx;
     _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
     uint32_t taken; /* packets seen */
-    uint32_t images, touches, different;
+    uint32_t images, touches, frames_of_events, events, different;
+    eits_gestures gestures;
+    eits_touch found[EITS_MAX_TOUCHES];
+    uint32_t found_count;
     float volts[256];
     uint32_t frame;
 } mirror;
@@ -58,7 +61,7 @@ static void mirror_image(const host_packet *packet)
 static void mirror_touches(const host_packet *packet)
 {
     const eits_packet_solved *head = (const eits_packet_solved *)(const void *)packet->payload;
-    eits_touch touches[EITS_MAX_TOUCHES];
+    eits_touch *touches = mirror.found;
     uint32_t count = 0;
     if (mirror.ctx->info.stop != EITS_STOP_BELOW_THRESHOLD || head->status == 0)
         CHECK_EQUAL(eits_find_touches(mirror.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
@@ -66,6 +69,31 @@ static void mirror_touches(const host_packet *packet)
     mirror.different +=
         head->count != count || packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
         !same_bits(packet->payload + sizeof *head, touches, count * sizeof(eits_packet_touch));
+    mirror.found_count = count;
+}
+
+/* The board's events are those that its touches give here. */
+static void mirror_events(const host_packet *packet)
+{
+    const eits_packet_events *head = (const eits_packet_events *)(const void *)packet->payload;
+    const eits_packet_event *sent = (const eits_packet_event *)(const void *)(head + 1);
+    eits_event events[EITS_MAX_EVENTS];
+    uint32_t told = 0;
+    CHECK_EQUAL(eits_gestures_update(&mirror.gestures, mirror.found, mirror.found_count,
+                                     head->time_us, events, EITS_MAX_EVENTS, &told),
+                EITS_OK);
+    ++mirror.frames_of_events;
+    mirror.events += told;
+    mirror.different += head->frame != mirror.frame || head->count != told ||
+                        packet->size != sizeof *head + told * sizeof *sent;
+    for (uint32_t k = 0; k < told && k < head->count; ++k)
+        mirror.different += sent[k].kind != events[k].kind || sent[k].phase != events[k].phase ||
+                            sent[k].first_id != events[k].first_id ||
+                            sent[k].second_id != events[k].second_id ||
+                            !same_bits(&sent[k].x_mm, &events[k].x_mm, 4) ||
+                            !same_bits(&sent[k].y_mm, &events[k].y_mm, 4) ||
+                            !same_bits(&sent[k].direction_deg, &events[k].direction_deg, 4) ||
+                            !same_bits(&sent[k].value, &events[k].value, 4);
 }
 
 /* Take the packets that have come since the last call. */
@@ -87,10 +115,13 @@ static void mirror_follow(void)
             if (mirror.ctx->reference.wanted > 0)
                 CHECK_EQUAL(eits_reference_finish(mirror.ctx), EITS_OK);
             eits_forget(mirror.ctx);
+            CHECK_EQUAL(eits_gestures_init(&mirror.gestures, NULL), EITS_OK);
         } else if (packet->type == EITS_PACKET_IMAGE) {
             mirror_image(packet);
         } else if (packet->type == EITS_PACKET_TOUCHES) {
             mirror_touches(packet);
+        } else if (packet->type == EITS_PACKET_EVENTS) {
+            mirror_events(packet);
         }
     }
 }
@@ -119,7 +150,7 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     host_forget(&b.host);
     mirror_start(untouched);
     CHECK_EQUAL(host_tare(&b.host, untouched).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 15, every, 0).status, EITS_REPLY_OK);
     mirror_follow();
     CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.99f);
     CHECK(same_bits(mirror.ctx->reference.v0, b.host.instrument.engine.ctx->reference.v0,
@@ -137,7 +168,7 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
         CHECK_EQUAL(eits_reference_begin(mirror.ctx, untouched), EITS_OK);
     /* with the touches: they are gone, and their ids */
     CHECK_EQUAL(host_tare(&b.host, untouched).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 15, every, 0).status, EITS_REPLY_OK);
     touch(4, -2, 3);
     host_run(&b.host, ms);
     mirror_follow();
@@ -151,6 +182,8 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     mirror_follow();
     CHECK(mirror.images >= 25u / every);
     CHECK_EQUAL(mirror.images, mirror.touches);
+    CHECK_EQUAL(mirror.images, mirror.frames_of_events);
+    CHECK(mirror.events > 0);
     CHECK_EQUAL(mirror.different, 0);
     CHECK_EQUAL(b.host.gaps, 0);
     CHECK_EQUAL(host_info(&b.host).tared, 1);
@@ -204,6 +237,12 @@ static void test_streaming(void)
     }
     CHECK_EQUAL(host_info(&b.host).streaming, 0); /* five, and no more */
     CHECK_EQUAL(host_stats(&b.host, 0).frames_solved, 5);
+    host_forget(&b.host);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_EVENTS, 1, 4).status, EITS_REPLY_OK);
+    host_run(&b.host, 200);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_EVENTS), 4); /* whether any happened or not */
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 0);
+    CHECK_EQUAL(host_last(&b.host, EITS_PACKET_EVENTS)->size, sizeof(eits_packet_events));
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_IMAGE, 2, 0).status, EITS_REPLY_OK);
     const eits_packet_info info = host_info(&b.host);
     CHECK_EQUAL(info.streaming, EITS_STREAM_IMAGE);

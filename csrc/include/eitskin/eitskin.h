@@ -41,6 +41,7 @@
 #include "eitskin/diagnostics.h"
 #include "eitskin/force.h"
 #include "eitskin/frame.h"
+#include "eitskin/gesture.h"
 #include "eitskin/link.h"
 #include "eitskin/model.h"
 #include "eitskin/options.h"
@@ -48,5 +49,6 @@
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
 #include "eitskin/types.h"
+#include "eitskin/zone.h"
 
 #endif

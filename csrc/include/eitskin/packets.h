@@ -31,6 +31,8 @@ typedef enum eits_packet_type {
     EITS_PACKET_IMAGE = 0x11,
     /* a frame's touches */
     EITS_PACKET_TOUCHES = 0x12,
+    /* what a frame's touches amounted to */
+    EITS_PACKET_EVENTS = 0x15,
     /* the board's counters */
     EITS_PACKET_STATS = 0x13,
     /* a fault that rose or went */
@@ -179,7 +181,9 @@ typedef enum eits_stream {
     /* its image, as an IMAGE */
     EITS_STREAM_IMAGE = 2,
     /* its touches, as TOUCHES */
-    EITS_STREAM_TOUCHES = 4
+    EITS_STREAM_TOUCHES = 4,
+    /* its events, as EVENTS, also where there are none; a tare forgets fingers */
+    EITS_STREAM_EVENTS = 8
 } eits_stream;
 
 /* The board, its model and its settings. */
@@ -360,6 +364,35 @@ typedef struct eits_packet_touch {
     float long_x_mm;
     float long_y_mm;
 } eits_packet_touch;
+
+/* What happened in a frame; none where the core rejected it. */
+typedef struct eits_packet_events {
+    /* number of the scanned frame, as in its RAW */
+    uint32_t frame;
+    /* when its scan began */
+    uint32_t time_us;
+    /* events that follow */
+    uint32_t count;
+} eits_packet_events;
+
+/* One event, as eits_event (gesture_events.h); its time is the frame's, its zone the host's. */
+typedef struct eits_packet_event {
+    /* eits_event_kind */
+    uint16_t kind;
+    /* eits_event_phase */
+    uint16_t phase;
+    /* of the touch, as it was when it landed */
+    uint32_t first_id;
+    /* of two fingers the second; else 0 */
+    uint32_t second_id;
+    /* where */
+    float x_mm;
+    float y_mm;
+    /* of a swipe, 0 along x, 90 along y */
+    float direction_deg;
+    /* by kind */
+    float value;
+} eits_packet_event;
 
 /* Stages that are timed. */
 typedef enum eits_stage {

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import add_verbose, read_mode, say, whole
+from eitskin.cli.device_options import add_verbose, add_zones, read_mode, read_zones, say, whole
 from eitskin.errors import FrameError, UsageError, VerificationError
 
 
@@ -25,8 +25,11 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     option(parser, "recording RUN.eits", None, Path)
-    option(parser, "--mode KIND[,KIND]", "raw, image, touches, or several (default: touches)")
+    option(
+        parser, "--mode KIND[,KIND]", "raw, image, touches, events, or several (default: touches)"
+    )
     option(parser, "--first N", "the first N frames only", int)
+    add_zones(parser)
     option(parser, "--model MODEL.eitm", "the board's model where it is not the prebuilt one", Path)
     option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Path)
     option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
@@ -70,6 +73,7 @@ def _show(options: argparse.Namespace) -> None:
         frames=options.first or 0,
         model=options.model,
         model_for="a picture" if options.picture or options.film else "",
+        zones=read_zones(options.zones),
     )
     with Session(f"file:{options.recording}", settings, say=say) as session:
         show(options, session)

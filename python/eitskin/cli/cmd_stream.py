@@ -14,6 +14,7 @@ from eitskin.cli.device_options import (
     add_scan,
     add_stream,
     add_verbose,
+    add_zones,
     opened_outputs,
     read_mode,
     say,
@@ -28,7 +29,8 @@ def add_parser(subparsers: Any) -> None:
         "stream",
         help="touches, images or raw frames of a board as they come",
         description=(
-            "Follow a board: its touches as a table on standard output, faults and events of the"
+            "Follow a board: its touches as a table on standard output, with a line a gesture,"
+            " faults and events of the"
             " link on standard error, a summary at the end. What is seen on a simulated or emulated"
             " board is compared with its scene's truth. With --json each line is a JSON object,"
             " the last one the summary (docs/reference/message.md)."
@@ -40,6 +42,7 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
     option(parser, "--record RUN.eits", "also record every packet, as  eitskin record  does", Path)
     option(parser, "--overwrite", "write over files that exist, of --record and --to")
+    add_zones(parser)
     add_outputs(parser)
     add_verbose(parser)
     add_scan(parser)

@@ -12,6 +12,7 @@ from eitskin.cli.budget_options import add_wish, named_target
 from eitskin.errors import FileError, UsageError
 
 if TYPE_CHECKING:
+    from eitskin.core.gestures import Zone
     from eitskin.device.client import Device
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.link_table import Stream
@@ -24,7 +25,7 @@ DEVICE_HELP = (
     " file:RUN.eits (a recording); SCENE is a file or a scene of  eitskin scene list; after the"
     " last three, ?speed=1&loop=1"
 )
-KINDS = ("raw", "image", "touches")
+KINDS = ("raw", "image", "touches", "events")
 TARE_FRAMES = 16
 
 
@@ -133,7 +134,7 @@ def named_solver(options: argparse.Namespace) -> dict[str, Any]:
 
 def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
     """What is streamed, and how much of it."""
-    option(parser, "--mode KIND[,KIND]", "raw, image, touches, or several", default=default)
+    option(parser, "--mode KIND[,KIND]", "raw, image, touches, events, or several", default=default)
     option(parser, "--every N", "every N-th frame (default: as many as the line carries)", int)
     option(
         parser, "--frames N", "stop after N (default: go on until Ctrl-C, or the scene ends)", int
@@ -170,6 +171,24 @@ def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
     model = None if session.known is None else session.known.model
     source = Source(transport.url, board.board, model, getattr(options, "overwrite", False))
     return Outputs(options.to or (), source, patient=session.patient, say=say)
+
+
+def add_zones(parser: argparse.ArgumentParser) -> None:
+    """``--zones``."""
+    option(parser, "--zones FILE.toml", "named keys, pads and rings whose presses are told", Path)
+
+
+def read_zones(path: Path | None) -> tuple[Zone, ...]:
+    """The zones of ``--zones``.
+
+    Raises:
+        FileError, ConfigError: as ``load_zones``.
+    """
+    if path is None:
+        return ()
+    from eitskin.live.zones import load_zones
+
+    return load_zones(path)
 
 
 def read_mode(text: str) -> Stream:
@@ -346,6 +365,7 @@ def session_settings(
         solver=read_solver(options),
         target=named_target(options, "f767"),
         tare=None if options.tare is None else check_tare_frames(options.tare),
+        zones=read_zones(getattr(options, "zones", None)),
         record=record,
     )
 

@@ -53,9 +53,14 @@ class Rows:
 
     def lines(self, frame: Frame) -> list[str]:
         """Of the next frame."""
+        return [*self._frame(frame), *_happened(frame)]
+
+    def _frame(self, frame: Frame) -> list[str]:
         from eitskin.scoring.stream_check import line
 
         live = frame.live
+        if live.events is not None and live.solved is None and live.raw is None:
+            return []
         if self._verbose or live.touches is None or live.image is not None or live.raw is not None:
             return [line(frame.compared, solver=self._verbose)]
         rows = [] if self._begun else [HEADER + (SCORED if self._scored else "")]
@@ -78,6 +83,11 @@ class Rows:
         if errors is None:
             return ""
         return f" {errors[number]:7.2f}" if number in errors else "   false"
+
+
+def _happened(frame: Frame) -> list[str]:
+    """A line a gesture, and a zone pressed; what moves on is left to --json."""
+    return [f"{frame.time_s:8.3f}  {one.text()}" for one in frame.events if one.is_gesture]
 
 
 def show(options: argparse.Namespace, session: Session, outputs: Outputs | None = None) -> None:
@@ -103,8 +113,8 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
                 continue
             if options.picture is not None or options.film is not None:
                 album.add(item.compared)
-            lines = [encoded(item.message())] if options.json else rows.lines(item)
-            print("\n".join(lines), flush=True)
+            for text in [encoded(item.message())] if options.json else rows.lines(item):
+                print(text, flush=True)
     except KeyboardInterrupt:
         say("stopped")
     except EitskinError as error:

@@ -14,6 +14,7 @@ USED = 0.9  # of the line; the rest is for replies, faults and what comes in bur
 PACKET_BYTES = 16  # head, checksum, zeros and stuffing
 RAW_BYTES, ROW_BYTES = 16, 5
 SOLVED_BYTES, PIXEL_BYTES, TOUCHES_BYTES = 104, 4, 8 * 44
+EVENTS_BYTES = 12 + 4 * 28
 
 
 def frame_bytes(info: BoardInfo, what: Stream) -> int:
@@ -22,6 +23,7 @@ def frame_bytes(info: BoardInfo, what: Stream) -> int:
         Stream.RAW: RAW_BYTES + ROW_BYTES * info.n_rows,
         Stream.IMAGE: SOLVED_BYTES + PIXEL_BYTES * info.n_pixels,
         Stream.TOUCHES: SOLVED_BYTES + TOUCHES_BYTES,
+        Stream.EVENTS: EVENTS_BYTES,
     }
     return sum(size + PACKET_BYTES + size // 254 for kind, size in kinds.items() if kind & what)
 

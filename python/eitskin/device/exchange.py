@@ -21,6 +21,7 @@ from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
+    FrameEvents,
     RawFrame,
     Reply,
     SolvedImage,
@@ -30,7 +31,7 @@ from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.errors import DeviceError, UsageError
 
 Answer = Reply | BoardInfo | BoardStats
-Streamed = RawFrame | SolvedImage | SolvedTouches | Fault | BoardStats | LinkEvent
+Streamed = RawFrame | SolvedImage | SolvedTouches | FrameEvents | Fault | BoardStats | LinkEvent
 
 Self = TypeVar("Self", bound="CommandExchange")
 

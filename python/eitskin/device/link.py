@@ -15,7 +15,7 @@ from eitskin.device.wire.codec import Decoder, LinkCounters, Packet, encode
 from eitskin.device.wire.link_table import PacketType
 from eitskin.errors import DeviceError, EitskinError
 
-FRAME_PACKETS = frozenset((PacketType.RAW, PacketType.IMAGE, PacketType.TOUCHES))
+FRAME_PACKETS = frozenset((PacketType.RAW, PacketType.IMAGE, PacketType.TOUCHES, PacketType.EVENTS))
 READ_S = 0.1
 
 

@@ -18,6 +18,7 @@ from eitskin.device.wire.link_table import Stream, StreamCommand
 from eitskin.device.wire.packets import (
     BoardStats,
     Fault,
+    FrameEvents,
     RawFrame,
     Solved,
     SolvedImage,
@@ -32,8 +33,8 @@ CLOCK_TIMER, TIMER_COUNT = 5, 0x24  # of the emulated board: its microsecond clo
 @dataclass(frozen=True, eq=False)
 class LiveFrame:
     """What came of one frame. ``time_us`` counts from the first frame of the stream and does not
-    wrap; ``board_us`` is the board's own clock when the scan began. At least one of the three
-    packets is there."""
+    wrap; ``board_us`` is the board's own clock when the scan began. At least one of the packets
+    is there."""
 
     number: int
     time_us: int
@@ -41,6 +42,7 @@ class LiveFrame:
     raw: RawFrame | None = None
     image: SolvedImage | None = None
     touches: SolvedTouches | None = None
+    events: FrameEvents | None = None
 
     @property
     def solved(self) -> Solved | None:
@@ -264,7 +266,12 @@ def replayed(
             count += 1
 
 
-_KINDS = {RawFrame: "raw", SolvedImage: "image", SolvedTouches: "touches"}
+_KINDS = {
+    RawFrame: "raw",
+    SolvedImage: "image",
+    SolvedTouches: "touches",
+    FrameEvents: "events",
+}
 
 
 class Clock:
@@ -285,7 +292,7 @@ class Clock:
 
 def _frame(clock: Clock, parts: dict[str, Any]) -> LiveFrame:
     first = next(iter(parts.values()))
-    board_us = first.time_us if isinstance(first, RawFrame) else first.solved.time_us
+    board_us = (first if isinstance(first, RawFrame | FrameEvents) else first.solved).time_us
     return LiveFrame(first.frame, clock.elapsed_us(board_us), board_us, **parts)
 
 

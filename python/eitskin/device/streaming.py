@@ -9,7 +9,7 @@ from eitskin.device.exchange import CommandExchange, Streamed
 from eitskin.device.link import LinkEvent
 from eitskin.device.wire.explain import reply_text
 from eitskin.device.wire.link_table import Stream, StreamCommand
-from eitskin.device.wire.packets import RawFrame, SolvedImage, SolvedTouches
+from eitskin.device.wire.packets import FrameEvents, RawFrame, SolvedImage, SolvedTouches
 from eitskin.errors import DeviceError, EitskinError
 
 SILENCES = 3
@@ -49,6 +49,7 @@ _KIND: dict[type, Stream] = {
     RawFrame: Stream.RAW,
     SolvedImage: Stream.IMAGE,
     SolvedTouches: Stream.TOUCHES,
+    FrameEvents: Stream.EVENTS,
 }
 
 
@@ -107,7 +108,7 @@ def _resume(device: CommandExchange, progress: _Progress, every: int) -> None:
         )
     if now.model_crc != before.model_crc:
         raise DeviceError(f"{name}: the board came back with another model; start again")
-    if progress.what & (Stream.IMAGE | Stream.TOUCHES) and not now.tared:
+    if progress.what & ~Stream.RAW and not now.tared:
         raise DeviceError(
             f"{name}: the board restarted and has no reference frame; leave the skin untouched and"
             " start again"
@@ -151,7 +152,7 @@ def _replay(device: CommandExchange, what: Stream, every: int, frames: int) -> I
         if kind is None:
             yield item
             continue
-        assert isinstance(item, (RawFrame, SolvedImage, SolvedTouches))
+        assert isinstance(item, (RawFrame, SolvedImage, SolvedTouches, FrameEvents))
         place = numbers.setdefault(item.frame, len(numbers))
         if frames and place >= frames * every:
             return

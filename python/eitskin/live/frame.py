@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from eitskin.core.diagnostics import names, words
 from eitskin.core.diagnostics_table import Touch
+from eitskin.core.gestures import GestureEvent
 from eitskin.core.notebook import places_text, touches_html
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
@@ -47,7 +48,7 @@ class Frame:
         time_unix_s: when it was complete on this host, in seconds since 1970 (UTC); None for what
             was recorded.
         arrived_ns: the same by ``time.monotonic_ns``.
-        events: gestures that ended with this frame.
+        events: what its touches amounted to: fingers down, moved and up, gestures, zones pressed.
         notices: what was noticed since the frame before.
     """
 
@@ -56,7 +57,7 @@ class Frame:
     known: KnownModel | None = None
     time_unix_s: float | None = None
     arrived_ns: int = 0
-    events: tuple[Any, ...] = ()
+    events: tuple[GestureEvent, ...] = ()
     notices: tuple[Notice, ...] = ()
 
     @property
@@ -121,7 +122,7 @@ class Frame:
             diagnostics=self.diagnostics,
             found=self.found,
             refused=self.refused,
-            events=[event.as_dict() for event in self.events],
+            events=[event.as_dict() | {"time_s": self.time_s} for event in self.events],
             info=None if solved is None else solved.as_dict(),
         )
         message["board_us"] = live.board_us

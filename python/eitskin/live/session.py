@@ -17,6 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from eitskin.core.gestures import Zone
 from eitskin.device.bandwidth import carried_every
 from eitskin.device.client import Device
 from eitskin.device.events import Events
@@ -40,6 +41,7 @@ from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import Fault
 from eitskin.errors import EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice
+from eitskin.live.gestures import GestureTeller
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore, truth_of
 from eitskin.scoring.stream_check import Watcher
 
@@ -49,7 +51,7 @@ if TYPE_CHECKING:
     from eitskin.tuning.front import Target
 
 TARE_FRAMES = 16
-KINDS = ("raw", "image", "touches")
+KINDS = ("raw", "image", "touches", "events")
 Item: TypeAlias = LiveFrame | Fault | LinkEvent
 Say: TypeAlias = Callable[[str], None]
 T = TypeVar("T")
@@ -67,6 +69,7 @@ class SessionSettings:
         firmware: of an emulated board.
         model_for: what cannot do without the board's model, such as "a picture"; "": nothing.
         tare: take the reference from so many frames; None: from 16 where that is needed.
+        zones: named places that fingers press (``eitskin.live.zones``).
         target: a budget or an accuracy that chooses the solver's settings.
         record: a new recording of every packet; an existing file is written over.
         quiet_frames: those of the reference are sent too, for taps of the link.
@@ -80,6 +83,7 @@ class SessionSettings:
     model_for: str = ""
     scan: ScanSettings = field(default_factory=ScanSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
+    zones: tuple[Zone, ...] = ()
     target: Target | None = None
     tare: int | None = None
     record: Path | None = None
@@ -259,6 +263,7 @@ class Session:
         ``summary`` and ``score``."""
         self.start()
         watcher, events, last = Watcher(self.known, self.truth), Events(), None
+        gestures = GestureTeller(self.settings.zones)
         watcher.score = self.score
         items = self.items()
         try:
@@ -275,7 +280,8 @@ class Session:
                 if isinstance(item, LiveFrame):
                     self.summary.add(item)
                     watcher.known = self.known  # another one where a model was uploaded
-                    yield Frame(item, watcher.see(item), self.known, now_s, arrived_ns)
+                    happened = gestures.take(item)
+                    yield Frame(item, watcher.see(item), self.known, now_s, arrived_ns, happened)
                 elif isinstance(item, Fault):
                     self.summary.faults += item.raised
         finally:
@@ -350,7 +356,7 @@ class Session:
 
     @property
     def _solves(self) -> bool:
-        return bool(self.settings.mode & (Stream.IMAGE | Stream.TOUCHES))
+        return bool(self.settings.mode & ~Stream.RAW)
 
     def _take_reference(self) -> None:
         how, simulated = self.settings, self.device.transport.synchronous

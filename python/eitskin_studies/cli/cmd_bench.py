@@ -1,5 +1,5 @@
 """``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes,
-boards, kernels, growth, batches; and what diagnostics are worth."""
+boards, kernels, growth, batches; what diagnostics are worth, and gestures."""
 
 from __future__ import annotations
 
@@ -138,6 +138,27 @@ def add_parser(subparsers: Any) -> None:
     option(outputs, "--seed", "of contacts and noise", default=1)
     _add_page(outputs)
     outputs.set_defaults(run=run_outputs)
+    gestures = what.add_parser(
+        "gestures",
+        help="gestures of simulated fingers: how many are told rightly, and how late",
+        description=(
+            "Draw sessions of taps, holds, swipes, pinches, spreads, turns, drags and presses,"
+            " simulate a board that scans meanwhile, and judge what the C core tells."
+        ),
+    )
+    option(gestures, "--sessions", "of 27 each", default=60)
+    option(gestures, "--seed", "of all that is random", default=7001)
+    option(
+        gestures,
+        "--role",
+        "which sessions: to choose by, or to judge by",
+        choices=("tuning", "judging"),
+        default="judging",
+    )
+    option(gestures, "--snr-db DB", None, float, nargs="+", default=[60.0, 40.0])
+    option(gestures, "--cache DIR", "keeps the simulated frames", Path)
+    _add_page(gestures, "gestures")
+    gestures.set_defaults(run=run_gestures)
     worlds = what.add_parser(
         "worlds",
         help="touches counted in worlds that the model does not share",
@@ -401,6 +422,29 @@ def run_scenes(options: argparse.Namespace) -> int:
     )
     print(json.dumps(result, indent=2) if options.json else bench_scenes.scenes_text(result))
     return 0
+
+
+def run_gestures(options: argparse.Namespace) -> int:
+    """Judge gestures."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.gestures import bench as bench_gestures
+
+    _within("--sessions", options.sessions, 1, 10_000)
+    _within("--seed", options.seed, 0, 2**31 - 1)
+    for snr_db in options.snr_db:
+        if not 0 <= snr_db <= 200:
+            raise UsageError(f"bench: --snr-db {snr_db:g} is out of range; use 0 to 200")
+    refuse_unwritable(options.page)
+    how = bench_gestures.Settings(
+        options.sessions, options.seed, options.role, tuple(options.snr_db), options.cache
+    )
+    result = bench_gestures.run(how, _progress)
+    command = (
+        f"eitskin bench gestures --sessions {options.sessions} --seed {options.seed} --role"
+        f" {options.role} --snr-db {' '.join(f'{snr:g}' for snr in options.snr_db)}"
+    )
+    filling = bench_gestures.for_page(result, command)
+    return _show(options, result, bench_gestures.as_text(result), filling, "gestures")
 
 
 def run_worlds(options: argparse.Namespace) -> int:

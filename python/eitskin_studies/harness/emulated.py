@@ -37,7 +37,7 @@ MAX_SECONDS = 300
 STATUS = re.compile(r"(model|choose|quiet) status (-?\d+)(?: workspace (\d+) kernels (\S+))?")
 LINE = re.compile(
     r"frame (\d+) status (-?\d+) stop (\d+) iterations (\d+) macs (\d+) touchmacs (\d+) solve (\d+)"
-    r" touch (\d+) stack (\d+) "
+    r" touch (\d+) gesture (\d+) stack (\d+) "
     r"image ([0-9a-f]{8}) info (\S+) touches (\d+)(.*)"
 )
 
@@ -56,6 +56,7 @@ class EmulatedFrame:
     touch_macs: int
     solve_instructions: int
     touch_instructions: int
+    gesture_instructions: int
     stack_bytes: int
     image_crc: int
     info: str
@@ -218,8 +219,8 @@ def run_steps(
 
 def _frame(match: re.Match[str]) -> EmulatedFrame:
     g = match.groups()
-    iterations, macs, touch_macs, solve, touch, stack = map(int, g[3:9])
-    image, info, touches = int(g[9], 16), g[10], f"{g[11]}{g[12]}"
+    iterations, macs, touch_macs, solve, touch, gesture, stack = map(int, g[3:10])
+    image, info, touches = int(g[10], 16), g[11], f"{g[12]}{g[13]}"
     return EmulatedFrame(
         int(g[1]),
         STOPS[int(g[2])],
@@ -228,6 +229,7 @@ def _frame(match: re.Match[str]) -> EmulatedFrame:
         touch_macs,
         solve,
         touch,
+        gesture,
         stack,
         image,
         info,

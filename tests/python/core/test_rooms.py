@@ -22,7 +22,8 @@ ROOMS = (
     "evidence",
     "api",
 )
-APART = {"link": ("base", "link")}  # knows nothing of contexts
+# know nothing of contexts
+APART = {"link": ("base", "link"), "gesture": ("base", "gesture")}
 # which rooms write the fields of each part of a context; api lays out, and starts and ends stages
 OWNERS = {
     "reference": {"frame"},

@@ -25,6 +25,7 @@ PAGE = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "link-proto
         ("REPLY", "eits_packet_reply"),
         ("RAW", "eits_packet_raw"),
         ("IMAGE", "eits_packet_solved"),
+        ("EVENTS", "eits_packet_events"),
         ("STATS", "eits_packet_stats"),
         ("FAULT", "eits_packet_fault"),
     ],

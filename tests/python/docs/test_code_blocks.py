@@ -20,6 +20,7 @@ PAGES = (
     "docs/guide/shapes.md",
     "docs/guide/calibration.md",
     "docs/guide/board.md",
+    "docs/guide/gestures.md",
     "docs/guide/touches-out.md",
     "docs/guide/your-board.md",
     "docs/reference/python-api.md",

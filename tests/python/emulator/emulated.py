@@ -24,7 +24,7 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.library_scenes import find_scene
 
 IMAGE = "firmware/eitskin_nucleo_f767zi.bin"
-EVERYTHING = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
+EVERYTHING = Stream.RAW | Stream.IMAGE | Stream.TOUCHES | Stream.EVENTS
 
 
 def power_up(

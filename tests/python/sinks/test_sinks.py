@@ -106,6 +106,10 @@ def test_osc(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
             assert (x, y, confidence) == pytest.approx(
                 (touch.x_mm, touch.y_mm, touch.confidence), rel=1e-6
             )
+        for event in frame.events:
+            path, kind, x, y, zone, one = heard.get(timeout=WAIT_S)
+            assert (path, kind, zone, one) == ("/table/event", event.name, None, event.first_id)
+            assert (x, y) == pytest.approx((event.x_mm, event.y_mm), rel=1e-6)
 
 
 def test_tuio(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:

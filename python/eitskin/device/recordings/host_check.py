@@ -12,11 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
+from eitskin.core.gestures import Gestures, event_numbers
 from eitskin.core.results import Info, Options, Reconstruction
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, follow
-from eitskin.device.wire.link_table import Quality, Stream
+from eitskin.device.wire.link_table import Quality
 from eitskin.device.wire.packets import Fault, RawFrame, Solved
 from eitskin.errors import FrameError
 from eitskin.solve.reconstructor import Reconstructor
@@ -27,7 +28,8 @@ class HostCheck:
     """How many frames were compared and how that ended.
 
     ``same``: every bit of the image, and of the touches but their ids, which count on from whatever
-    the board did before, and all that was found in the frame. ``different``: numbers of frames that
+    the board did before, of the events that these touches make, and all that was found in the
+    frame. ``different``: numbers of frames that
     are not. ``untold``: frames whose solve or touches began from one that was lost on the way, or
     from a reference that was. ``alone``: solved on the board without its raw frame here.
     """
@@ -35,6 +37,7 @@ class HostCheck:
     same: int = 0
     images: int = 0
     touches: int = 0
+    events: int = 0
     different: list[int] = field(default_factory=list)
     untold: int = 0
     alone: int = 0
@@ -61,6 +64,7 @@ class HostCheck:
             )
         else:
             line = f"same bits: yes, {self.images} images and the touches of {self.touches} frames"
+            line += f"; {self.events} events" if self.events else ""
         return line + (f"; {self.untold} frames after losses not told" if self.untold else "")
 
 
@@ -75,7 +79,8 @@ class HostTwin:
         self._core = Reconstructor(known.model, blob=known.blob, options=options)
         self._warm, self._tracks = options.warm_start, options.tracks
         self._quiet: list[RawFrame] = []
-        self._tared = self._sure = self._lost = False
+        self._tared = self._sure = self._lost = self._told = False
+        self._gestures = Gestures()
         self.check = HostCheck()
 
     def follow(self, items: Iterable[LiveFrame | Fault | LinkEvent]) -> HostCheck:
@@ -90,7 +95,7 @@ class HostTwin:
     def lost(self) -> None:
         """Something is missing here: perhaps a frame from which the next solve began, perhaps a
         quiet one."""
-        self._sure, self._lost = False, True
+        self._sure, self._lost, self._told = False, True, False
 
     def take(self, frame: LiveFrame) -> Reconstruction | None:
         """The next frame; returns what this host makes of it, None where the board solved
@@ -124,7 +129,8 @@ class HostTwin:
             self._tared = False
             return
         self._core.forget()
-        self._tared = self._sure = True
+        self._gestures.reset()
+        self._tared = self._sure = self._told = True
 
     def _compare(self, frame: LiveFrame, raw: RawFrame) -> Reconstruction | None:
         try:
@@ -144,11 +150,24 @@ class HostTwin:
                 _difference(result.image, frame.image.image),
             )
         touched = frame.touches is None or same_touches(result.touches, frame.touches.touches)
+        touched = self._same_events(frame) and touched
         if same and not touched:
             self._count(frame, False, difference, self._warm or self._tracks)
         else:
             self._count(frame, same, difference, self._warm)
         return result
+
+    def _same_events(self, frame: LiveFrame) -> bool:
+        """Whether the board's events are what its touches give here; only told where all touches
+        since the tare came."""
+        if frame.events is None or frame.touches is None or frame.refused is not None:
+            self._told = self._told and frame.refused is not None
+            return True
+        here = self._gestures.update(frame.touches.touches, frame.events.time_us)
+        if not self._told:
+            return True
+        self.check.events += len(here)
+        return event_numbers(here).tobytes() == event_numbers(frame.events.events).tobytes()
 
     def _count(self, frame: LiveFrame, same: bool, difference: float, from_before: bool) -> None:
         """``from_before``: what differs may come from frames before, of which one may be missing
@@ -174,14 +193,18 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
             belong together.
     """
     from eitskin.device.client import Device
-    from eitskin.device.recordings.recording import FileTransport, recorded_options
+    from eitskin.device.recordings.recording import (
+        FileTransport,
+        recorded_kinds,
+        recorded_options,
+    )
 
     options = recorded_options(path)
     with Device(FileTransport(path)) as device:
         known = need_model(device.board, model, str(path), "the comparison")
         twin = HostTwin(known, board_options(known.model) if options is None else options)
         return (
-            twin.follow(follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES)),
+            twin.follow(follow(device, recorded_kinds(path))),
             options is not None,
         )
 

@@ -11,8 +11,16 @@ from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import Stream
-from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches
+from eitskin.device.wire.packets import (
+    Fault,
+    FrameEvents,
+    RawFrame,
+    SolvedImage,
+    SolvedTouches,
+)
 from eitskin.device.wire.payloads import MalformedPacket, parse
+
+_Content = RawFrame | SolvedImage | SolvedTouches | FrameEvents | Fault
 
 
 class PacketLog:
@@ -32,11 +40,11 @@ class PacketLog:
         """The frames so far, faults and gaps between them; ``what`` was streamed."""
         return put_together(self._contents(), what)
 
-    def _contents(self) -> Iterator[RawFrame | SolvedImage | SolvedTouches | Fault | LinkEvent]:
+    def _contents(self) -> Iterator[_Content | LinkEvent]:
         for packet in self.packets:
             if packet.lost:
                 yield LinkEvent("gap", packet.lost)
             with suppress(MalformedPacket):
                 content = parse(packet.type, packet.payload)
-                if isinstance(content, RawFrame | SolvedImage | SolvedTouches | Fault):
+                if isinstance(content, _Content):
                     yield content

@@ -17,7 +17,7 @@ from eitskin import __version__
 from eitskin.core.results import Options, check_options
 from eitskin.device.recordings.new_file import RecordingFile
 from eitskin.device.wire.codec import Decoder, Packet, encode
-from eitskin.device.wire.link_table import LINK_VERSION, PacketType
+from eitskin.device.wire.link_table import LINK_VERSION, PacketType, Stream
 from eitskin.device.wire.payloads import pack
 from eitskin.errors import DeviceError, EitskinError, FileError
 from eitskin.fileio import parse_json
@@ -247,6 +247,26 @@ def recorded_options(path: str | Path) -> Options | None:
                 ) from None
             return options
     return None
+
+
+def recorded_kinds(path: str | Path) -> Stream:
+    """The kinds of packets of frames that the recording holds.
+
+    Raises:
+        FileError: it cannot be read.
+    """
+    kinds, decoder = Stream(0), Decoder()
+    try:
+        with Path(path).open("rb") as stream:
+            while data := stream.read(CHUNK):
+                for packet in decoder.feed(data):
+                    kinds |= _KIND_OF.get(packet.type, Stream(0))
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    return kinds
+
+
+_KIND_OF: dict[int, Stream] = {PacketType[kind.name or ""]: kind for kind in Stream}
 
 
 def _notes(path: str | Path) -> Iterator[dict[str, Any]]:

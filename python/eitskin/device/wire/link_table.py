@@ -38,6 +38,8 @@ class PacketType(IntEnum):
     IMAGE = 0x11
     # a frame's touches
     TOUCHES = 0x12
+    # what a frame's touches amounted to
+    EVENTS = 0x15
     # the board's counters
     STATS = 0x13
     # a fault that rose or went
@@ -185,6 +187,8 @@ class Stream(IntFlag):
     IMAGE = 2
     # its touches, as TOUCHES
     TOUCHES = 4
+    # its events, as EVENTS, also where there are none; a tare forgets fingers
+    EVENTS = 8
 
 
 @dataclass(frozen=True)
@@ -470,6 +474,58 @@ class TouchPacket(Payload):
     # half of the long axis as a vector; 0, 0: a disc, or not known
     long_x_mm: float
     long_y_mm: float
+
+
+@dataclass(frozen=True)
+class EventsHead(Payload):
+    """eits_packet_events: What happened in a frame; none where the core rejected it."""
+
+    LAYOUT: ClassVar[Layout] = Layout(
+        "eits_packet_events",
+        ("frame", "I", ""),
+        ("time_us", "I", ""),
+        ("count", "I", ""),
+    )
+    # number of the scanned frame, as in its RAW
+    frame: int
+    # when its scan began
+    time_us: int
+    # events that follow
+    count: int
+
+
+@dataclass(frozen=True)
+class EventPacket(Payload):
+    """eits_packet_event: One event, as eits_event (gesture_events.h); its time is the frame's, its
+    zone the host's.
+    """
+
+    LAYOUT: ClassVar[Layout] = Layout(
+        "eits_packet_event",
+        ("kind", "H", ""),
+        ("phase", "H", ""),
+        ("first_id", "I", ""),
+        ("second_id", "I", ""),
+        ("x_mm", "f", ""),
+        ("y_mm", "f", ""),
+        ("direction_deg", "f", ""),
+        ("value", "f", ""),
+    )
+    # eits_event_kind
+    kind: int
+    # eits_event_phase
+    phase: int
+    # of the touch, as it was when it landed
+    first_id: int
+    # of two fingers the second; else 0
+    second_id: int
+    # where
+    x_mm: float
+    y_mm: float
+    # of a swipe, 0 along x, 90 along y
+    direction_deg: float
+    # by kind
+    value: float
 
 
 @dataclass(frozen=True)

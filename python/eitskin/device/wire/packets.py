@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from eitskin.core.diagnostics import names, words
 from eitskin.core.diagnostics_table import Touch
+from eitskin.core.gestures import GestureEvent
 from eitskin.device.wire.link_table import (
     FaultCode,
     FaultPacket,
@@ -151,6 +152,15 @@ class SolvedTouches:
 
 
 @dataclass(frozen=True)
+class FrameEvents:
+    """What happened in a frame whose scan began at ``time_us``, as the board's core tells it."""
+
+    frame: int
+    time_us: int
+    events: tuple[GestureEvent, ...]
+
+
+@dataclass(frozen=True)
 class BoardStats(StatsPacket):
     """The board's counters; ``stages`` by ``STAGES``."""
 
@@ -164,4 +174,6 @@ class Fault(FaultPacket):
     """A fault that rose or went; ``explain.fault_text`` puts it in words."""
 
 
-FromBoard = BoardInfo | Reply | RawFrame | SolvedImage | SolvedTouches | BoardStats | Fault
+FromBoard = (
+    BoardInfo | Reply | RawFrame | SolvedImage | SolvedTouches | FrameEvents | BoardStats | Fault
+)

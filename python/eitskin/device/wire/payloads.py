@@ -10,13 +10,24 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from eitskin.core.diagnostics_table import STOPS
+from eitskin.core.gestures import GestureEvent
+from eitskin.core.gestures_table import EventKind, EventPhase
 from eitskin.core.results import known_touch
 from eitskin.device.wire.layout import Payload
-from eitskin.device.wire.link_table import STAGES, PacketType, RawHead, StageStats, TouchPacket
+from eitskin.device.wire.link_table import (
+    STAGES,
+    EventPacket,
+    EventsHead,
+    PacketType,
+    RawHead,
+    StageStats,
+    TouchPacket,
+)
 from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
+    FrameEvents,
     FromBoard,
     RawFrame,
     Reply,
@@ -129,12 +140,30 @@ def parse_touches(payload: bytes) -> SolvedTouches:
     return SolvedTouches(solved, tuple(map(known_touch, found)))
 
 
+def parse_events(payload: bytes) -> FrameEvents:
+    head, each = unpack(EventsHead, payload, "EVENTS", more=True), EventPacket.LAYOUT
+    _check_rest(payload, head, each.size * head.count, "EVENTS")
+    found = each.struct.iter_unpack(payload[head.LAYOUT.size :])
+    events = tuple(_event(head.time_us, *values) for values in found)
+    return FrameEvents(head.frame, head.time_us, events)
+
+
+def _event(time_us: int, kind: int, phase: int, *rest: float) -> GestureEvent:
+    first_id, second_id, *reals = rest
+    if kind not in _KINDS or phase not in _PHASES or not np.isfinite(reals).all():
+        raise MalformedPacket(f"EVENTS: kind {kind}, phase {phase}, numbers {reals} are no event")
+    ids = int(first_id), int(second_id), 0, time_us
+    return GestureEvent(EventKind(kind), EventPhase(phase), *ids, *reals)  # type: ignore[arg-type]
+
+
+_KINDS, _PHASES = frozenset(EventKind), frozenset(EventPhase)
 _PARSERS: dict[int, Callable[[bytes], FromBoard]] = {
     PacketType.INFO: lambda payload: unpack(BoardInfo, payload, "INFO"),
     PacketType.REPLY: lambda payload: unpack(Reply, payload, "REPLY"),
     PacketType.RAW: parse_raw,
     PacketType.IMAGE: parse_image,
     PacketType.TOUCHES: parse_touches,
+    PacketType.EVENTS: parse_events,
     PacketType.STATS: lambda payload: unpack(BoardStats, payload, "STATS"),
     PacketType.FAULT: lambda payload: unpack(Fault, payload, "FAULT"),
 }

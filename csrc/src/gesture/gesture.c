@@ -1,0 +1,343 @@
+/* Fingers out of tracked touches: which touch is which finger, when one lands, moves and lifts.
+ *
+ * A tracker's ids are right nearly always. What it cannot know is made good here: a touch that is
+ * missed in a frame or comes back under another id is the same finger; one that appears beside
+ * another, or much fainter, is doubtful until it has lasted a while. */
+#include "gesture/gesture.h"
+
+enum { NOBODY = EITS_MAX_CONTACTS };
+
+eits_status eits_gestures_usual(eits_gesture_options *options)
+{
+    if (options == NULL)
+        return EITS_E_ARGUMENT;
+    *options = (eits_gesture_options){.lost_us = EITS_LOST_US,
+                                      .rejoin_us = EITS_REJOIN_US,
+                                      .settle_us = EITS_SETTLE_US,
+                                      .doubt_us = EITS_DOUBT_US,
+                                      .short_us = EITS_SHORT_US,
+                                      .tap_us = EITS_TAP_US,
+                                      .double_us = EITS_DOUBLE_US,
+                                      .hold_us = EITS_HOLD_US,
+                                      .swipe_us = EITS_SWIPE_US,
+                                      .speed_us = EITS_SPEED_US,
+                                      .rejoin_mm = EITS_REJOIN_MM,
+                                      .move_mm = EITS_MOVE_MM,
+                                      .still_mm = EITS_STILL_MM,
+                                      .double_mm = EITS_DOUBLE_MM,
+                                      .swipe_mm = EITS_SWIPE_MM,
+                                      .swipe_mm_per_s = EITS_SWIPE_MM_PER_S,
+                                      .pair_mm = EITS_PAIR_MM,
+                                      .split_mm = EITS_SPLIT_MM,
+                                      .faint = EITS_FAINT,
+                                      .firm = EITS_FIRM,
+                                      .clear = EITS_TAP_CLEAR};
+    return EITS_OK;
+}
+
+eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_options *options)
+{
+    eits_gesture_options chosen;
+    if (gestures == NULL)
+        return EITS_E_ARGUMENT;
+    (void)eits_gestures_usual(&chosen);
+    if (options != NULL)
+        chosen = *options;
+    const eits_real reals[] = {chosen.rejoin_mm, chosen.move_mm,  chosen.still_mm,
+                               chosen.double_mm, chosen.swipe_mm, chosen.swipe_mm_per_s,
+                               chosen.pair_mm,   chosen.split_mm, chosen.faint,
+                               chosen.firm,      chosen.clear};
+    for (size_t k = 0; k < sizeof reals / sizeof reals[0]; ++k) {
+        if (!eits_is_finite(reals[k]) || reals[k] < 0)
+            return EITS_E_ARGUMENT;
+    }
+    memset(gestures, 0, sizeof *gestures);
+    gestures->options = chosen;
+    return EITS_OK;
+}
+
+/* ---- which is which ---- */
+
+/* Whether a touch may still be this contact. */
+static int waits(const eits_gestures *g, const eits_contact *c, const eits_touch *touch)
+{
+    if ((c->flags & CONTACT_SEEN) != 0 || c->state == CONTACT_NONE)
+        return 0;
+    return c->state != CONTACT_LIFTED ||
+           (touch->explained > 0 && g->time_us - c->seen_us <= g->options.rejoin_us);
+}
+
+static uint32_t of_same_id(const eits_gestures *g, const eits_touch *touch)
+{
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        if (g->contact[k].touch_id == touch->id && waits(g, &g->contact[k], touch))
+            return k;
+    }
+    return NOBODY;
+}
+
+static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
+{
+    eits_real nearest = g->options.rejoin_mm;
+    uint32_t found = NOBODY;
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        const eits_contact *c = &g->contact[k];
+        const eits_real apart = eits_apart(touch->x_mm - c->x_mm, touch->y_mm - c->y_mm);
+        /* one that let go has lifted; only the tracker may know better */
+        const int lifted = c->state == CONTACT_LIFTED && (c->flags & CONTACT_GOING) != 0;
+        if (!lifted && waits(g, c, touch) && apart <= nearest) {
+            nearest = apart;
+            found = k;
+        }
+    }
+    return found;
+}
+
+/* A place for a new contact: an empty one, else that of the one that lifted first. */
+static uint32_t free_place(const eits_gestures *g)
+{
+    uint32_t found = NOBODY, longest_us = 0;
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        const eits_contact *c = &g->contact[k];
+        if (c->state == CONTACT_NONE)
+            return k;
+        const uint32_t since_us = g->time_us - c->seen_us;
+        if (c->state == CONTACT_LIFTED && (c->flags & CONTACT_SEEN) == 0 &&
+            since_us >= longest_us) {
+            longest_us = since_us;
+            found = k;
+        }
+    }
+    return found;
+}
+
+/* ---- a finger's life ---- */
+
+/* Where it is; not in a frame in which it lets go: a scan that a finger lifts in shows it aside. */
+static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch *touch)
+{
+    const eits_real strength = eits_fabs(touch->strength_s_per_m_mm2);
+    const int firm = strength >= g->options.firm * c->strength;
+    if (touch->explained > 0) {
+        const int going = !firm || touch->explained < R(0.5) * c->explained;
+        c->flags = going ? c->flags | CONTACT_GOING : c->flags & ~(uint32_t)CONTACT_GOING;
+        c->explained = touch->explained;
+    } else if ((c->flags & CONTACT_GOING) != 0) {
+        return; /* the tracker holds it, but it was letting go: it has lifted */
+    }
+    c->touch_id = touch->id;
+    c->seen_us = g->time_us;
+    c->seen_x_mm = touch->x_mm;
+    c->seen_y_mm = touch->y_mm;
+    c->flags |= CONTACT_SEEN;
+    c->strength = firm ? strength : c->strength + (strength - c->strength) * R(0.25);
+    if (!firm || !(touch->explained > 0))
+        return;
+    const uint32_t at = c->trail_count++ % EITS_TRAIL;
+    c->x_mm = c->trail_x_mm[at] = touch->x_mm;
+    c->y_mm = c->trail_y_mm[at] = touch->y_mm;
+    c->trail_us[at] = g->time_us;
+    if (c->state != CONTACT_DOWN && c->state != CONTACT_LIFTED) {
+        c->start_x_mm = c->x_mm;
+        c->start_y_mm = c->y_mm;
+        return;
+    }
+    const eits_real far = eits_apart(c->x_mm - c->start_x_mm, c->y_mm - c->start_y_mm);
+    c->farthest_mm = far > c->farthest_mm ? far : c->farthest_mm;
+}
+
+static void tell_place(const eits_gestures *g, eits_contact *c, uint32_t kind, event_list *out)
+{
+    c->told_x_mm = c->x_mm;
+    c->told_y_mm = c->y_mm;
+    eits_tell(out, (eits_event){.kind = kind,
+                                .first_id = c->id,
+                                .time_us = g->time_us,
+                                .x_mm = c->x_mm,
+                                .y_mm = c->y_mm});
+}
+
+static void land(const eits_gestures *g, eits_contact *c, event_list *out)
+{
+    c->state = CONTACT_DOWN;
+    tell_place(g, c, EITS_EVENT_DOWN, out);
+}
+
+/* A finger was in this frame: it goes on, or is found again after it seemed to have lifted. */
+static void go_on(eits_gestures *g, eits_contact *c, const eits_touch *touch, event_list *out)
+{
+    note_place(g, c, touch);
+    const uint32_t wait_us =
+        (c->flags & CONTACT_DUBIOUS) != 0 ? g->options.doubt_us : g->options.settle_us;
+    if (c->state == CONTACT_LIFTED ||
+        (c->state == CONTACT_NEW && g->time_us - c->born_us >= wait_us))
+        land(g, c, out);
+    else if (c->state == CONTACT_DOWN &&
+             eits_apart(c->x_mm - c->told_x_mm, c->y_mm - c->told_y_mm) >= g->options.move_mm)
+        tell_place(g, c, EITS_EVENT_MOVE, out);
+}
+
+/* Beside another that is down, or much fainter than the strongest. */
+static int is_doubtful(const eits_gestures *g, const eits_touch *touch)
+{
+    const eits_real strength = eits_fabs(touch->strength_s_per_m_mm2);
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        const eits_contact *c = &g->contact[k];
+        if (c->state == CONTACT_DOWN &&
+            (eits_apart(touch->x_mm - c->x_mm, touch->y_mm - c->y_mm) < g->options.split_mm ||
+             strength < g->options.faint * c->strength))
+            return 1;
+    }
+    return 0;
+}
+
+static void begin_contact(eits_gestures *g, const eits_touch *touch)
+{
+    const uint32_t place = free_place(g);
+    if (place == NOBODY) {
+        ++g->dropped;
+        return;
+    }
+    const uint32_t flags = is_doubtful(g, touch) ? CONTACT_DUBIOUS : 0;
+    eits_contact *c = &g->contact[place];
+    *c = (eits_contact){
+        .state = CONTACT_NEW, .id = touch->id, .flags = flags, .born_us = g->time_us};
+    note_place(g, c, touch);
+}
+
+/* ---- a frame ---- */
+
+static int is_touch(const eits_touch *touch)
+{
+    return eits_is_place(touch->x_mm, touch->y_mm) && eits_is_finite(touch->strength_s_per_m_mm2);
+}
+
+static void match(eits_gestures *g, const eits_touch *touches, uint32_t count, event_list *out)
+{
+    uint8_t passed[EITS_MAX_TOUCHES] = {0};
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k)
+        g->contact[k].flags &= ~(uint32_t)(CONTACT_SEEN | CONTACT_RENAMED);
+    for (uint32_t round = 0; round < 3; ++round) {
+        for (uint32_t k = 0; k < count; ++k) {
+            if (passed[k] || !is_touch(&touches[k]))
+                continue;
+            const uint32_t place = round == 0   ? of_same_id(g, &touches[k])
+                                   : round == 1 ? of_same_place(g, &touches[k])
+                                                : NOBODY;
+            if (place == NOBODY && round < 2)
+                continue;
+            passed[k] = 1;
+            if (place == NOBODY && touches[k].explained > 0)
+                begin_contact(g, &touches[k]);
+            else if (place != NOBODY)
+                go_on(g, &g->contact[place], &touches[k], out);
+        }
+    }
+}
+
+/* A finger beside another that is there as long is not alone; nor is one that landed beside it. */
+static void note_company(eits_gestures *g)
+{
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        eits_contact *c = &g->contact[k];
+        for (uint32_t l = 0; c->state == CONTACT_DOWN && l < EITS_MAX_CONTACTS; ++l) {
+            eits_contact *other = &g->contact[l];
+            if (l == k || other->state != CONTACT_DOWN)
+                continue;
+            const uint32_t age_us = g->time_us - c->born_us, its_us = g->time_us - other->born_us;
+            if (its_us > age_us || its_us >= g->options.doubt_us)
+                c->flags |= CONTACT_WITH;
+        }
+    }
+}
+
+static void lift(eits_gestures *g, uint32_t place, event_list *out)
+{
+    eits_contact *c = &g->contact[place];
+    eits_pair_lift(g, place, out);
+    tell_place(g, c, EITS_EVENT_UP, out);
+    c->state = CONTACT_LIFTED;
+}
+
+/* A finger that is not found while a touch has just appeared near it is that touch: the tracker
+ * lost it, as it does where one moves far within a frame. */
+static int is_renamed(eits_gestures *g, eits_contact *c)
+{
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        eits_contact *other = &g->contact[k];
+        if (other->state != CONTACT_NEW || (other->flags & CONTACT_SEEN) == 0 ||
+            eits_apart(other->x_mm - c->x_mm, other->y_mm - c->y_mm) > g->options.rejoin_mm)
+            continue;
+        const eits_touch touch = {.id = other->touch_id,
+                                  .x_mm = other->x_mm,
+                                  .y_mm = other->y_mm,
+                                  .strength_s_per_m_mm2 = other->strength,
+                                  .explained = other->explained};
+        note_place(g, c, &touch);
+        c->flags |= CONTACT_RENAMED;
+        other->state = CONTACT_NONE;
+        if (g->time_us - c->born_us > 2 * g->options.doubt_us || (c->flags & CONTACT_GOING) != 0)
+            return 1;
+        /* just landed: the first touch was none */
+        c->start_x_mm = c->x_mm;
+        c->start_y_mm = c->y_mm;
+        c->farthest_mm = 0;
+        return 1;
+    }
+    return 0;
+}
+
+static void end_lost(eits_gestures *g, event_list *out)
+{
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        eits_contact *c = &g->contact[k];
+        const uint32_t since_us = g->time_us - c->seen_us;
+        if ((c->flags & CONTACT_SEEN) != 0 || (c->state == CONTACT_DOWN && is_renamed(g, c)))
+            continue;
+        if (c->state == CONTACT_DOWN && since_us >= g->options.lost_us) {
+            lift(g, k, out);
+            eits_lifted(g, c, out);
+        } else if ((c->state == CONTACT_NEW && since_us >= g->options.lost_us) ||
+                   (c->state == CONTACT_LIFTED && since_us > g->options.rejoin_us)) {
+            c->state = CONTACT_NONE;
+        }
+    }
+}
+
+/* All lift, and nothing is made of it. */
+static void begin_again(eits_gestures *g, event_list *out)
+{
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        if (g->contact[k].state == CONTACT_DOWN)
+            lift(g, k, out);
+        g->contact[k] = (eits_contact){0};
+    }
+    g->pair = (eits_finger_pair){0};
+    g->tapped = 0;
+}
+
+eits_status eits_gestures_update(eits_gestures *gestures, const eits_touch *touches, uint32_t count,
+                                 uint32_t time_us, eits_event *events, uint32_t room,
+                                 uint32_t *told)
+{
+    eits_gestures *g = gestures;
+    if (g == NULL || told == NULL || count > EITS_MAX_TOUCHES || (touches == NULL && count > 0) ||
+        (events == NULL && room > 0))
+        return EITS_E_ARGUMENT;
+    event_list out = {.events = events, .room = room, .dropped = &g->dropped};
+    const uint32_t elapsed_us = time_us - g->time_us;
+    *told = 0;
+    if (g->begun && elapsed_us == 0)
+        return EITS_OK;
+    if (g->begun && elapsed_us > EITS_LONGEST_GAP_US)
+        begin_again(g, &out);
+    g->time_us = time_us;
+    g->begun = 1;
+    match(g, touches, count, &out);
+    note_company(g);
+    end_lost(g, &out);
+    eits_pair_step(g, &out);
+    eits_hold(g, &out);
+    *told = out.count;
+    return EITS_OK;
+}

@@ -1,0 +1,139 @@
+/* Tap, double tap, hold, swipe: what a finger by itself did. */
+#include "gesture/gesture.h"
+
+/* atan of 0 to 1 by Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.47: within 1e-5
+ * rad. The reference does the same in the same order. */
+static eits_real angle_of_slope(eits_real t)
+{
+    const eits_real s = t * t;
+    eits_real sum = R(0.0208351);
+    sum = R(-0.0851330) + sum * s;
+    sum = R(0.1801410) + sum * s;
+    sum = R(-0.3302995) + sum * s;
+    sum = R(0.9998660) + sum * s;
+    return sum * t * R(57.29577951308232);
+}
+
+eits_real eits_angle_deg(eits_real y, eits_real x)
+{
+    const eits_real high = eits_fabs(y), wide = eits_fabs(x);
+    if (high == 0 && wide == 0)
+        return 0;
+    eits_real angle = high <= wide ? angle_of_slope(high / wide) : 90 - angle_of_slope(wide / high);
+    angle = x < 0 ? 180 - angle : angle;
+    return y < 0 ? -angle : angle;
+}
+
+static eits_event event_at(const eits_gestures *g, const eits_contact *c, uint32_t kind)
+{
+    return (eits_event){.kind = kind,
+                        .first_id = c->id,
+                        .time_us = g->time_us,
+                        .x_mm = c->start_x_mm,
+                        .y_mm = c->start_y_mm};
+}
+
+static void tap(eits_gestures *g, eits_contact *c, event_list *out)
+{
+    const int again = g->tapped && c->born_us - g->tap_us <= g->options.double_us &&
+                      eits_apart(c->start_x_mm - g->tap_x_mm, c->start_y_mm - g->tap_y_mm) <=
+                          g->options.double_mm;
+    eits_tell(out, event_at(g, c, again ? EITS_EVENT_DOUBLE_TAP : EITS_EVENT_TAP));
+    c->flags |= CONTACT_TAPPED;
+    g->tapped = !again; /* a third tap is a first one */
+    g->tap_us = c->seen_us;
+    g->tap_x_mm = c->start_x_mm;
+    g->tap_y_mm = c->start_y_mm;
+}
+
+/* Its speed over the last speed_us, or over as much as is known; mm/s. */
+static eits_real last_speed(const eits_gestures *g, const eits_contact *c)
+{
+    const uint32_t known = c->trail_count < EITS_TRAIL ? c->trail_count : EITS_TRAIL;
+    uint32_t at = (c->trail_count - 1) % EITS_TRAIL;
+    const uint32_t last_us = c->trail_us[at];
+    for (uint32_t back = 1; back < known; ++back) {
+        const uint32_t before = (c->trail_count - 1 - back) % EITS_TRAIL;
+        if (last_us - c->trail_us[before] > g->options.speed_us)
+            break;
+        at = before;
+    }
+    const uint32_t span_us = last_us - c->trail_us[at];
+    if (span_us == 0)
+        return 0;
+    return eits_apart(c->x_mm - c->trail_x_mm[at], c->y_mm - c->trail_y_mm[at]) /
+           ((eits_real)span_us * R(1e-6));
+}
+
+/* Tell a swipe if a way so long, at such a speed, is one. */
+static int is_swipe(const eits_gestures *g, eits_contact *c, eits_real dx, eits_real dy,
+                    eits_real speed, event_list *out)
+{
+    const eits_real length = eits_apart(dx, dy), angle = eits_angle_deg(dy, dx);
+    /* it has gone on for settle_us before it was told */
+    const eits_real before = speed * (eits_real)g->options.settle_us * R(1e-6);
+    if (length + before < g->options.swipe_mm || speed < g->options.swipe_mm_per_s ||
+        length < EITS_SWIPE_STRAIGHT * c->farthest_mm)
+        return 0;
+    eits_event event = event_at(g, c, EITS_EVENT_SWIPE);
+    event.direction_deg = angle < 0 ? angle + 360 : angle;
+    event.value = length;
+    c->flags |= CONTACT_DONE;
+    eits_tell(out, event);
+    return 1;
+}
+
+/* A quick one is over before three frames show it; then the one in which it lets go counts too. */
+static void swipe(const eits_gestures *g, eits_contact *c, event_list *out)
+{
+    const uint32_t last_us = c->trail_us[(c->trail_count - 1) % EITS_TRAIL];
+    const eits_real going_mm = eits_apart(c->seen_x_mm - c->x_mm, c->seen_y_mm - c->y_mm);
+    if (!is_swipe(g, c, c->x_mm - c->start_x_mm, c->y_mm - c->start_y_mm, last_speed(g, c), out) &&
+        c->seen_us != last_us && c->seen_us - c->born_us <= g->options.tap_us)
+        (void)is_swipe(g, c, c->seen_x_mm - c->start_x_mm, c->seen_y_mm - c->start_y_mm,
+                       going_mm / ((eits_real)(c->seen_us - last_us) * R(1e-6)), out);
+}
+
+/* Another finger came no later and was there as long: this one is not alone, or is what the other's
+ * landing looked like. */
+static int is_outlived(const eits_gestures *g, const eits_contact *c)
+{
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        const eits_contact *other = &g->contact[k];
+        if (other != c && (other->state == CONTACT_DOWN || other->state == CONTACT_LIFTED) &&
+            g->time_us - other->seen_us <= g->time_us - c->seen_us &&
+            g->time_us - other->born_us >= g->time_us - c->born_us)
+            return 1;
+    }
+    return 0;
+}
+
+void eits_lifted(eits_gestures *g, eits_contact *c, event_list *out)
+{
+    const uint32_t lasted_us = c->seen_us - c->born_us;
+    const eits_real going_mm =
+        eits_apart(c->seen_x_mm - c->start_x_mm, c->seen_y_mm - c->start_y_mm);
+    if (is_outlived(g, c))
+        return;
+    if ((c->flags & (CONTACT_WITH | CONTACT_DONE | CONTACT_TAPPED)) == 0 &&
+        c->farthest_mm <= g->options.still_mm && going_mm <= 2 * g->options.still_mm &&
+        (lasted_us >= g->options.short_us || c->explained >= g->options.clear) &&
+        lasted_us <= g->options.tap_us)
+        tap(g, c, out);
+    else if ((c->flags & (CONTACT_WITH | CONTACT_DONE)) == 0 && lasted_us <= g->options.swipe_us)
+        swipe(g, c, out);
+}
+
+void eits_hold(eits_gestures *g, event_list *out)
+{
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        eits_contact *c = &g->contact[k];
+        if (c->state != CONTACT_DOWN || (c->flags & (CONTACT_WITH | CONTACT_DONE)) != 0 ||
+            g->time_us - c->born_us < g->options.hold_us || c->farthest_mm > g->options.still_mm)
+            continue;
+        c->flags |= CONTACT_DONE;
+        eits_event event = event_at(g, c, EITS_EVENT_HOLD);
+        event.value = (eits_real)(g->time_us - c->born_us) * R(1e-6);
+        eits_tell(out, event);
+    }
+}

@@ -1,0 +1,156 @@
+/* Pinch, spread, rotate: what two fingers do together.
+ *
+ * Both have moved when the distance between them has changed, or one has gone round the other: the
+ * longer of the two ways says what it is. A pinch that opens again becomes a spread. */
+#include "gesture/gesture.h"
+
+/* Down, seen now, and there for long enough to say where it landed. */
+static int is_settled(const eits_gestures *g, const eits_contact *c)
+{
+    return c->state == CONTACT_DOWN && (c->flags & CONTACT_SEEN) != 0 &&
+           g->time_us - c->born_us >= g->options.settle_us;
+}
+
+/* Between two fingers; never 0, for it divides. */
+static eits_real distance(eits_real dx_mm, eits_real dy_mm)
+{
+    const eits_real apart = eits_apart(dx_mm, dy_mm);
+    return apart > EITS_MIN_APART_MM ? apart : EITS_MIN_APART_MM;
+}
+
+static void tell_pair(const eits_gestures *g, uint32_t phase, event_list *out)
+{
+    const eits_finger_pair *p = &g->pair;
+    const eits_contact *first = &g->contact[p->first], *second = &g->contact[p->second];
+    const eits_real apart = distance(p->dx_mm, p->dy_mm);
+    eits_tell(out, (eits_event){.kind = p->kind,
+                                .phase = phase,
+                                .first_id = p->first_id,
+                                .second_id = p->second_id,
+                                .time_us = g->time_us,
+                                .x_mm = (first->x_mm + second->x_mm) * R(0.5),
+                                .y_mm = (first->y_mm + second->y_mm) * R(0.5),
+                                .value = p->kind == EITS_EVENT_ROTATE ? p->turned_deg
+                                                                      : apart / p->base_mm});
+}
+
+/* Two fingers and no third: they may begin something. */
+static void look_for_pair(eits_gestures *g)
+{
+    uint32_t found[2] = {0, 0}, count = 0;
+    for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
+        if (!is_settled(g, &g->contact[k]))
+            continue;
+        if (count < 2)
+            found[count] = k;
+        ++count;
+    }
+    if (count != 2)
+        return;
+    const eits_contact *first = &g->contact[found[0]], *second = &g->contact[found[1]];
+    const eits_real dx = second->x_mm - first->x_mm, dy = second->y_mm - first->y_mm;
+    const eits_real apart = distance(dx, dy);
+    g->pair = (eits_finger_pair){.on = 1,
+                                 .first = found[0],
+                                 .second = found[1],
+                                 .first_id = first->id,
+                                 .second_id = second->id,
+                                 .base_mm = apart,
+                                 .dx_mm = dx,
+                                 .dy_mm = dy,
+                                 .extreme_mm = apart};
+}
+
+static void begin_kind(eits_gestures *g, uint32_t kind, eits_real apart_mm, event_list *out)
+{
+    eits_finger_pair *p = &g->pair;
+    p->kind = kind;
+    p->extreme_mm = p->told_mm = apart_mm;
+    p->told_deg = p->turned_deg;
+    tell_pair(g, EITS_PHASE_BEGIN, out);
+}
+
+/* The way that one finger went about the other, mm, for so many degrees. */
+static eits_real way_round(eits_real degrees, eits_real apart_mm)
+{
+    return eits_fabs(degrees) * R(0.017453292519943295) * apart_mm;
+}
+
+static void recognise(eits_gestures *g, eits_real apart_mm, event_list *out)
+{
+    const eits_finger_pair *p = &g->pair;
+    const eits_real along = eits_fabs(apart_mm - p->base_mm);
+    const eits_real round = way_round(p->turned_deg, apart_mm);
+    if (along < g->options.pair_mm && round < g->options.pair_mm)
+        return;
+    begin_kind(g,
+               round > along           ? EITS_EVENT_ROTATE
+               : apart_mm < p->base_mm ? EITS_EVENT_PINCH
+                                       : EITS_EVENT_SPREAD,
+               apart_mm, out);
+}
+
+static void go_on(eits_gestures *g, eits_real apart_mm, event_list *out)
+{
+    eits_finger_pair *p = &g->pair;
+    const int pinch = p->kind == EITS_EVENT_PINCH, rotate = p->kind == EITS_EVENT_ROTATE;
+    const eits_real back = pinch ? apart_mm - p->extreme_mm : p->extreme_mm - apart_mm;
+    if (!rotate && back >= g->options.pair_mm) {
+        tell_pair(g, EITS_PHASE_END, out);
+        p->base_mm = p->extreme_mm;
+        begin_kind(g, pinch ? EITS_EVENT_SPREAD : EITS_EVENT_PINCH, apart_mm, out);
+        return;
+    }
+    p->extreme_mm = back < 0 ? apart_mm : p->extreme_mm;
+    const eits_real moved = rotate ? way_round(p->turned_deg - p->told_deg, apart_mm)
+                                   : eits_fabs(apart_mm - p->told_mm);
+    if (moved < g->options.move_mm)
+        return;
+    p->told_mm = apart_mm;
+    p->told_deg = p->turned_deg;
+    tell_pair(g, EITS_PHASE_CHANGE, out);
+}
+
+/* A finger was lost for a frame and found again: they go on. */
+static int take_up(eits_gestures *g)
+{
+    eits_finger_pair *p = &g->pair;
+    const eits_contact *first = &g->contact[p->first], *second = &g->contact[p->second];
+    p->on = p->kind != 0 && first->state == CONTACT_DOWN && second->state == CONTACT_DOWN &&
+            first->id == p->first_id && second->id == p->second_id;
+    return (int)p->on;
+}
+
+void eits_pair_step(eits_gestures *g, event_list *out)
+{
+    eits_finger_pair *p = &g->pair;
+    if (!p->on && !take_up(g)) {
+        look_for_pair(g);
+        return;
+    }
+    const eits_contact *first = &g->contact[p->first], *second = &g->contact[p->second];
+    if ((first->flags & second->flags & CONTACT_SEEN) == 0)
+        return;
+    const eits_real dx = second->x_mm - first->x_mm, dy = second->y_mm - first->y_mm;
+    if (((first->flags | second->flags) & CONTACT_RENAMED) != 0 && p->kind == 0) {
+        p->on = 0; /* where they began is not known */
+        return;
+    }
+    p->turned_deg += eits_angle_deg(p->dx_mm * dy - p->dy_mm * dx, p->dx_mm * dx + p->dy_mm * dy);
+    p->dx_mm = dx;
+    p->dy_mm = dy;
+    if (p->kind == 0)
+        recognise(g, distance(dx, dy), out);
+    else
+        go_on(g, distance(dx, dy), out);
+}
+
+void eits_pair_lift(eits_gestures *g, uint32_t place, event_list *out)
+{
+    eits_finger_pair *p = &g->pair;
+    if (!p->on || (place != p->first && place != p->second))
+        return;
+    if (p->kind != 0)
+        tell_pair(g, EITS_PHASE_END, out);
+    p->on = 0;
+}
