@@ -7,6 +7,7 @@ import asyncio
 import hmac
 import ipaddress
 import json
+import re
 import socket
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
@@ -212,6 +213,8 @@ class PageServer:
     def _host_is_ours(self, host: str) -> bool:
         """Whether a Host header names this server: by its name as given, this machine's, or an
         address; any other name may be a trick of another site (DNS rebinding)."""
+        if not re.fullmatch(r"[A-Za-z0-9.\-]+(:\d{1,5})?|\[[0-9A-Fa-f:.]+\](:\d{1,5})?", host):
+            return False
         name = (urlsplit(f"//{host}").hostname or "").lower()
         if name in ("localhost", self.host.lower(), socket.gethostname().lower()):
             return True

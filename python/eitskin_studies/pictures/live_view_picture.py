@@ -13,10 +13,10 @@ from eitskin.fileio import write_bytes
 from eitskin_studies.harness.live_page import browser, need_browser, served_page
 
 URL = "emu:rotate"
-WIDTH, HEIGHT = 1120, 780
-FRAME_MS = 100  # shown at half of real time
+WIDTH, HEIGHT = 1120, 772
+FRAME_MS = 130  # shown at half of real time
 FIRST, LAST = 8, 48  # of the scene's frames
-QUALITY = 30
+QUALITY = 70
 PATIENCE_S = 180.0
 
 
@@ -65,7 +65,7 @@ def _shots(page: Any) -> list[bytes]:
         if frame <= shown or frame < FIRST:
             time.sleep(0.02)
             continue
-        shown = frame
+        shown = frame + 1
         shots.append(base64.b64decode(page.execute_cdp_cmd("Page.captureScreenshot", {})["data"]))
         if page.find_element("id", "state").text == "over":
             break

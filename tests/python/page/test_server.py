@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
+import signal
 import socket
+import subprocess
+import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -16,6 +20,7 @@ import pytest
 from served import ALL, TOKEN, serving, until
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
 
 from eitskin.cli.main import main
 from eitskin.page.facts import HEAD, MAGIC
@@ -108,7 +113,9 @@ def test_a_frame_is_what_is_documented(server: PageServer) -> None:
     assert len(message["true"]) == 1
 
 
-@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example:80", ""])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1.evil.example:80", "", "127.0.0.1:80; script-src *"]
+)
 def test_another_hosts_name_is_refused(server: PageServer, host: str) -> None:
     assert got(server, "/", Host=host)[0] in (400, 403)
 
@@ -246,3 +253,27 @@ def test_every_kind_is_asked_for(server: PageServer) -> None:
     with opened(server, TOKEN) as line:
         assert told(line, "setup")["mode"] == ["raw", "image", "touches"]
     assert ALL == 7
+
+
+def test_the_command_says_where_and_ends_by_the_keyboard(scene: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "eitskin", "view", "--device", f"sim:{scene}?loop=1"]
+    command += ["--port", "0", "--token", "a-word-for-tests", "--to", f"csv:{tmp_path}/t.csv"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        found = re.fullmatch(r"open (http://127\.0\.0\.1:(\d+))/#token=a-word-for-tests\n", line)
+        assert found is not None
+        with connect(
+            f"ws://127.0.0.1:{found.group(2)}/live", origin=Origin(found.group(1))
+        ) as page:
+            page.send(json.dumps({"type": "hello", "token": "a-word-for-tests"}))
+            while not isinstance(page.recv(20), bytes):
+                pass
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert errors.splitlines()[-1] == "eitskin: stopped"
+    assert len((tmp_path / "t.csv").read_text().splitlines()) > 1

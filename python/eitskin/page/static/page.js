@@ -206,7 +206,7 @@ function draw() {
   showElectrodes(healthOf(info), setup.electrodes);
   showTouches(touches);
   chips($("found"), message.refused ? [`refused: ${message.refused}`, ...message.found] : message.found, "nothing found wrong");
-  chips($("gestures"), page.gestures.map((event) => event.kind));
+  chips($("gestures"), page.gestures.map((event) => (event.zone ? `${event.kind} ${event.zone}` : event.kind)));
   $("gestures").hidden = !page.gestures.length;
   $("n-frame").textContent = String(message.frame);
   $("n-time").textContent = `${message.time_s.toFixed(2)} s`;
