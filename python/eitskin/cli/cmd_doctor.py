@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.frames.doctor.subject import subject_from_source
 
     if (options.source is None) == (options.device is None):
-        raise UsageError("doctor: name frames to examine, or a board with --device URL, not both")
+        raise UsageError("doctor: name frames to examine, or a board: --device URL")
     if options.picture is not None:
         from eitskin.view.sheets import check_picture
 

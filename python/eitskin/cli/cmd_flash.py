@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.model.prebuilt import load_prebuilt
 
     if options.no_model and options.model is not None:
-        raise UsageError("flash: --model and --no-model contradict each other")
+        raise UsageError("flash: --model and --no-model contradict each other; give one of them")
     if options.json and not options.dry_run:
         raise UsageError("flash: --json goes with --dry-run; without it the tool itself talks")
     model = None

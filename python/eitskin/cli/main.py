@@ -38,7 +38,8 @@ class Parser(argparse.ArgumentParser):
             known = re.findall(r"'([^']+)'", found["known"]) or found["known"].split(", ")
             message = f"{found['what']}: {found['given']!r} is unknown; "
             message += nearest(found["given"], known)
-        raise UsageError(f"{message}; see  {self.prog} --help")
+        see = " See" if message.endswith("?") else "; see"
+        raise UsageError(f"{message}{see}  {self.prog} --help")
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -60,7 +60,10 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ["stream", "--sign", "up"],
             "--sign: 'up' is unknown; known are: both, decrease, increase",
         ),
-        (["stream", "--mode", "raw", "--picture", "x.png"], "--picture and --film draw images and touches"),
+        (
+            ["stream", "--mode", "raw", "--picture", "x.png"],
+            "--picture and --film draw images and touches",
+        ),
         (["stream", "--device", "usb0"], "as in auto, serial:/dev/ttyACM0, sim:two_touch"),
         (["stream", "--device", "/dev/ttyACM0"], "write  serial:/dev/ttyACM0"),
         (["stream", "--device", "sim:"], "something must follow the colon"),

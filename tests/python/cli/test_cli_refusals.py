@@ -441,18 +441,19 @@ def test_options_of_the_demo(arguments: list[str], refused: Refused, tmp_path: P
         ("netgen", "model", ["model", "build", "--paper", "-o", "OUT"]),
         ("scipy", "model", ["compare", "--scenes", "2", "--train", "2", "--csv", "OUT"]),
         ("netgen", "model", ["compare", "--scenes", "2", "--train", "2", "--csv", "OUT"]),
-        ("matplotlib", "plot", ["compare", "--scenes", "2", "--train", "2", "--picture", "OUT"]),
-        ("matplotlib", "plot", ["reconstruct", "FRAMES", "-o", "OUT", "--picture", "OUT"]),
-        ("matplotlib", "plot", ["demo", "--picture", "OUT"]),
-        ("scipy", "model", ["demo", "--picture", "OUT"]),
-        ("netgen", "model", ["demo", "--picture", "OUT"]),
+        ("matplotlib", "plot", ["compare", "--scenes", "2", "--train", "2", "--picture", "PNG"]),
+        ("matplotlib", "plot", ["reconstruct", "FRAMES", "-o", "OUT", "--picture", "PNG"]),
+        ("matplotlib", "plot", ["demo", "--picture", "PNG"]),
+        ("scipy", "model", ["demo", "--picture", "PNG"]),
+        ("netgen", "model", ["demo", "--picture", "PNG"]),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else value,
 )
 def test_missing_extras_are_named_with_the_command_to_install_them(
     package: str, extra: str, arguments: list[str], tmp_path: Path, frames_file: Path
 ) -> None:
-    given = [{"OUT": tmp_path / "out", "FRAMES": frames_file}.get(a, a) for a in arguments]
+    files = {"OUT": tmp_path / "out", "PNG": tmp_path / "out.png", "FRAMES": frames_file}
+    given = [files.get(a, a) for a in arguments]
     done = run_python(without(package) + MAIN, *given)
     assert (done.returncode, done.stdout) == (EXTRA, "")
     said = [line for line in done.stderr.splitlines() if line[:2] != "1/"]  # the demo's first step

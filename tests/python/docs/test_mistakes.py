@@ -1,0 +1,98 @@
+"""docs/reference/mistakes.md: every mistake in it is made, and gets the answer that stands there.
+
+``PYTHONPATH=tests/python python tests/python/docs/test_mistakes.py`` writes the answers anew.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shlex
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from unittest.mock import patch
+
+import pytest
+
+from eitskin.cli.main import main
+from eitskin.frames.frames import save_frames
+from small_models import session
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "mistakes.md"
+ROW = re.compile(r"\| `eitskin (.*?)` \| (\d+) \| (.*) \|")
+FILES = {
+    "volts.csv": "0.1,0.2,0.3\n0.1,0.2,0.3\n",
+    "typo.toml": "[skim]\nshape = 'disk'\n",
+    "small.toml": "[skin]\ndiameter_mm = -194\n",
+    "weights.csv": "press,grams\nfirst,heavy\n",
+    "notes.txt": "the skin was dry\n",
+}
+
+
+def rows() -> list[tuple[str, str, str]]:
+    """Command, code and answer of each row of the page."""
+    return [found.groups() for found in ROW.finditer(PAGE.read_text(encoding="utf-8"))]  # type: ignore[misc]
+
+
+@contextlib.contextmanager
+def in_a_folder_of_files() -> Iterator[None]:
+    """Where there are frames, files with mistakes in them, and no serial port."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as name:
+        os.chdir(name)
+        save_frames("touched.npz", session().as_frames())
+        for file, text in FILES.items():
+            Path(file).write_text(text, encoding="utf-8")
+        try:
+            with patch("eitskin.device.ports.ports", list):
+                yield
+        finally:
+            os.chdir(before)
+
+
+def answered(command: str) -> tuple[int, str]:
+    """The exit code, and the line on standard error."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(shlex.split(command))
+    assert out.getvalue() == "", command
+    lines = err.getvalue().splitlines()
+    assert len(lines) == 1 and lines[0].startswith("eitskin: "), f"{command}: {lines}"
+    return code, lines[0].removeprefix("eitskin: ")
+
+
+def in_a_cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+
+
+@pytest.fixture(scope="module")
+def folder() -> Iterator[None]:
+    with in_a_folder_of_files():
+        yield
+
+
+def test_there_are_forty_of_many_commands() -> None:
+    commands = {command.split()[0] for command, _, _ in rows()}
+    assert len(rows()) >= 40 and len(commands) >= 12
+
+
+@pytest.mark.parametrize(("command", "code", "answer"), rows())
+def test_a_mistake_gets_its_answer(folder: None, command: str, code: str, answer: str) -> None:
+    before = sorted(Path.cwd().iterdir())
+    got, line = answered(command)
+    assert (str(got), in_a_cell(line)) == (code, answer)
+    assert sorted(Path.cwd().iterdir()) == before
+
+
+if __name__ == "__main__":
+    with in_a_folder_of_files():
+        made = {command: answered(command) for command, _, _ in rows()}
+
+    def written(found: re.Match[str]) -> str:
+        code, line = made[found[1]]
+        return f"| `eitskin {found[1]}` | {code} | {in_a_cell(line)} |"
+
+    PAGE.write_text(ROW.sub(written, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
