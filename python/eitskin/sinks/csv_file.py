@@ -15,7 +15,7 @@ from eitskin.sinks.sink import Sink, Source, Told
 
 TOUCH = (
     "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence",
-    "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2",
+    "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2", "long_x_mm", "long_y_mm",
 )  # fmt: skip
 COLUMNS = ("frame", "time_s", "time_unix_s", *TOUCH, "found", "refused", "events")
 

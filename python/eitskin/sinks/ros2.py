@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from eitskin.fem.grid import Grid
 
 Table = dict[str, Any]
-NUMBERS = ("x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence")
+NUMBERS = (
+    "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence", "long_x_mm",
+    "long_y_mm",
+)  # fmt: skip
 COVARIANCE = ("x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2")
 OK, WARN, ERROR = 0, 1, 2
 COMMON = {
