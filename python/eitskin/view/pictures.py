@@ -190,7 +190,10 @@ def _shape(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
     """The disc, or the ellipse, that a touch was found to be."""
     from matplotlib.patches import Ellipse
 
-    x, y = mark.long_mm or (radius_mm, 0.0)
+    if mark.long_mm is None:
+        _circle(axes, mark, radius_mm, **style)
+        return
+    x, y = mark.long_mm
     half = math.hypot(x, y)
     turn = math.degrees(math.atan2(y, x))
     size = 2 * half, 2 * radius_mm**2 / half
