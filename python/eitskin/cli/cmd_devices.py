@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 URLS = {
     "auto": "the one board that is plugged in",
     "serial:PORT": "a serial port; serial:PORT?baud=N where it is not at 1000000 baud",
+    "text:PORT": "an instrument that sends lines: text:PORT?layout=FILE (docs/guide/your-board.md)",
     "sim:SCENE": "a simulated board that sees a scene: a file, or a name of  eitskin scene list",
     "emu:SCENE": "the firmware itself on an emulated board that sees a scene (extra: emulator)",
     "file:RUN.eits": "a recording, made by  eitskin record",
@@ -40,6 +41,7 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """List, ask, print."""
     from eitskin.device.discovery import discover
+    from eitskin.device.source import source_schemes
 
     found = discover(ask=not options.quiet)
     if options.json:
@@ -53,7 +55,8 @@ def run(options: argparse.Namespace) -> int:
     for port in found:
         print(_line(port))
     print("--device takes:")
-    for url, meaning in URLS.items():
+    brought = {f"{scheme}:...": "a source that a package brings" for scheme in source_schemes()}
+    for url, meaning in (URLS | brought).items():
         print(f"  {url:14} {meaning}")
     return 0
 

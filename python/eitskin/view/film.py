@@ -22,7 +22,7 @@ FORMATS = (".webp", ".gif")
 MAX_FRAMES = 240  # of a film, which is kept in memory until it is written
 MIN_MS, MAX_MS = 40, 2000  # that a frame is seen
 DPI = 140
-COLOURS = 128
+COLOURS = 256
 
 
 def check_film(path: str | Path | None) -> None:
@@ -91,7 +91,7 @@ def thinned(count: int) -> list[int]:
 
 
 def _image(model: Model, panel: Panel, limit: float) -> Image:
-    """One frame; 128 colours, which take a third of the memory."""
+    """One frame; 256 colours, which take a third of the memory."""
     figure = panels_figure(model.skin, model.grid, [panel], limit=limit, large=False)
     figure.set_dpi(DPI)
     canvas: Any = figure.canvas
