@@ -258,9 +258,9 @@ def run_growth(options: argparse.Namespace) -> int:
     _within("--rounds", options.rounds, 1, 1000)
     refuse_unwritable(options.page, options.picture)
     if options.picture is not None:
-        from eitskin.view.pictures import load_matplotlib
+        from eitskin.view.sheets import check_picture
 
-        load_matplotlib()
+        check_picture(options.picture)
     result = bench_growth.run(options.rounds, options.cache, progress=_progress)
     if options.picture is not None:
         from eitskin_studies.pictures.growth_picture import draw_growth

@@ -112,9 +112,10 @@ def _check(options: argparse.Namespace) -> None:
         if path is not None and not path.parent.is_dir():
             raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
     if options.picture is not None or options.curves is not None:
-        from eitskin.view.pictures import load_matplotlib
+        from eitskin.view.sheets import check_picture
 
-        load_matplotlib()
+        check_picture(options.picture)
+        check_picture(options.curves)
 
 
 def progress(items: Sequence[Any], what: str) -> Iterable[Any]:
