@@ -42,6 +42,10 @@
  * stand still; smaller: drags end with a jump, as swipes */
 #define EITS_FIRM R(0.8)
 
+/* one that explains less is letting go: if the tracker then holds it, it has lifted [of what it
+ * last explained]. larger: faint touches flicker; smaller: their lifts are told late */
+#define EITS_GOING R(0.8)
+
 /* a shorter tap must be clear [us]. larger: quick taps are missed; smaller: ghosts of landing
  * fingers tap */
 #define EITS_SHORT_US 30000

@@ -119,7 +119,7 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
     const eits_real strength = eits_fabs(touch->strength_s_per_m_mm2);
     const int firm = strength >= g->options.firm * c->strength;
     if (touch->explained > 0) {
-        const int going = !firm || touch->explained < R(0.5) * c->explained;
+        const int going = !firm || touch->explained < EITS_GOING * c->explained;
         c->flags = going ? c->flags | CONTACT_GOING : c->flags & ~(uint32_t)CONTACT_GOING;
         c->explained = touch->explained;
     } else if ((c->flags & CONTACT_GOING) != 0) {

@@ -186,7 +186,7 @@ class ReferenceGestures:
         strength, explained = np.abs(R(touch.strength_s_per_m_mm2)), R(touch.explained)
         firm = strength >= R(c.FIRM) * one.strength
         if explained > 0:
-            one.going = bool(not firm or explained < R(0.5) * one.explained)
+            one.going = bool(not firm or explained < R(c.GOING) * one.explained)
             one.explained = explained
         elif one.going:
             return

@@ -62,6 +62,7 @@ class ConfigurationCost:
     warm: bool
     solve_mean: float
     touches_mean: float
+    gestures_most: int
     worst: int
     worst_tenth: float
     macs_mean: float
@@ -216,6 +217,7 @@ def _cost(
         warm=warm,
         solve_mean=float(np.mean([frame.solve_instructions for frame in done.frames])),
         touches_mean=float(np.mean([frame.touch_instructions for frame in done.frames])),
+        gestures_most=max(frame.gesture_instructions for frame in done.frames),
         worst=int(each[-1]),
         worst_tenth=float(each[-max(1, len(each) // 10) :].mean()),
         macs_mean=float(np.mean([frame.macs for frame in done.frames])),
@@ -341,6 +343,8 @@ def rate_rows(result: BoardCost) -> list[tuple[str, ...]]:
 def as_text(result: BoardCost) -> str:
     """For a terminal."""
     parts = [f"{result.scenes} random scenes, seed {result.seed}; {result.compiler}; {result.qemu}"]
+    gestures = max((cost.gestures_most for cost in result.costs), default=0)
+    parts.append(f"gestures of a frame: at most {gestures} instructions")
     for head, rows in (
         (COST_HEAD, cost_rows(result)),
         (IMAGE_HEAD, image_rows(result)),
@@ -354,10 +358,12 @@ def as_text(result: BoardCost) -> str:
 def for_page(result: BoardCost, command: str) -> Filling:
     """The marks of docs/results/board-cost.md; ``rates`` where the emulated board ran."""
     stack = max(cost.stack_bytes for cost in result.costs if cost.kernels != "portable")
+    gestures = max(cost.gestures_most for cost in result.costs)
     run = (
         f"By `{command}`: the prebuilt model with its default options (working set, 60 iterations,"
         f" rank 64), {result.scenes} random scenes of seed {result.seed} (1 to 3 touches, 60 dB),"
-        f" {result.compiler}, {result.qemu}. Solve and touches take at most {stack} bytes of stack."
+        f" {result.compiler}, {result.qemu}. Solve and touches take at most {stack} bytes of stack,"
+        f" the gestures of a frame at most {gestures} instructions."
     )
     tables: dict[str, Tabular] = {
         "cost": (COST_HEAD, cost_rows(result)),

@@ -116,7 +116,7 @@ def judge(session: DrawnSession, told: Sequence[ToldGesture]) -> GestureCount:
 
 
 def _until(one: DrawnGesture) -> float:
-    return max(float(finger.at_s[-1]) for finger in one.fingers)
+    return max((float(finger.at_s[-1]) for finger in one.fingers), default=one.end_s)
 
 
 def _end(one: DrawnGesture) -> float:
