@@ -16,6 +16,7 @@ from eitskin.cli.device_options import (
     add_device,
     add_outputs,
     add_scan,
+    add_zones,
     opened_outputs,
     read_mode,
     say,
@@ -55,6 +56,7 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "--token WORD", "that commands need (default: drawn anew, in the address)")
     option(parser, "--folder FOLDER", "where the page's recordings go", Path, default=Path())
     add_outputs(parser)
+    add_zones(parser)
     option(parser, "--overwrite", "write over files that exist, of --to")
     option(parser, "--open", "open the page in this machine's browser")
     add_scan(parser)

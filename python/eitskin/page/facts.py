@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,7 @@ def setup_text(session: Session, reference_v: list[float] | None, may_command: b
         "iterations": None if solver is None else solver.iterations,
         "recording": None if session.recorder is None else session.recorder.path.name,
         "model_crc": f"{board.model_crc:08x}",
+        "zones": [asdict(zone) for zone in how.zones],
         "skin": _skin(session),
     }
     return text_of("setup", **facts)

@@ -85,6 +85,7 @@ class Follower:
         self._url, self.settings, self._speed, self.folder = url, settings, speed, folder
         self._on_frame, self._on_news, self._outputs = on_frame, on_news, outputs
         self.session: PageSession | None = None
+        self.last: PageSession | None = None  # that is over, for pages that come later
         self.state, self.text = "starting", ""
         self.error: Exception | None = None
         self.frames = 0
@@ -134,7 +135,7 @@ class Follower:
         )
         with session, nullcontext() if self._outputs is None else self._outputs(session) as outputs:
             session.start()
-            self.session = session
+            self.session = self.last = session
             self._set("live", "")
             frames = session.frames()
             try:

@@ -9,6 +9,7 @@ import ipaddress
 import json
 import re
 import socket
+import time
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 from contextlib import suppress
@@ -103,6 +104,7 @@ class PageServer:
         self._say = say
         self.hub, self._loop = Hub(), asyncio.new_event_loop()
         self._waiting: Frame | None = None
+        self._newest: Frame | None = None  # for pages that come later
         self._frames = 0
         self.skipped = 0  # frames that came while the one before was not taken up yet
         self.follower = Follower(
@@ -185,10 +187,12 @@ class PageServer:
 
     def _send_frame(self) -> None:
         frame, self._waiting = self._waiting, None
-        if frame is None or not self.hub.size:
+        if frame is None:
             return
-        self._frames += 1
-        self.hub.offer(Outgoing(self._frames, frame_bytes(self._frames, frame), frame.arrived_ns))
+        self._frames, self._newest = self._frames + 1, frame
+        if self.hub.size:
+            data = frame_bytes(self._frames, frame)
+            self.hub.offer(Outgoing(self._frames, data, frame.arrived_ns))
         if self._frames == 1:
             self._send_setup()  # the reference is known now
 
@@ -197,7 +201,7 @@ class PageServer:
             self._tell_setup(page)
 
     def _tell_setup(self, page: PageClient) -> None:
-        session = self.follower.session
+        session = self.follower.session or self.follower.last
         if session is not None:
             page.tell(setup_text(session, session.reference_v, page.may_command))
 
@@ -290,6 +294,9 @@ class PageServer:
         self.hub.pages.add(page)
         page.tell(text_of("state", state=self.follower.state, text=self.follower.text))
         self._tell_setup(page)
+        if self._newest is not None:
+            data = frame_bytes(self._frames, self._newest)
+            page.offer(Outgoing(self._frames, data, time.monotonic_ns()))
         tasks = [
             asyncio.create_task(one)
             for one in (self._send(socket, page), self._receive(socket, page), self._about(page))

@@ -36,7 +36,7 @@ def until(what: Callable[[], Any], seconds: float = 30.0) -> Any:
 @contextmanager
 def serving(url: str, mode: Stream = ALL, **more: Any) -> Iterator[PageServer]:
     """The page of ``url`` on a free port."""
-    settings = SessionSettings(mode, quiet_frames=True)
+    settings = SessionSettings(mode, quiet_frames=True, zones=more.pop("zones", ()))
     more = {"token": TOKEN, "host": "127.0.0.1"} | more
     server = PageServer(url, settings, listen("127.0.0.1", 0), **more)
     thread = threading.Thread(target=server.serve, daemon=True)

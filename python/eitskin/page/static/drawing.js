@@ -108,6 +108,7 @@ export class SkinDrawing {
     context.strokeStyle = this.colours.soft;
     context.lineWidth = 1.5;
     context.stroke(outline);
+    this.drawZones(context, options.zones, options.pressed);
     this.drawElectrodes(context, options.health);
     if (!frame) return;
     if (options.trails) this.drawTrails(context, frame.message.time_s);
@@ -131,6 +132,33 @@ export class SkinDrawing {
     context.imageSmoothingEnabled = true;
     context.drawImage(this.pixels, this.x(x0), this.y(y0 + high), wide * this.scale, high * this.scale);
     context.restore();
+  }
+
+  drawZones(context, zones, pressed) {
+    context.font = "600 12px system-ui, sans-serif";
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    for (const zone of zones) {
+      const border = new Path2D();
+      zone.corners_mm.forEach(([x, y], k) => border[k ? "lineTo" : "moveTo"](this.x(x), this.y(y)));
+      if (zone.corners_mm.length) border.closePath();
+      for (const radius of zone.corners_mm.length ? [] : [zone.outer_mm, zone.inner_mm]) {
+        if (!radius) continue;
+        border.moveTo(this.x(zone.x_mm) + radius * this.scale, this.y(zone.y_mm));
+        border.arc(this.x(zone.x_mm), this.y(zone.y_mm), radius * this.scale, 0, 2 * Math.PI);
+      }
+      context.fillStyle = context.strokeStyle = this.colours.accent;
+      context.lineWidth = 1.5;
+      context.globalAlpha = pressed.has(zone.name) ? 0.3 : 0.06;
+      context.fill(border, "evenodd");
+      context.globalAlpha = 0.8;
+      context.stroke(border);
+      const xs = zone.corners_mm.map((p) => p[0]), ys = zone.corners_mm.map((p) => p[1]);
+      const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
+      const at = xs.length ? [mean(xs), mean(ys)] : [zone.x_mm, zone.y_mm + (zone.inner_mm ? (zone.inner_mm + zone.outer_mm) / 2 : 0.7 * zone.outer_mm)];
+      context.fillText(zone.name, this.x(at[0]), this.y(at[1]));
+      context.globalAlpha = 1;
+    }
   }
 
   drawElectrodes(context, health) {

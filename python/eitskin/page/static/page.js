@@ -5,12 +5,14 @@ const $ = (id) => document.getElementById(id);
 const MAGIC = 0x31465645; // "EVF1"
 const WORDS_MS = 2500; // between two texts for screen readers
 const SHOWN_LOG = 60;
+const FINGERS = ["down", "move", "up"]; // told by the touches themselves
+const GESTURE_MS = 4000; // that a gesture stays to be read
 
 const skin = new SkinDrawing($("skin"));
 const volts = new VoltsDrawing($("volts"));
 const page = {
   socket: null, setup: null, frame: null, asked: false, times: [], health: {}, dropped: 0, skipped: 0,
-  wordsAt: 0, words: "", gestures: [], state: "",
+  wordsAt: 0, words: "", gestures: [], pressed: new Set(), state: "",
 };
 const token = new URLSearchParams(location.hash.slice(1)).get("token");
 
@@ -53,8 +55,12 @@ function takeFrame(buffer) {
   page.times.push(performance.now());
   while (page.times.length > 2 && page.times[0] < performance.now() - 2000) page.times.shift();
   skin.follow(message.touches || [], message.time_s);
-  for (const event of message.events || []) page.gestures.unshift(event);
-  page.gestures.length = Math.min(page.gestures.length, 4);
+  for (const event of message.events || []) {
+    if (event.zone && event.kind === "press") page.pressed.add(event.zone);
+    if (event.zone && event.kind === "release") page.pressed.delete(event.zone);
+    if (!FINGERS.includes(event.kind) && event.phase !== "change") page.gestures.unshift({ ...event, at: performance.now() });
+  }
+  page.gestures = page.gestures.filter((event) => performance.now() - event.at < GESTURE_MS).slice(0, 4);
   soon();
 }
 
@@ -185,6 +191,11 @@ function showElectrodes(health, count) {
   $("health").textContent = bad.length ? bad.join(", ") : "None is found open, bridged or noisy.";
 }
 
+function gestureText({ kind, phase, zone, direction_deg }) {
+  const way = direction_deg === null || direction_deg === undefined ? "" : ` ${["right", "up", "left", "down"][Math.round(direction_deg / 90 + 4) % 4]}`;
+  return [kind, phase === "end" ? phase : "", zone || ""].filter(Boolean).join(" ") + way;
+}
+
 function healthOf(info) {
   const health = {};
   if (!info) return health;
@@ -199,14 +210,15 @@ function rate() {
 
 function draw() {
   const { frame, setup } = page;
-  skin.draw(frame, { health: page.health, trails: $("trails").checked, truth: $("truth").checked });
+  skin.draw(frame, { health: page.health, trails: $("trails").checked, truth: $("truth").checked,
+    zones: setup ? setup.zones : [], pressed: page.pressed });
   if (!frame || !setup) return;
   const { message } = frame, { info } = message, touches = message.touches || [];
   $("volts").ariaLabel = volts.draw(frame.volts, setup.reference_v);
   showElectrodes(healthOf(info), setup.electrodes);
   showTouches(touches);
   chips($("found"), message.refused ? [`refused: ${message.refused}`, ...message.found] : message.found, "nothing found wrong");
-  chips($("gestures"), page.gestures.map((event) => (event.zone ? `${event.kind} ${event.zone}` : event.kind)));
+  chips($("gestures"), page.gestures.map(gestureText));
   $("gestures").hidden = !page.gestures.length;
   $("n-frame").textContent = String(message.frame);
   $("n-time").textContent = `${message.time_s.toFixed(2)} s`;
