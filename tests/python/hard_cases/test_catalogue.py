@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import page
 import pictures
 from catalogue import CASES, exists, hard_tests
 
+import page
 from margins import Margins
 
 
