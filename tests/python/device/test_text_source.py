@@ -418,3 +418,18 @@ def test_a_layout_comes_back_as_it_was_saved(tmp_path: Path, layout: Path) -> No
         assert (again.options, again.send, again.baud) == (before.options, before.send, before.baud)
     save_layout(tmp_path / "empty.toml", Layout())
     assert load_layout(tmp_path / "empty.toml") == Layout()
+
+
+def test_magnitudes_and_phases_are_turned_as_a_board_turns_them(tmp_path: Path) -> None:
+    """Pairs with a common phase of 40 degrees: the application finds it at the tare."""
+    z = volts() * np.exp(1j * np.deg2rad(40.0))
+    pairs = np.stack([np.abs(z), np.rad2deg(np.angle(z))], axis=2).reshape(len(z), -1)
+    path = written(tmp_path, "\n".join("\t".join(map(repr, row)) for row in pairs.tolist()))
+    layout = tmp_path / "polar.toml"
+    layout.write_text(
+        '[lines]\ndelimiter = "tab"\ncells = 416\npairs = "magnitude-degrees"\n'
+        'complex_part = "in-phase"\n'
+    )
+    *items, _ = streamed(f"text:{path}?layout={layout}")
+    got = np.array([item.voltage_v for item in items if isinstance(item, RawFrame)])
+    assert np.allclose(got, volts()[8:], rtol=1e-4, atol=1e-7)
