@@ -1,8 +1,8 @@
 """``osc://HOST:PORT[/prefix]``: a bundle of OSC messages a frame, over UDP.
 
 /eitskin/frame number time_s touches; then for each touch /eitskin/touch id x_mm y_mm radius_mm
-strength force_n confidence (nil where one is not known); /eitskin/event kind x_mm y_mm zone
-touch_ids...; /eitskin/notice kind text.
+strength force_n confidence (nil where one is not known); /eitskin/event kind x_mm y_mm
+direction_deg value zone touch_ids...; /eitskin/notice kind text.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
         known = [t["strength_s_per_m_mm2"], t["force_n"], t["confidence"]]
         listed.append(("/touch", place + known))
     for event in message["events"]:
-        place = [event["kind"], event["x_mm"], event["y_mm"], event.get("zone")]
-        listed.append(("/event", place + event["touch_ids"]))
+        told = [event[name] for name in ("kind", "x_mm", "y_mm", "direction_deg", "value", "zone")]
+        listed.append(("/event", told + event["touch_ids"]))
     return listed
 
 

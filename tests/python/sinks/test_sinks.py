@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from swipe_frames import Swipe
 
+import eitskin
 from eitskin.live.message import schema
 from eitskin.sinks.outputs import Outputs
 
@@ -93,15 +94,39 @@ def osc() -> Iterator[tuple[int, queue.Queue[Any]]]:
         thread.join()
 
 
+def test_gestures_go_out(osc: tuple[int, queue.Queue[Any]]) -> None:
+    """A double tap of the library, as OSC and as valid messages."""
+    port, heard = osc
+    kinds = []
+    for frame in eitskin.stream("sim:double_tap", to=[f"osc://127.0.0.1:{port}"]):
+        message = frame.message()
+        VALID.validate(message)
+        kinds += [(one["kind"], one["x_mm"]) for one in message["events"] if one["kind"] != "move"]
+    assert [kind for kind, _ in kinds][:6] == ["down", "up", "tap", "down", "up", "double-tap"]
+    came: list[Any] = []
+    while len(came) < len(kinds):
+        path, *values = heard.get(timeout=WAIT_S)
+        came += [values] if path == "/eitskin/event" and values[0] != "move" else []
+    assert [values[0] for values in came] == [kind for kind, _ in kinds]
+    assert [values[1] for values in came] == pytest.approx([x for _, x in kinds], abs=1e-4)
+
+
+def heard_besides_events(heard: queue.Queue[Any]) -> Any:
+    while True:
+        message = heard.get(timeout=WAIT_S)
+        if not message[0].endswith("/event"):
+            return message
+
+
 def test_osc(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
     port, heard = osc
     send(swipe, f"osc://127.0.0.1:{port}/table")
     for frame in swipe.frames:
-        path, number, time_s, count = heard.get(timeout=WAIT_S)
+        path, number, time_s, count = heard_besides_events(heard)
         assert (path, number, count) == ("/table/frame", frame.number, len(frame.touches))
         assert time_s == pytest.approx(frame.time_s, abs=1e-5)
         for touch in frame.touches:
-            path, one, x, y, _, _, force, confidence = heard.get(timeout=WAIT_S)
+            path, one, x, y, _, _, force, confidence = heard_besides_events(heard)
             assert (path, one, force) == ("/table/touch", touch.id, None)
             assert (x, y, confidence) == pytest.approx(
                 (touch.x_mm, touch.y_mm, touch.confidence), rel=1e-6
