@@ -159,8 +159,9 @@ typedef enum eits_fault {
 #define EITS_FAULTS 16u
 
 /* ELECTRODE_OPEN, SATURATED and BRIDGED rise in the frame that shows them, MODEL_MISMATCH,
- * ELECTRODE_NOISY, STALE_REFERENCE and UNLIKE_MODEL with the third in a row, since a touch that lands within a
- * scan gives one such frame; all these are gone after so many frames in a row without them. */
+ * ELECTRODE_NOISY, STALE_REFERENCE and UNLIKE_MODEL with the third in a row, since a touch that
+ * lands within a scan gives one such frame; all these are gone after so many frames in a row
+ * without them. */
 #define EITS_FAULT_RAISE_FRAMES 3u
 #define EITS_FAULT_CLEAR_FRAMES 8u
 
