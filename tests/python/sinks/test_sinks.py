@@ -111,28 +111,21 @@ def test_gestures_go_out(osc: tuple[int, queue.Queue[Any]]) -> None:
     assert [values[1] for values in came] == pytest.approx([x for _, x in kinds], abs=1e-4)
 
 
-def heard_besides_events(heard: queue.Queue[Any]) -> Any:
-    while True:
-        message = heard.get(timeout=WAIT_S)
-        if not message[0].endswith("/event"):
-            return message
-
-
 def test_osc(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
     port, heard = osc
     send(swipe, f"osc://127.0.0.1:{port}/table")
     for frame in swipe.frames:
-        path, number, time_s, count = heard_besides_events(heard)
+        path, number, time_s, count = heard.get(timeout=WAIT_S)
         assert (path, number, count) == ("/table/frame", frame.number, len(frame.touches))
         assert time_s == pytest.approx(frame.time_s, abs=1e-5)
         for touch in frame.touches:
-            path, one, x, y, _, _, force, confidence = heard_besides_events(heard)
+            path, one, x, y, _, _, force, confidence = heard.get(timeout=WAIT_S)
             assert (path, one, force) == ("/table/touch", touch.id, None)
             assert (x, y, confidence) == pytest.approx(
                 (touch.x_mm, touch.y_mm, touch.confidence), rel=1e-6
             )
         for event in frame.events:
-            path, kind, x, y, zone, one = heard.get(timeout=WAIT_S)
+            path, kind, x, y, _, _, zone, one = heard.get(timeout=WAIT_S)
             assert (path, kind, zone, one) == ("/table/event", event.name, None, event.first_id)
             assert (x, y) == pytest.approx((event.x_mm, event.y_mm), rel=1e-6)
 
