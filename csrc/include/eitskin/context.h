@@ -112,7 +112,8 @@ size_t eits_workspace_size(const eits_model *model, int prepared);
  * (see `prepared` above) S is also copied into panels, which is faster where memory is plentiful
  * and gives the same bits. Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE (smaller than
  * eits_workspace_size(model, 0), or not aligned); *ctx is untouched then. EITS_E_ARITHMETIC: the
- * library was compiled in a way that changes bits; what the context then gives is near, not equal. */
+ * library was compiled in a way that changes bits; what the context then gives is near, not equal.
+ */
 eits_status eits_init(void *workspace, size_t size, const eits_model *model, eits_context **ctx);
 
 /* Replace the options. Errors: EITS_E_ARGUMENT for one that is out of range or not finite; then
