@@ -48,8 +48,9 @@ static void places_get_factor_floor_distance_and_what_the_test_would_move(void)
     for (int k = 0; k < 3; ++k) {
         ctx->reference.distance = (eits_real)(0.125 * k);
         const double x = fmin(apart[k][0], reach), y = apart[k][1],
-                     least =
-                         (double)EITS_PLACE_MIN_MM2 + (double)EITS_PLACE_DISTANCE_MM2 * 0.125 * k,
+                     least = pow((double)ctx->model->pixel_mm, 2) * (double)EITS_PLACE_MIN +
+                             pow((double)ctx->model->pixel_mm, 2) * (double)EITS_PLACE_DISTANCE *
+                                 0.125 * k,
                      add[3] = {x * x + least, x * y, y * y + least};
         const eits_fit f = rated(100, 1, PLACE, apart[k][0], apart[k][1]);
         for (int i = 0; i < 3; ++i)

@@ -22,9 +22,10 @@ static int is_known(const eits_real *place_mm2, const eits_real *apart_mm)
 
 void eits_rate_touches(const eits_context *ctx, eits_fit *f)
 {
-    const eits_real least = eits_fma(EITS_PLACE_DISTANCE_MM2, ctx->reference.distance,
-                                     EITS_PLACE_MIN_MM2),
-                    reach = EITS_MAX_MOVE * (eits_real)ctx->model->pixel_mm;
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
+                    least = pixel * pixel *
+                            eits_fma(EITS_PLACE_DISTANCE, ctx->reference.distance, EITS_PLACE_MIN),
+                    reach = EITS_MAX_MOVE * pixel;
     for (uint32_t k = 0; k < f->count; ++k) {
         eits_real *place = f->place_mm2[k];
         if (!f->tested || !is_known(place, f->apart_mm[k])) {

@@ -115,13 +115,13 @@
 /* of the linearisation's covariance of a place. larger: ellipses of light touches cover more */
 #define EITS_PLACE_FACTOR R(0.5)
 
-/* of both variances, for what no linearisation knows [mm^2]. larger: ellipses of clear touches
+/* of both variances, for what no linearisation knows [pixels^2]. larger: ellipses of clear touches
  * cover more */
-#define EITS_PLACE_MIN_MM2 R(0.04)
+#define EITS_PLACE_MIN R(0.002)
 
-/* of both variances, for each unit of the reference's distance from the model's [mm^2]. larger:
+/* of both variances, for each unit of the reference's distance from the model's [pixels^2]. larger:
  * ellipses cover more on skins unlike their model */
-#define EITS_PLACE_DISTANCE_MM2 R(12.0)
+#define EITS_PLACE_DISTANCE R(0.2)
 
 /* ---- Chosen: on the tuning family of the worlds: logistic regression of touches that are two
  * fingers 12 to 16 mm apart (seed 2, 200 scenes) against single touches of all sets; the limits so

@@ -11,9 +11,9 @@ from eitskin.core.constants_table import (
     MAX_MOVE,
     MIN_CONFIDENCE,
     PAIR_ODDS,
-    PLACE_DISTANCE_MM2,
+    PLACE_DISTANCE,
     PLACE_FACTOR,
-    PLACE_MIN_MM2,
+    PLACE_MIN,
 )
 from eitskin.reference.evidence import Tested
 
@@ -24,7 +24,7 @@ def rated(tested: Tested, distance: float, pixel_mm: float) -> tuple[FloatArray,
     """For each disc the probability that it is a touch (k,), and the covariance of its place as
     wide as places err: xx, xy, yy (k, 3), mm^2; ``distance`` of the reference from the model's."""
     x, y = np.clip(tested.apart_mm, -MAX_MOVE * pixel_mm, MAX_MOVE * pixel_mm).T
-    least = PLACE_MIN_MM2 + PLACE_DISTANCE_MM2 * distance
+    least = pixel_mm**2 * (PLACE_MIN + PLACE_DISTANCE * distance)
     place = PLACE_FACTOR * tested.place_mm2 + np.column_stack([x * x + least, x * y, y * y + least])
     return tested.rise / (tested.rise + CONFIDENCE_HALF), place
 
