@@ -401,6 +401,46 @@ static void zeros_and_nan_come_to_an_end(void)
     }
 }
 
+/* Two touches, and up to three discs beside them at random, under errors of several sizes: what
+ * stays is some of it, the two among it where the model is not wrong by much; on an instrument that
+ * is far from the model one stays whatever its errors could have made. */
+static void ghosts_beside_touches_go(void)
+{
+    uint64_t state = 41;
+    for (int round = 0; round < 48; ++round) {
+        bench b;
+        eits_context *ctx = set_up(&b, round & 1);
+        const int size = round / 2 % 4;
+        eits_disc discs[5] = {ONE, OTHER, ONE, OTHER, ONE};
+        stage_discs(&b, discs, 2);
+        ctx->reference.far = round >= 24;
+        for (int i = 0; i < PACKED; ++i) {
+            b.errors[i] *= (float)pow(10, size - 1);
+            b.drift[i] *= size == 3 ? 0 : (float)pow(10, 2 * size - 3);
+        }
+        for (int k = 2; k < 5; ++k) {
+            discs[k].x_mm += (eits_real)(14 * small_random(&state));
+            discs[k].y_mm += (eits_real)(14 * small_random(&state));
+            discs[k].change *= (eits_real)(0.2 + 0.1 * small_random(&state));
+        }
+        eits_fit f = fit_of(ctx, discs, (round < 24 ? 2 : 1) + (uint32_t)round / 3 % 4);
+        const uint32_t before = f.count;
+        eits_test_touches(ctx, &ctx->scratch, &f);
+        CHECK_EQUAL(f.tested, 1);
+        CHECK(f.count >= ctx->reference.far && f.count <= before);
+        for (uint32_t k = 0; k < f.count; ++k)
+            CHECK(f.rise[k] > 0 && f.place_mm2[k][0] > 0 && f.place_mm2[k][2] > 0);
+        for (uint32_t k = 0; size == 0 && k < 2 && k < before; ++k) {
+            double nearest = 1e9;
+            for (uint32_t l = 0; l < f.count; ++l)
+                nearest = fmin(nearest, hypot((double)(f.disc[l].x_mm - discs[k].x_mm),
+                                              (double)(f.disc[l].y_mm - discs[k].y_mm)));
+            CHECK(nearest < 3);
+        }
+        dense_bench_close(&b.b);
+    }
+}
+
 int main(void)
 {
     leaving_out_is_solving_again_without();
@@ -411,5 +451,6 @@ int main(void)
     rows_left_out_do_not_stop_the_test();
     what_cannot_be_tested_is_left_alone();
     zeros_and_nan_come_to_an_end();
+    ghosts_beside_touches_go();
     return checks_report("evidence");
 }

@@ -239,7 +239,8 @@ static int eliminate(eits_context *ctx, const eits_scratch *scratch, verdict *v,
         uint32_t weakest = look(ctx, scratch, v, &now);
         if (v->rise[weakest] > EITS_CLEAR * needed(ctx, v) && !any_may_be_one(v, needed(ctx, v)))
             return 1;
-        if (!to_the_end && !fits(ctx, v))
+        if (!to_the_end && excess(ctx, v->answer.misfit, v->answer.count) >
+                               (v->fitted ? EITS_FITS : EITS_FITS_AS_DISCS))
             return 0;
         if (v->linear) {
             const int taken = take_linear(ctx, scratch, v, weakest, &now, macs);

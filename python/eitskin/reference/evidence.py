@@ -411,7 +411,8 @@ class Hypothesis:
             weakest = self.look(now)
             if self.rise[weakest] > CLEAR * self.needed() and not self.near_pairs():
                 return True
-            if not to_the_end and not self.fits():
+            bad = FITS if self.fitted else FITS_AS_DISCS
+            if not to_the_end and self.excess(self.answer.misfit, len(self.answer.discs)) > bad:
                 return False
             if self.linear:
                 rest, about = self.drop_linearly(now, weakest)
