@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,18 +17,17 @@ from eitskin.fem.grid import Grid
 from eitskin.fileio import write_beside
 from eitskin.skin.skin import Skin
 from eitskin.view.pictures import (
-    FOUND,
     INK,
     MARGIN,
     SMALL_MARGIN,
     STYLE,
-    TRUE,
     Mark,
     Panel,
     draw_panel,
     largest,
     load_matplotlib,
 )
+from eitskin.view.sheet_texts import Key, plain, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -209,7 +207,7 @@ def panels_figure(
         sheet.height += BAR + TICKS
         unit = UNIT_TEXT if limit is None else "change of conductivity (S/m)"
         sheet.text(wrapped(unit, width - 2 * EDGE, 8.5), 8.5)
-    key = _Key(panels, width) if legend else None
+    key = Key(panels, width) if legend else None
     key_top = sheet.height
     if key is not None:
         sheet.height += key.height
@@ -281,54 +279,10 @@ def frame_figure(
             bar = _axes(figure, sheet, (x + (wide - bar_width) / 2, bar_top, bar_width, BAR))
             _bar(figure, coloured, bar, label)
         else:
-            key = _Key([panel], cell.whole)
+            key = Key([panel], cell.whole)
             middle = (x + wide / 2) / width
             key.draw(figure, bar_top / sheet.height, middle)
     return figure
-
-
-def wrapped(text: str, width: float, size: float, weight: str = "normal") -> list[str]:
-    """``text`` in lines of at most ``width`` inches at ``size`` points; words that are longer are
-    cut."""
-    lines: list[str] = []
-    for part in text.split("\n"):
-        line = ""
-        for word in part.split(" "):
-            for piece in _pieces(word, width, size, weight):
-                longer = f"{line} {piece}" if line else piece
-                if line and _inches(longer, size, weight) > width:
-                    lines.append(line)
-                    line = piece
-                else:
-                    line = longer
-        lines.append(line)
-    return lines
-
-
-def _pieces(word: str, width: float, size: float, weight: str) -> list[str]:
-    if _inches(word, size, weight) <= width:
-        return [word]
-    pieces, piece = [], ""
-    for letter in word:
-        if piece and _inches(piece + letter, size, weight) > width:
-            pieces.append(piece)
-            piece = ""
-        piece += letter
-    return [*pieces, piece]
-
-
-@lru_cache(4096)
-def _inches(text: str, size: float, weight: str) -> float:
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
-    font = FontProperties(size=size, weight=weight)
-    return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]) / 72
-
-
-def _plain(text: str) -> str:
-    """``text`` that matplotlib does not take for a formula."""
-    return text.replace("$", r"\$")
 
 
 def _cell(skin: Skin, small: bool) -> Cell:
@@ -362,7 +316,7 @@ def _heading(title: str, cell: Cell, size: float) -> str:
 
 
 def _titled(panel: Panel, heading: str) -> Panel:
-    return Panel(_plain(heading), panel.values, panel.truth, panel.found, panel.fill_truth)
+    return Panel(plain(heading), panel.values, panel.truth, panel.found, panel.fill_truth)
 
 
 def _figure(sheet: Sheet) -> Figure:
@@ -373,7 +327,7 @@ def _figure(sheet: Sheet) -> Figure:
         matplotlib.backends.backend_agg.FigureCanvasAgg(figure)
         for top, text, size, weight in sheet.texts:
             figure.text(
-                0.5, 1 - top / sheet.height, _plain(text), ha="center", va="center",
+                0.5, 1 - top / sheet.height, plain(text), ha="center", va="center",
                 fontsize=size, fontweight=weight, color=INK,
             )  # fmt: skip
     return figure
@@ -416,42 +370,3 @@ def _bar(figure: Figure, coloured: Any, axes: Axes, label: str = "") -> None:
     axes.tick_params(labelsize=8.5)
     if label:
         bar.set_label(label, fontsize=9)
-
-
-class _Key:
-    """What the marks of ``panels`` mean, in as many rows as ``width`` inches need."""
-
-    SAMPLE = 0.62  # inches of a mark and the room around it
-
-    def __init__(self, panels: Sequence[Panel], width: float) -> None:
-        from matplotlib.lines import Line2D
-
-        found = [mark for panel in panels for mark in panel.found]
-        cross: dict[str, Any] = {"marker": "x", "markersize": 7, "markeredgewidth": 1.6}
-        ring: dict[str, Any] = {"marker": "o", "markersize": 9, "markerfacecolor": "none"}
-        kinds = (
-            ("true touch", any(panel.truth for panel in panels), TRUE, ring),
-            ("found touch", bool(found), FOUND, cross),
-            ("its size", any(m.radius_mm for m in found), FOUND, {"linestyle": (0, (3, 2))}),
-            ("its place, 90 %", any(m.place_mm2 for m in found), FOUND, {"linestyle": "-"}),
-        )
-        self.handles = [
-            Line2D([], [], label=label, markeredgecolor=colour,
-                   color=colour if "linestyle" in style else "none", **style)
-            for label, there, colour, style in kinds if there
-        ]  # fmt: skip
-        widest = max(
-            (_inches(str(one.get_label()), 8, "normal") for one in self.handles), default=0.0
-        )
-        self._columns = max(min(int(width / (widest + self.SAMPLE)), len(self.handles)), 1)
-        rows = math.ceil(len(self.handles) / self._columns)
-        self.height = 0.08 + 0.19 * rows if self.handles else 0.0
-
-    def draw(self, figure: Figure, top: float, middle: float = 0.5) -> None:
-        """With its upper edge at ``top`` of the figure's height, from above, around ``middle``."""
-        if self.handles:
-            figure.legend(
-                handles=self.handles, loc="upper center", bbox_to_anchor=(middle, 1 - top),
-                ncols=self._columns, frameon=False, fontsize=8, borderaxespad=0.1,
-                borderpad=0.1, columnspacing=1.0, handlelength=1.6, handletextpad=0.4,
-            )  # fmt: skip
