@@ -185,6 +185,7 @@ static void zones_that_cannot_be_are_refused(void)
     const eits_event e = {.kind = EITS_EVENT_DOWN, .first_id = 1};
     CHECK_EQUAL(eits_zones_update(&b.state, &e, 1, b.out, 8, &b.told), EITS_OK);
     CHECK_EQUAL(b.told, 0);
+    CHECK_EQUAL(eits_zones_update(&b.state, NULL, 0, b.out, 8, &b.told), EITS_OK);
     CHECK_EQUAL(eits_zones_update(NULL, &e, 1, b.out, 8, &b.told), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_zones_update(&b.state, NULL, 1, b.out, 8, &b.told), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_zones_update(&b.state, &e, 1, NULL, 8, &b.told), EITS_E_ARGUMENT);
