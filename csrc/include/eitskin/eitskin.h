@@ -11,6 +11,7 @@
  *     diagnostics.h  what is wrong with a frame, by name
  *     solve.h        from the data to an image
  *     touch.h        from the image to touches; force.h: how hard they press
+ *     gesture.h      from touches in time to taps, swipes, pinches; zone.h: named zones pressed
  *     batch.h        many frames at once, on a host
  *     link.h         the packets between a board and a host
  *     types.h        scalar, status, version
