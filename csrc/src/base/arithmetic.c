@@ -1,7 +1,5 @@
 #include "base/arithmetic.h"
 
-#include "base/vec.h"
-
 #ifdef EITS_DOUBLE
 #define TINY 0x1p-27
 #else
@@ -11,7 +9,7 @@
 /* Volatile, so that the operations are done by the program and not by the compiler. */
 void eits_try_arithmetic(eits_real *contracted, eits_real *reordered)
 {
-    volatile eits_real tiny = R(TINY), one = 1;
+    volatile eits_real tiny = (eits_real)TINY, one = 1;
     const eits_real e = tiny, unit = one, factor = unit + e, known = -(unit + 2 * e);
     *contracted = factor * factor + known;
     const eits_real large = unit / (e * e);
