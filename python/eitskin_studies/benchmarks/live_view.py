@@ -21,6 +21,7 @@ from eitskin_studies.harness.sections import Filling, text_table
 
 RATE_HZ = 50.0
 PAGES = (0, 1, 8)
+UNREAD_PORT = 47_808
 WARM_S = 3.0
 SCENE = """[scene]
 frames = 400
@@ -62,7 +63,8 @@ WebSocket.prototype.send = function (data) {
 class LiveView:
     """With ``pages`` looking on: frames a second that were sent to each, the server's share of a
     core (all of it: simulated board, solver, page), frames that were dropped, and the times from a
-    frame that is complete to its pixels, in ms (the first page, in Chromium)."""
+    frame that is complete to its pixels, in ms (the first page, in Chromium); the server's memory
+    when the measurement began and at its end."""
 
     pages: int
     rate_hz: float
@@ -70,6 +72,7 @@ class LiveView:
     dropped: int
     median_ms: float
     p99_ms: float
+    memory_mb: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -89,9 +92,13 @@ class LiveViews:
 
 
 def run(
-    seconds: float, pages: tuple[int, ...] = PAGES, progress: Callable[[str], None] = print
+    seconds: float,
+    pages: tuple[int, ...] = PAGES,
+    progress: Callable[[str], None] = print,
+    *,
+    sinks: bool = False,
 ) -> LiveViews:
-    """Each number of ``pages`` for ``seconds``.
+    """Each number of ``pages`` for ``seconds``; with ``sinks`` six of them beside.
 
     Raises:
         MissingExtraError: selenium is not installed.
@@ -104,13 +111,20 @@ def run(
         results = []
         for count in pages:
             progress(f"{count} pages for {seconds:g} s")
-            results.append(_measured(scene, count, seconds))
+            results.append(_measured(scene, count, seconds, _sinks(folder) if sinks else []))
         return LiveViews(tuple(results))
 
 
-def _measured(scene: Path, count: int, seconds: float) -> LiveView:
+def _sinks(folder: str) -> list[str]:
+    """Six that are fast: nobody reads the datagrams."""
+    files = [f"csv:{folder}/touches.csv", f"mcap:{folder}/touches.mcap"]
+    udp = [f"{name}://127.0.0.1:{UNREAD_PORT}" for name in ("udp", "osc", "tuio")]
+    return [*udp, f"ws://127.0.0.1:{UNREAD_PORT}", *files]
+
+
+def _measured(scene: Path, count: int, seconds: float, sinks: list[str]) -> LiveView:
     with ExitStack() as stack:
-        process, address = stack.enter_context(served_page(f"sim:{scene}?loop=1"))
+        process, address = stack.enter_context(served_page(f"sim:{scene}?loop=1", sinks))
         page = stack.enter_context(browser(address, WATCH)) if count else None
         others = [stack.enter_context(_other(address)) for _ in range(count - 1)]
         time.sleep(WARM_S)
@@ -119,18 +133,20 @@ def _measured(scene: Path, count: int, seconds: float) -> LiveView:
         for other in others:
             other["frames"] = 0
         begin, busy = time.monotonic(), _cpu_s(process.pid)
+        early_mb = _memory_mb(process.pid)
         time.sleep(seconds)
         passed = time.monotonic() - begin
         share = (_cpu_s(process.pid) - busy) / passed
+        memory_mb = (early_mb, _memory_mb(process.pid))
         if page is None:
-            return LiveView(0, 0.0, share, 0, float("nan"), float("nan"))
+            return LiveView(0, 0.0, share, 0, float("nan"), float("nan"), memory_mb)
         seen = np.array(page.execute_script("return window.seen"), dtype=np.float64)
         rates = [len(seen) / passed, *(other["frames"] / passed for other in others)]
         dropped = int(page.find_element("id", "n-dropped").text) + sum(
             other["dropped"] for other in others
         )
         median, p99 = np.percentile(seen, [50, 99])
-        return LiveView(count, min(rates), share, dropped, float(median), float(p99))
+        return LiveView(count, min(rates), share, dropped, float(median), float(p99), memory_mb)
 
 
 @contextmanager
@@ -168,19 +184,24 @@ def _cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def _memory_mb(pid: int) -> float:
+    """Of a process, resident."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
 def as_text(result: LiveViews) -> str:
     """For reading."""
     return text_table(*_table(result))
 
 
-def for_page(result: LiveViews, command: str) -> Filling:
+def for_page(result: LiveViews, command: str, mark: str) -> Filling:
     """The texts and tables between the marks of docs/results/live-view.md."""
-    return {"view-run": f"By `{command}`."}, {"view": _table(result)}
+    return {f"{mark}-run": f"By `{command}`."}, {mark: _table(result)}
 
 
 def _table(result: LiveViews) -> tuple[list[str], list[list[str]]]:
     head = ["pages", "frames a second", "server, % of a core", "not shown"]
-    head += ["frame to pixel, median", "99th percentile"]
+    head += ["frame to pixel, median", "99th percentile", "memory of the server, MB"]
     rows = []
     for one in result.measured:
         shown = bool(one.pages)
@@ -192,6 +213,7 @@ def _table(result: LiveViews) -> tuple[list[str], list[list[str]]]:
                 str(one.dropped) if shown else "",
                 f"{one.median_ms:.1f} ms" if shown else "",
                 f"{one.p99_ms:.1f} ms" if shown else "",
+                "{:.0f}, {:.0f} at the end".format(*one.memory_mb),
             ]
         )
     return head, rows

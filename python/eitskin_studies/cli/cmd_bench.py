@@ -85,6 +85,7 @@ def add_parser(subparsers: Any) -> None:
         "view", help="the live page: the server's share of a core, frame to pixel in Chromium"
     )
     option(view, "--seconds", "for each number of pages", default=30.0)
+    option(view, "--load", "eight pages only, and six sinks beside")
     _add_page(view, "live-view")
     view.set_defaults(run=run_view)
     batches = what.add_parser(
@@ -278,8 +279,14 @@ def run_view(options: argparse.Namespace) -> int:
 
     _within("--seconds", options.seconds, 1, 3600)
     refuse_unwritable(options.page)
-    result = live_view.run(options.seconds, progress=lambda text: print(text, file=sys.stderr))
-    filling = live_view.for_page(result, f"eitskin bench view --seconds {options.seconds:g}")
+    command = f"eitskin bench view --seconds {options.seconds:g}" + " --load" * options.load
+    result = live_view.run(
+        options.seconds,
+        live_view.PAGES[-1:] if options.load else live_view.PAGES,
+        progress=lambda text: print(text, file=sys.stderr),
+        sinks=options.load,
+    )
+    filling = live_view.for_page(result, command, "load" if options.load else "view")
     return _show(options, result, live_view.as_text(result), filling, "live-view")
 
 

@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -32,13 +32,14 @@ def need_browser() -> None:
 
 
 @contextmanager
-def served_page(url: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """``eitskin view`` of a device: the process, and its address with the token.
+def served_page(url: str, sinks: Sequence[str] = ()) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """``eitskin view`` of a device, with ``sinks``: the process, and its address with the token.
 
     Raises:
         DeviceError: it did not start.
     """
     command = [sys.executable, "-m", "eitskin", "view", "--device", url]
+    command += [word for sink in sinks for word in ("--to", sink)]
     process = subprocess.Popen(
         [*command, "--port", "0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     )
