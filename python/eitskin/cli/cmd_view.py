@@ -53,7 +53,9 @@ def add_parser(subparsers: Any) -> None:
         "to listen on, such as 0.0.0.0; other than this machine needs --token",
         default="127.0.0.1",
     )
-    option(parser, "--token WORD", "that commands need (default: drawn anew, in the address)")
+    option(
+        parser, "--token WORD", "that commands need (default: drawn at the start, in the address)"
+    )
     option(parser, "--folder FOLDER", "where the page's recordings go", Path, default=Path())
     add_outputs(parser)
     add_zones(parser)

@@ -175,7 +175,9 @@ def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
 
 def add_zones(parser: argparse.ArgumentParser) -> None:
     """``--zones``."""
-    option(parser, "--zones FILE.toml", "named keys, pads and rings whose presses are told", Path)
+    option(
+        parser, "--zones FILE.toml", "named keys, pads and rings whose presses are reported", Path
+    )
 
 
 def read_zones(path: Path | None) -> tuple[Zone, ...]:

@@ -354,7 +354,8 @@ def _axis_labels(axes: Axes, small: bool, first: bool) -> None:
 
     if small:
         return
-    width, height = axes.get_figure().get_size_inches() * axes.get_position().size  # type: ignore[union-attr]
+    figure: Any = axes.get_figure()
+    width, height = figure.get_size_inches() * axes.get_position().size
     axes.xaxis.set_major_locator(MaxNLocator(max(min(int(width / 0.6), 7), 2)))
     axes.yaxis.set_major_locator(MaxNLocator(max(min(int(height / 0.35), 7), 1)))
     if first:

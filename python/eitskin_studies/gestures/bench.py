@@ -121,8 +121,8 @@ def _summary(bench: GestureBench) -> Tabular:
             )
         )  # fmt: skip
     head = (
-        "SNR, dB", "gestures", "right, % (95 %)", "invented, % of those told (95 %)",
-        "told after its end, median ms", "99 %", "most", "within 50 ms, % (95 %)",
+        "SNR, dB", "gestures", "right, % (95 %)", "invented, % of those reported (95 %)",
+        "reported after its end, median ms", "99 %", "most", "within 50 ms, % (95 %)",
         "right, all fingers firm, %", "right, one light, %",
     )  # fmt: skip
     return head, rows
@@ -154,7 +154,7 @@ def _confusion(bench: GestureBench) -> Tabular:
             wrong.sort(key=lambda item: (-item[0], item[1]))
             row.append("; ".join(f"{told} {n}" for n, told in wrong))
         rows.append(row)
-    return ["what was done", *(f"{snr:g} dB: told, times" for snr in bench.counts)], rows
+    return ["what was done", *(f"{snr:g} dB: reported, times" for snr in bench.counts)], rows
 
 
 def as_text(bench: GestureBench) -> str:

@@ -22,7 +22,8 @@ from eitskin.skin.protocol import adjacent, opposite
 
 def taken(path: Path, protocol: object = None, **options: object) -> np.ndarray:
     source = SourceOptions(reference_frames="0", **options)  # type: ignore[arg-type]
-    frames = import_frames(path, ImportOptions(source=source), protocol or adjacent(16), None)  # type: ignore[arg-type]
+    reading = ImportOptions(source=source)
+    frames = import_frames(path, reading, protocol or adjacent(16), None)  # type: ignore[arg-type]
     return np.vstack([frames.reference_voltage_v, frames.voltage_v])
 
 
