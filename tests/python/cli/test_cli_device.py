@@ -286,7 +286,8 @@ def test_devices_asks_only_what_looks_like_a_board(
     assert by_path[path]["board"]["board"] == "simulated" and by_path[path]["why"] is None
     assert by_path["/dev/ttyS0"]["board"] is by_path["/dev/ttyS0"]["why"] is None
     assert "no such port" in by_path[str(tmp_path / "gone")]["why"]
-    assert set(listed["urls"]) == {"auto", "serial:PORT", "sim:SCENE", "emu:SCENE", "file:RUN.eits"}
+    urls = {"auto", "serial:PORT", "text:PORT", "sim:SCENE", "emu:SCENE", "file:RUN.eits"}
+    assert set(listed["urls"]) == urls
     assert f"serial:{path}  STM32 STLink, USB 0483:374b: simulated, firmware 0.1.0" in text
     assert "serial:/dev/ttyS0: no board's" in text
     assert quiet.count("a board's, not asked") == 2
