@@ -3,6 +3,8 @@
 root=$(CDPATH= cd -- "$(dirname -- "$0")/.." && pwd)
 venv=${EITSKIN_VENV:-$root/.venv}
 
+unset PYTHONDONTWRITEBYTECODE # what pip does not compile, Python keeps once it has
+
 say() { printf '%s\n' "== $*"; }
 
 # debian COMMAND-OR-FILE PACKAGE...: install the packages unless the first word is there; as root by apt, else say how.
