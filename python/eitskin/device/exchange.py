@@ -7,7 +7,6 @@ import random
 import time
 from collections import deque
 from dataclasses import replace
-from types import TracebackType
 from typing import TypeVar
 
 from eitskin.device.check import check_board, no_answer
@@ -93,12 +92,7 @@ class CommandExchange:
     def __enter__(self: Self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     @property

@@ -24,7 +24,7 @@ AS_IN = {
     "file": "file:RUN.eits",
     "text": "text:/dev/ttyACM0?layout=FILE",
 }
-SCHEMES = ("auto", "serial", "sim", "emu", "file", "text")
+SCHEMES = ("auto", *AS_IN)
 MAX_BAUD = 20_000_000
 
 
@@ -79,8 +79,7 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
             )
         raise UsageError(
             f"device {url!r}: {nearest(scheme, (*SCHEMES, *source_schemes()))}, as in auto,"
-            " serial:/dev/ttyACM0, sim:two_touch, emu:two_touch, file:RUN.eits,"
-            " text:/dev/ttyACM0?layout=FILE"
+            f" {', '.join(AS_IN.values())}"
         )
     if scheme == "auto":
         return SerialTransport(only_board().path)

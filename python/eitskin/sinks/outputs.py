@@ -9,7 +9,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint, entry_points
-from types import TracebackType
 from typing import Any
 
 from eitskin.config import nearest
@@ -77,12 +76,7 @@ class Outputs:
     def __enter__(self) -> Outputs:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def put(self, item: Frame | Notice) -> None:

@@ -34,7 +34,7 @@ class RecordingFile:
                 self._file: IO[bytes] = target.open("wb", buffering=0)
                 self.write(first)
             elif overwrite and target.exists():
-                self._file = self._replacing(target, first)
+                self._replace(target, first)
             else:
                 self._file = target.open("xb", buffering=0)
                 _locked(self._file)
@@ -47,7 +47,7 @@ class RecordingFile:
         self._synced = time.monotonic()
         self._syncing: threading.Thread | None = None
 
-    def _replacing(self, target: Path, first: bytes) -> IO[bytes]:
+    def _replace(self, target: Path, first: bytes) -> None:
         with target.open("rb") as old:
             if not _locked(old):
                 raise FileError(
@@ -63,7 +63,6 @@ class RecordingFile:
             self._file.close()
             Path(name).unlink(missing_ok=True)
             raise
-        return self._file
 
     def write(self, data: bytes) -> None:
         """Append ``data``.
