@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.device.settings import SolverSettings
-from eitskin.device.wire.link_table import Stream
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame, Notice
-from eitskin.live.session import KINDS, Session, SessionSettings
+from eitskin.live.session import Session, SessionSettings, kinds_of
 from eitskin.live.zones import load_zones
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_or_prebuilt
@@ -64,7 +63,7 @@ def stream(
         EitskinError: the board cannot be opened, set up or followed, or a sink not be opened.
     """
     settings = SessionSettings(
-        mode=_mode(mode),
+        mode=kinds_of(mode, "mode"),
         every=every,
         frames=frames,
         model=None if model is None else Path(model),
@@ -97,15 +96,6 @@ def _frames(session: Session, outputs: Outputs) -> Iterator[Frame]:
             notices.clear()
     finally:
         items.close()
-
-
-def _mode(text: str) -> Stream:
-    mode = Stream(0)
-    for kind in text.split(","):
-        if kind not in KINDS:
-            raise UsageError(f"mode {text!r}: use {', '.join(KINDS)}, or several of them")
-        mode |= Stream[kind.upper()]
-    return mode
 
 
 def _solver(named: dict[str, Any]) -> SolverSettings:

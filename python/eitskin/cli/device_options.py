@@ -25,7 +25,6 @@ DEVICE_HELP = (
     " file:RUN.eits (a recording); SCENE is a file or a scene of  eitskin scene list; after the"
     " last three, ?speed=1&loop=1"
 )
-KINDS = ("raw", "image", "touches", "events")
 TARE_FRAMES = 16
 
 
@@ -199,15 +198,9 @@ def read_mode(text: str) -> Stream:
     Raises:
         UsageError: one is unknown.
     """
-    from eitskin.config import nearest
-    from eitskin.device.wire.link_table import Stream
+    from eitskin.live.session import kinds_of
 
-    what = Stream(0)
-    for kind in text.split(","):
-        if kind not in KINDS:
-            raise UsageError(f"--mode {text}: {nearest(kind, KINDS)}")
-        what |= Stream[kind.upper()]
-    return what
+    return kinds_of(text, "--mode")
 
 
 def read_every(options: argparse.Namespace) -> tuple[int, int]:

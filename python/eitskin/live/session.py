@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from eitskin.config import nearest
 from eitskin.core.gestures import Zone
 from eitskin.device.bandwidth import carried_every
 from eitskin.device.client import Device
@@ -54,6 +55,20 @@ KINDS = ("raw", "image", "touches", "events")
 Item: TypeAlias = LiveFrame | Fault | LinkEvent
 Say: TypeAlias = Callable[[str], None]
 T = TypeVar("T")
+
+
+def kinds_of(text: str, name: str) -> Stream:
+    """The kinds in "raw,touches"; ``name`` is the option that gave them.
+
+    Raises:
+        UsageError: one is unknown.
+    """
+    what = Stream(0)
+    for kind in text.split(","):
+        if kind not in KINDS:
+            raise UsageError(f"{name} {text}: {nearest(kind, KINDS)}")
+        what |= Stream[kind.upper()]
+    return what
 
 
 @dataclass(frozen=True)
