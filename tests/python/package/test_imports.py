@@ -23,6 +23,7 @@ ORDER = (
     {"solve", "scene"},
     {"calibration"},
     {"device", "emulator"},  # emu: is opened by the one and speaks the other's link
+    {"teaching"},
     {"scoring"},
     {"tuning", "demo"},
     {"view"},

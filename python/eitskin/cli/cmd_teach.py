@@ -1,0 +1,22 @@
+"""``eitskin teach ACTION``: a model learned from presses at known places. One file an action beside
+this one, ``teach_ACTION``, with ``add_parser(actions)``."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+ACTIONS: tuple[str, ...] = ()
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``teach`` and its actions."""
+    parser = subparsers.add_parser(
+        "teach",
+        help="a model learned from presses at known places",
+        description="Learn a skin's model from presses at known places: no sign, gain, order of"
+        " channels or exact geometry is needed. docs/guide/teaching.md shows how.",
+    )
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    for name in ACTIONS:
+        importlib.import_module(f"eitskin.cli.teach_{name}").add_parser(actions)

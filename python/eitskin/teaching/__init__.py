@@ -1,0 +1,1 @@
+"""A model learned from presses at known places: their file, the fit, its report."""

@@ -1,0 +1,207 @@
+"""Presses at known places, and the .npz file that holds them (docs/reference/presses-format.md)."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import FrameError
+from eitskin.fileio import read_bytes, write_beside
+from eitskin.skin.protocol import Protocol, table
+
+FloatArray = npt.NDArray[np.float64]
+
+FORMAT, VERSION = "eitskin-presses", 1
+MAX_PRESSES = 20_000
+MAX_BYTES = 400_000_000  # unpacked
+MAX_TEXT = 1_000_000
+MAX_MM = 1e5
+ARRAYS = {"untouched": 2, "pressed": 2, "place_mm": 2, "drive_measure": 2}
+OPTIONAL = {"depth_mm": 1, "force_n": 1, "time_s": 1}
+WORDS = ("format", "version", "n_electrodes", "current_a", "skin")
+
+
+@dataclass(frozen=True, eq=False)
+class Presses:
+    """n presses of a scan of m rows.
+
+    ``untouched`` and ``pressed`` (n, m) V: the frame just before each press, and during it; any
+    other unit does as well. ``place_mm`` (n, 2) of the press's centre. ``depth_mm`` or ``force_n``
+    (n,), at least 0, NaN where a press has none; ``time_s`` (n,) from any start. ``skin``: the text
+    of the skin's description (TOML), empty where unknown.
+
+    Raises:
+        FrameError: a shape disagrees, there are no presses or too many, or a number cannot be.
+    """
+
+    protocol: Protocol
+    untouched: FloatArray
+    pressed: FloatArray
+    place_mm: FloatArray
+    depth_mm: FloatArray | None = None
+    force_n: FloatArray | None = None
+    time_s: FloatArray | None = None
+    skin: str = ""
+
+    def __post_init__(self) -> None:
+        count, rows = len(self.place_mm), self.protocol.n_rows
+        if not 1 <= count <= MAX_PRESSES:
+            raise FrameError(f"presses: {count} presses; record 1 to {MAX_PRESSES}")
+        wanted = {"untouched": (count, rows), "pressed": (count, rows), "place_mm": (count, 2)}
+        for name in (*wanted, *OPTIONAL):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            values, shape = np.array(given, dtype=np.float64), wanted.get(name, (count,))
+            if values.shape != shape:
+                raise FrameError(
+                    f"presses: {name} of shape {values.shape} for {count} places and a protocol of"
+                    f" {rows} rows; it must be {shape}"
+                )
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+        _refuse_numbers(self)
+
+    def __len__(self) -> int:
+        return len(self.place_mm)
+
+    @property
+    def difference(self) -> FloatArray:
+        """Pressed less untouched, (n, m) V."""
+        return np.asarray(self.pressed - self.untouched)
+
+    def take(self, which: npt.ArrayLike) -> Presses:
+        """Some of them, by number or by a mask (n,)."""
+        k = np.asarray(which)
+        parts: dict[str, Any] = {}
+        for name in ("untouched", "pressed", "place_mm", *OPTIONAL):
+            given = getattr(self, name)
+            parts[name] = None if given is None else given[k]
+        return replace(self, **parts)
+
+
+def _refuse_numbers(presses: Presses) -> None:
+    for name in ("untouched", "pressed"):
+        bad = np.flatnonzero(~np.isfinite(getattr(presses, name)).all(axis=1))
+        if len(bad):
+            raise FrameError(
+                f"presses: press {bad[0]} (from 0) has a number in {name} that is not finite, as"
+                f" {len(bad)} of {len(presses)} do; leave those presses out or record them again"
+            )
+    bad = np.flatnonzero(~(np.abs(presses.place_mm) <= MAX_MM).all(axis=1))
+    if len(bad):
+        raise FrameError(
+            f"presses: press {bad[0]} (from 0) has no place within {MAX_MM:g} mm; give it in mm"
+        )
+    for name in ("depth_mm", "force_n"):
+        given = getattr(presses, name)
+        if given is not None and not ((given >= 0) & (given <= 1e6) | np.isnan(given)).all():
+            raise FrameError(f"presses: {name} must be 0 to 1e6, or NaN where it is unknown")
+    if presses.time_s is not None and not np.isfinite(presses.time_s).all():
+        raise FrameError("presses: time_s has a number that is not finite; leave the array out")
+
+
+def joined(first: Presses, second: Presses) -> Presses:
+    """The presses of both, one after the other; what only one of them has becomes NaN, time goes.
+
+    Raises:
+        FrameError: their protocols differ.
+    """
+    if first.protocol.hash != second.protocol.hash:
+        raise FrameError("presses: made with different protocols; teach them apart")
+    optional: dict[str, Any] = {"time_s": None}
+    for name in ("depth_mm", "force_n"):
+        both = [(one, getattr(one, name)) for one in (first, second)]
+        if all(given is None for _, given in both):
+            continue
+        optional[name] = np.concatenate(
+            [np.full(len(one), np.nan) if given is None else given for one, given in both]
+        )
+    stacked: dict[str, Any] = {
+        name: np.concatenate([getattr(first, name), getattr(second, name)])
+        for name in ("untouched", "pressed", "place_mm")
+    }
+    return replace(first, **stacked, **optional)
+
+
+def save_presses(path: str | Path, presses: Presses) -> None:
+    """Write them to ``path``, whole or not at all.
+
+    Raises:
+        FileError: it cannot be written.
+    """
+    optional = {n: getattr(presses, n) for n in OPTIONAL if getattr(presses, n) is not None}
+    with write_beside(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(
+            stream, format=FORMAT, version=VERSION, n_electrodes=presses.protocol.n_electrodes,
+            current_a=presses.protocol.current_a, drive_measure=presses.protocol.drive_measure,
+            untouched=presses.untouched, pressed=presses.pressed, place_mm=presses.place_mm,
+            skin=presses.skin, **optional,
+        )  # fmt: skip
+
+
+def load_presses(path: str | Path) -> Presses:
+    """The presses in ``path``. A plain .npz with untouched, pressed, place_mm and drive_measure
+    does as well.
+
+    Raises:
+        FileError: it cannot be read.
+        FrameError, ProtocolError: it holds something else; the text names the file.
+    """
+    import io
+
+    content = read_bytes(path, "presses file")
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as packed:
+            size = sum(one.file_size for one in packed.infolist())
+        if size > MAX_BYTES:
+            raise FrameError(
+                f"{path}: {size / 1e6:.0f} MB unpacked, over {MAX_BYTES / 1e6:g}; split it"
+            )
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            found = {
+                name: np.asarray(arrays[name])
+                for name in (*ARRAYS, *OPTIONAL, *WORDS)
+                if name in arrays.files
+            }
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError):
+        raise FrameError(
+            f"{path}: this is no file of presses (.npz); record one with  eitskin teach record"
+        ) from None
+    try:
+        return _checked(found)
+    except FrameError as error:
+        raise FrameError(f"{path}: {error}") from None
+
+
+def _checked(found: dict[str, Any]) -> Presses:
+    absent = [name for name in ARRAYS if name not in found]
+    if absent:
+        raise FrameError(
+            f"presses: no array {absent[0]!r}; each press needs the untouched frame just before it,"
+            " the pressed one, its place_mm, and the file a drive_measure"
+            if absent[0] == "untouched"
+            else f"presses: no array {absent[0]!r}; see docs/reference/presses-format.md"
+        )
+    if str(found.get("format", FORMAT)) != FORMAT or found.get("version", VERSION) != VERSION:
+        raise FrameError("presses: a file of another kind or version; upgrade eitskin")
+    for name, axes in {**ARRAYS, **OPTIONAL}.items():
+        if name in found and (found[name].dtype.kind not in "iuf" or found[name].ndim != axes):
+            raise FrameError(f"presses: {name} must be numbers on {axes} axes")
+    drive_measure = found.pop("drive_measure")
+    if drive_measure.size == 0:
+        raise FrameError("presses: drive_measure has no rows; give [I+, I-, V+, V-] of each")
+    words = [found.pop(name, None) for name in ("n_electrodes", "current_a", "skin")]
+    count, current = (None if one is None or one.ndim else one for one in words[:2])
+    protocol = table(
+        int(drive_measure.max()) + 1 if count is None else int(count),
+        drive_measure,
+        1e-3 if current is None else float(current),
+    )
+    skin = "" if words[2] is None else str(words[2])[:MAX_TEXT]
+    return Presses(protocol, skin=skin, **{n: found[n] for n in found if n not in WORDS})

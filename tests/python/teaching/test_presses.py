@@ -1,0 +1,58 @@
+"""A file of presses gives back what was written, and what cannot be presses is refused in a line
+that says which press and what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.errors import FrameError
+from eitskin.skin.protocol import opposite
+from eitskin.teaching.presses import Presses, joined, load_presses, save_presses
+
+
+def some(count: int = 3) -> Presses:
+    draw, protocol = np.random.default_rng(1), opposite(8)
+    rows = (count, protocol.n_rows)
+    return Presses(
+        protocol, draw.normal(size=rows), draw.normal(size=rows), draw.normal(size=(count, 2))
+    )
+
+
+def test_a_file_gives_back_its_presses(tmp_path: Path) -> None:
+    whole = joined(some(), some(2))
+    save_presses(tmp_path / "a.npz", whole)
+    read = load_presses(tmp_path / "a.npz")
+    assert len(read) == 5 and read.protocol.hash == whole.protocol.hash
+    assert (read.pressed == whole.pressed).all() and (read.place_mm == whole.place_mm).all()
+    assert read.depth_mm is None and (read.take([1, 3]).untouched == whole.untouched[[1, 3]]).all()
+
+
+def test_what_cannot_be_presses_is_refused(tmp_path: Path) -> None:
+    arrays = {
+        "untouched": some().untouched,
+        "pressed": some().pressed,
+        "place_mm": some().place_mm,
+        "drive_measure": opposite(8).drive_measure,
+    }
+    holed = arrays["pressed"].copy()
+    holed[1, 4] = np.nan
+    for change, words in (
+        ({"untouched": None}, "just before it"),
+        ({"pressed": holed}, "press 1 .* leave those presses out"),
+        ({"place_mm": np.zeros((2, 2))}, "shape"),
+        ({"place_mm": np.full((3, 2), np.inf)}, "give it in mm"),
+        ({"depth_mm": np.full(3, -1.0)}, "depth_mm must be"),
+        ({"pressed": np.array(["a"])}, "must be numbers"),
+        ({"version": 9}, "upgrade"),
+    ):
+        path = tmp_path / "bad.npz"
+        kept = {name: one for name, one in {**arrays, **change}.items() if one is not None}
+        np.savez(path, **kept)
+        with pytest.raises(FrameError, match=words):
+            load_presses(path)
+    (tmp_path / "none.npz").write_bytes(b"PK no zip")
+    with pytest.raises(FrameError, match="no file of presses"):
+        load_presses(tmp_path / "none.npz")
