@@ -22,8 +22,9 @@ MAX_LISTED = 30
 
 MAX_TOML_BYTES = 1_000_000
 MAX_KEY_PARTS = 32  # the parser's time grows with the square of a key's parts
+# A part starts where a word starts: the time to look for deep keys grows with the text's length alone.
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
-DEEP_KEY = re.compile(rf"{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MAX_KEY_PARTS}}}")
+DEEP_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MAX_KEY_PARTS}}}")
 
 
 def load_toml(path: str | Path, what: str) -> dict[str, Any]:
