@@ -439,12 +439,10 @@ def test_options_of_the_demo(arguments: list[str], refused: Refused, tmp_path: P
     [
         ("scipy", "model", ["model", "build", "--paper", "-o", "OUT"]),
         ("netgen", "model", ["model", "build", "--paper", "-o", "OUT"]),
-        ("scipy", "model", ["compare", "--scenes", "2", "--train", "2", "--csv", "OUT"]),
         ("netgen", "model", ["compare", "--scenes", "2", "--train", "2", "--csv", "OUT"]),
         ("matplotlib", "plot", ["compare", "--scenes", "2", "--train", "2", "--picture", "PNG"]),
         ("matplotlib", "plot", ["reconstruct", "FRAMES", "-o", "OUT", "--picture", "PNG"]),
         ("matplotlib", "plot", ["demo", "--picture", "PNG"]),
-        ("scipy", "model", ["demo", "--picture", "PNG"]),
         ("netgen", "model", ["demo", "--picture", "PNG"]),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else value,

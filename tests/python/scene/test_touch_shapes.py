@@ -24,7 +24,6 @@ from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.runner import run_scene, simulate_frames
 from eitskin.scene.touch_shape import SHAPES, TouchShape, named_shape
 from eitskin.skin.skin import paper_skin
-from fresh_python import run_python
 
 
 @pytest.fixture(scope="module")
@@ -152,23 +151,6 @@ def test_contacts_change_after_the_tare_only_where_the_scene_says_so() -> None:
     first, second = (state.contacts.impedance_ohm_m2 for state in changes.states)
     assert np.array_equal(first, stays.states[0].contacts.impedance_ohm_m2)
     assert 0.05 < np.std(np.log(second / first)) < 0.9
-
-
-def test_shapes_are_imported_only_where_a_touch_names_one() -> None:
-    code = """
-import sys
-from pathlib import Path
-from eitskin.scene.description import scene_from_table
-from eitskin.scene.runner import run_scene
-shape = {"shape": "hertz"} if sys.argv[1:] else {}
-touch = {"x_mm": 0.0, "y_mm": 0.0, "radius_mm": 10.0, **shape}
-table = {"scene": {"elements": 400, "quiet_frames": 1}, "touch": [touch]}
-run_scene(scene_from_table(table, "probe", Path()))
-print("eitskin.scene.touch_shape" in sys.modules)
-"""
-    for arguments, imported in (((), "False"), (("hertz",), "True")):
-        done = run_python(code, *arguments)
-        assert done.stdout.strip() == imported, done.stderr
 
 
 def test_the_page_has_every_law_and_shape() -> None:
