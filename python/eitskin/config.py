@@ -22,7 +22,7 @@ MAX_LISTED = 30
 
 MAX_TOML_BYTES = 1_000_000
 MAX_KEY_PARTS = 32  # the parser's time grows with the square of a key's parts
-# A part starts where a word starts: the time to look for deep keys grows with the text's length alone.
+# A part starts where a word starts, so that the search's time grows with the text's length alone.
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 DEEP_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MAX_KEY_PARTS}}}")
 
