@@ -57,7 +57,8 @@ def test_constants_have_one_name_and_a_check_that_exists() -> None:
     assert len(set(names)) == len(names) > 100
     tests = [f"{path.stem[5:]}_f32" for path in (ROOT / "tests" / "c").glob("test_*.c")]
     tests += [f"fw_{path.stem[5:]}" for path in (ROOT / "tests" / "firmware").glob("test_*.c")]
-    benches = (ROOT / "python/eitskin_studies/cli/cmd_bench.py").read_text(encoding="utf-8")
+    files = (ROOT / "python/eitskin_studies/cli").glob("bench_*.py")
+    benches = "".join(path.read_text(encoding="utf-8") for path in files)
     for group in groups:
         words = shlex.split(group["check"])
         if words[0] == "ctest":

@@ -1,0 +1,125 @@
+"""``eitskin bench``: the emulated board, the live page and the sinks behind them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from eitskin.cli.arguments import option
+from eitskin.errors import UsageError
+from eitskin_studies.cli.bench_shared import add_page_option, check_within, progress_bar, show
+
+
+def add_board(what: Any) -> None:
+    """``bench board``."""
+    parser = what.add_parser(
+        "board",
+        help=(
+            "a frame on the emulated board: exact instructions, memory, frame rate; needs a"
+            " checkout"
+        ),
+        description=(
+            "Build the Cortex-M7 program and both firmware images from the source checkout, run"
+            " random scenes under QEMU in every storage with the M7's kernels and with plain C, and"
+            " the firmware itself on the emulated NUCLEO-F767ZI."
+        ),
+    )
+    option(parser, "--scenes", "random scenes", default=60)
+    option(parser, "--seed", "of the scenes", default=1)
+    option(parser, "--frames", "on the emulated NUCLEO, 0 for none", default=8)
+    option(parser, "--build DIR", "keep the build there, or take up an earlier one", Path)
+    add_page_option(parser, "board-cost")
+    parser.set_defaults(run=run_board)
+
+
+def run_board(options: argparse.Namespace) -> int:
+    """Count what a frame costs on the emulated board."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import board as bench_board
+
+    check_within("--scenes", options.scenes, 1, 2000)
+    check_within("--seed", options.seed, 0, 2**31)
+    if options.frames:
+        check_within("--frames", options.frames, 2, 1000)
+    refuse_unwritable(options.page)
+    result = bench_board.run(
+        options.scenes,
+        options.seed,
+        frames=options.frames,
+        build=options.build,
+        progress=progress_bar,
+    )
+    command = (
+        f"eitskin bench board --scenes {options.scenes} --seed {options.seed} --frames"
+        f" {options.frames}"
+    )
+    filling = bench_board.for_page(result, command)
+    return show(options, result, bench_board.as_text(result), filling, "board-cost")
+
+
+def add_view(what: Any) -> None:
+    """``bench view``."""
+    parser = what.add_parser(
+        "view", help="the live page: the server's share of a core, frame to pixel in Chromium"
+    )
+    option(parser, "--seconds", "for each number of pages", default=30.0)
+    option(parser, "--load", "eight pages only, and six sinks beside")
+    add_page_option(parser, "live-view")
+    parser.set_defaults(run=run_view)
+
+
+def run_view(options: argparse.Namespace) -> int:
+    """Look at the live page, once, and with several pages at a time."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import live_view
+
+    check_within("--seconds", options.seconds, 1, 3600)
+    refuse_unwritable(options.page)
+    command = f"eitskin bench view --seconds {options.seconds:g}" + " --load" * options.load
+    result = live_view.run(
+        options.seconds,
+        live_view.PAGES[-1:] if options.load else live_view.PAGES,
+        progress=lambda text: print(text, file=sys.stderr),
+        sinks=options.load,
+    )
+    filling = live_view.for_page(result, command, "load" if options.load else "view")
+    return show(options, result, live_view.as_text(result), filling, "live-view")
+
+
+def add_outputs(what: Any) -> None:
+    """``bench outputs``."""
+    parser = what.add_parser(
+        "outputs",
+        help="from a contact to the UDP packet and the TUIO message; load of six sinks",
+        description=(
+            "Tap an emulated board's skin, and say how long each contact takes through scan, solve,"
+            " link, host and sink; then stream to six sinks at once."
+        ),
+    )
+    option(parser, "--taps", "of the emulated board; about 4 s each", default=24)
+    option(parser, "--seconds", "of each sink alone", default=20.0)
+    option(parser, "--load", "seconds of six sinks at once, 0 for none", default=20.0)
+    option(parser, "--seed", "of contacts and noise", default=1)
+    add_page_option(parser)
+    parser.set_defaults(run=run_outputs)
+
+
+def run_outputs(options: argparse.Namespace) -> int:
+    """Time contacts, and load sinks."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import outputs as bench_outputs
+
+    check_within("--taps", options.taps, 1, 1000)
+    for name, value in (("--seconds", options.seconds), ("--load", options.load)):
+        if not 0 <= value <= 86_400:
+            raise UsageError(f"{name} {value:g} is out of range; use 0 to 86400")
+    refuse_unwritable(options.page)
+    result = bench_outputs.run(options.taps, options.seconds, options.load, options.seed)
+    command = (
+        f"eitskin bench outputs --taps {options.taps} --seconds {options.seconds:g} --load"
+        f" {options.load:g} --seed {options.seed}"
+    )
+    filling = bench_outputs.for_page(result, command)
+    return show(options, result, bench_outputs.as_text(result), filling)

@@ -1,0 +1,160 @@
+"""``eitskin bench``: what is counted rightly: diagnostics, gestures, touches in other worlds."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from eitskin.cli.arguments import option
+from eitskin.errors import UsageError
+from eitskin_studies.cli.bench_shared import add_page_option, check_within, progress_bar, show
+
+
+def add_diagnostics(what: Any) -> None:
+    """``bench diagnostics``."""
+    parser = what.add_parser(
+        "diagnostics",
+        help="how often faults are called by their name, and what they cost the image",
+        description=(
+            "Spoil frames of random scenes in every way that docs/reference/diagnostics.md names,"
+            " count how often that is said in that very frame, and compare the image with that of"
+            " the same frame without the fault; some five minutes."
+        ),
+    )
+    option(parser, "--scenes", "that every fault is put on", default=640)
+    option(parser, "--crowds", "scenes of each number of touches", default=24)
+    option(parser, "--imperfect", "scenes of each front end", default=40)
+    option(parser, "--seed", "of scenes and noise", default=4001)
+    add_page_option(parser, "diagnostics")
+    parser.set_defaults(run=run_diagnostics)
+
+
+def run_diagnostics(options: argparse.Namespace) -> int:
+    """Count how often faults are named, and what they cost."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import diagnostics as bench_diagnostics
+    from eitskin_studies.benchmarks import diagnostics_page as bench_diagnostics_page
+
+    check_within("--scenes", options.scenes, 2, 100_000)
+    check_within("--crowds", options.crowds, 2, 10_000)
+    check_within("--imperfect", options.imperfect, 1, 10_000)
+    check_within("--seed", options.seed, 0, 2**31 - 1)
+    refuse_unwritable(options.page)
+    result = bench_diagnostics.run(
+        options.seed, options.scenes, options.crowds, options.imperfect, progress=progress_bar
+    )
+    sizes = f"--scenes {options.scenes} --crowds {options.crowds} --imperfect {options.imperfect}"
+    command = f"eitskin bench diagnostics {sizes} --seed {options.seed}"
+    filling = bench_diagnostics_page.for_page(result, command)
+    text = bench_diagnostics_page.as_text(result)
+    return show(options, result, text, filling, "diagnostics")
+
+
+def add_gestures(what: Any) -> None:
+    """``bench gestures``."""
+    parser = what.add_parser(
+        "gestures",
+        help="gestures of simulated fingers: how many are told rightly, and how late",
+        description=(
+            "Draw sessions of taps, holds, swipes, pinches, spreads, turns, drags and presses,"
+            " simulate a board that scans meanwhile, and judge what the C core tells."
+        ),
+    )
+    option(parser, "--sessions", "of 27 each", default=60)
+    option(parser, "--seed", "of all that is random", default=7001)
+    option(
+        parser,
+        "--role",
+        "which sessions: to choose by, or to judge by",
+        choices=("tuning", "judging"),
+        default="judging",
+    )
+    option(parser, "--snr-db DB", None, float, nargs="+", default=[60.0, 40.0])
+    option(parser, "--cache DIR", "keeps the simulated frames", Path)
+    add_page_option(parser, "gestures")
+    parser.set_defaults(run=run_gestures)
+
+
+def run_gestures(options: argparse.Namespace) -> int:
+    """Judge gestures."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.gestures import bench as bench_gestures
+
+    check_within("--sessions", options.sessions, 1, 10_000)
+    check_within("--seed", options.seed, 0, 2**31 - 1)
+    for snr_db in options.snr_db:
+        if not 0 <= snr_db <= 200:
+            raise UsageError(f"bench: --snr-db {snr_db:g} is out of range; use 0 to 200")
+    refuse_unwritable(options.page)
+    how = bench_gestures.Settings(
+        options.sessions, options.seed, options.role, tuple(options.snr_db), options.cache
+    )
+    result = bench_gestures.run(how, progress_bar)
+    command = (
+        f"eitskin bench gestures --sessions {options.sessions} --seed {options.seed} --role"
+        f" {options.role} --snr-db {' '.join(f'{snr:g}' for snr in options.snr_db)}"
+    )
+    filling = bench_gestures.for_page(result, command)
+    return show(options, result, bench_gestures.as_text(result), filling, "gestures")
+
+
+def add_worlds(what: Any) -> None:
+    """``bench worlds``."""
+    parser = what.add_parser(
+        "worlds",
+        help="touches counted in worlds that the model does not share",
+        description=(
+            "Simulate sets of scenes on another mesh, with touches, sheets, electrodes and drifts"
+            " that the model knows nothing of, and count the touches that the C core finds."
+        ),
+    )
+    option(parser, "--scenes", "of each set", default=100)
+    option(parser, "--seed", "of all that is random", default=1)
+    option(
+        parser,
+        "--family",
+        "which scenes: to choose by, or to judge by",
+        choices=("tuning", "judging"),
+        default="tuning",
+    )
+    option(
+        parser, "--sets NAME,...", "these alone; no_touch* names all that begin so (default: all)"
+    )
+    option(parser, "--snr-db DB", "instead of each set's own", float)
+    option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
+    option(parser, "--option NAME=VALUE", "an option of the core; may be repeated", action="append")
+    option(parser, "--cache DIR", "keeps the simulated frames", Path)
+    option(parser, "--list", "name the sets")
+    option(parser, "--json")
+    parser.set_defaults(run=run_worlds)
+
+
+def run_worlds(options: argparse.Namespace) -> int:
+    """Count touches in other worlds."""
+    from eitskin_studies.benchmarks import worlds as bench_worlds
+    from eitskin_studies.cli.cmd_compare import progress
+    from eitskin_studies.worlds.score import as_text
+
+    if options.list:
+        print(bench_worlds.listed())
+        return 0
+    check_within("--scenes", options.scenes, 1, 100_000)
+    check_within("--seed", options.seed, 0, 2**31 - 1)
+    scores = bench_worlds.run(
+        bench_worlds.Settings(
+            options.scenes,
+            options.seed,
+            options.family,
+            bench_worlds.chosen_sets(options.sets),
+            options.snr_db,
+            options.model,
+            tuple(options.option or ()),
+            options.cache,
+        ),
+        progress,
+    )
+    text = as_text(scores)
+    print(json.dumps([one.as_dict() for one in scores], indent=2) if options.json else text)
+    return 0

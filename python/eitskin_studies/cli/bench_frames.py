@@ -1,0 +1,169 @@
+"""``eitskin bench``: a frame, the solve, batches, kernels and growth on this computer."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from eitskin.cli.arguments import option
+from eitskin.errors import UsageError
+from eitskin_studies.cli.bench_shared import add_page_option, check_within, progress_bar, show
+
+
+def add_frame(what: Any) -> None:
+    """``bench frame``."""
+    parser = what.add_parser(
+        "frame", help="one frame through cffi: p50, p99, share outside C, beside numpy"
+    )
+    option(parser, "--runs", default=2000)
+    option(parser, "--json")
+    parser.set_defaults(run=run_frame)
+
+
+def run_frame(options: argparse.Namespace) -> int:
+    """Time a frame."""
+    from eitskin_studies.benchmarks import frame as bench_frame
+
+    if not 100 <= options.runs <= 10_000_000:
+        raise UsageError(f"bench frame: --runs {options.runs} is out of range; use 100 to 10000000")
+    times = bench_frame.run(options.runs)
+    print(json.dumps(times.as_dict(), indent=2) if options.json else bench_frame.to_text(times))
+    return 0
+
+
+def add_solve(what: Any) -> None:
+    """``bench solve``."""
+    parser = what.add_parser(
+        "solve", help="the solve alone: time to a suboptimality, beside other solvers"
+    )
+    option(parser, "--scenes", "problems of each model", default=20)
+    option(parser, "--seed", "of the scenes", default=3)
+    option(parser, "--rounds", "interleaved rounds", default=11)
+    option(parser, "--picture PNG", "draw suboptimality against MIoU instead", Path)
+    option(parser, "--json")
+    parser.set_defaults(run=run_solve)
+
+
+def run_solve(options: argparse.Namespace) -> int:
+    """Time the solvers, or draw what their suboptimality means for images."""
+    from eitskin.fileio import refuse_unwritable
+
+    check_within("--scenes", options.scenes, 4, 1000)
+    check_within("--seed", options.seed, 0, 2**31 - 1)
+    check_within("--rounds", options.rounds, 3, 10_000)
+    refuse_unwritable(options.picture)
+    if options.picture is not None:
+        from eitskin_studies.benchmarks import suboptimality
+        from eitskin_studies.pictures.suboptimality_picture import draw
+
+        curves = suboptimality.run(options.scenes, options.seed, progress_bar)
+        draw(options.picture, curves)
+        print(
+            json.dumps(curves.as_dict(), indent=2) if options.json else suboptimality.text(curves)
+        )
+        return 0
+    from eitskin_studies.benchmarks import solve as bench_solve
+
+    result = bench_solve.run(options.scenes, options.seed, options.rounds, progress_bar)
+    print(json.dumps(result, indent=2) if options.json else bench_solve.text(result))
+    return 0
+
+
+def add_batches(what: Any) -> None:
+    """``bench batches``."""
+    parser = what.add_parser(
+        "batches", help="batches of frames over threads, beside one after another"
+    )
+    option(parser, "--frames", default=1000)
+    option(parser, "--rounds", default=9)
+    option(parser, "--threads N", None, int, nargs="+", default=[1, 2])
+    add_page_option(parser)
+    parser.set_defaults(run=run_batches)
+
+
+def run_batches(options: argparse.Namespace) -> int:
+    """Time batches over threads."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.solve.batch import check_threads
+    from eitskin_studies.benchmarks import batches as bench_batches
+
+    check_within("--frames", options.frames, 8, 1_000_000)
+    check_within("--rounds", options.rounds, 1, 1000)
+    for count in options.threads:
+        check_threads(count)
+    refuse_unwritable(options.page)
+    result = bench_batches.run(options.frames, options.rounds, options.threads)
+    command = f"eitskin bench batches --frames {options.frames} --rounds {options.rounds}"
+    filling = bench_batches.for_page(result, command)
+    return show(options, result, bench_batches.as_text(result), filling)
+
+
+def add_kernels(what: Any) -> None:
+    """``bench kernels``."""
+    parser = what.add_parser(
+        "kernels",
+        help="each C kernel beside the machine's measured peaks; needs a checkout",
+        description=(
+            "Build a C program from the source checkout that times every kernel beside this"
+            " machine's peaks of memory and arithmetic, in turns, and say how far from its limit"
+            " each is."
+        ),
+    )
+    option(parser, "--rank", "numbers of a column", default=64)
+    option(parser, "--columns", default=812)
+    option(parser, "--rounds", default=41)
+    add_page_option(parser)
+    parser.set_defaults(run=run_kernels)
+
+
+def run_kernels(options: argparse.Namespace) -> int:
+    """Time each kernel beside the machine's peaks."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import kernels as bench_kernels
+
+    check_within("--rank", options.rank, 8, 1024)
+    check_within("--columns", options.columns, 48, 20_000)
+    check_within("--rounds", options.rounds, 1, 200)
+    refuse_unwritable(options.page)
+    result = bench_kernels.run(options.rank, options.columns, options.rounds)
+    command = (
+        f"eitskin bench kernels --rank {options.rank} --columns {options.columns} --rounds"
+        f" {options.rounds}"
+    )
+    filling = bench_kernels.for_page(result, command)
+    return show(options, result, bench_kernels.as_text(result), filling)
+
+
+def add_growth(what: Any) -> None:
+    """``bench growth``."""
+    parser = what.add_parser(
+        "growth", help="a frame's time and MACs against pixels, rows, rank, touches and electrodes"
+    )
+    option(parser, "--rounds", default=15)
+    option(parser, "--cache DIR", "keeps the models (default: beside other temporary files)", Path)
+    option(parser, "--picture PNG", "draw it", Path)
+    add_page_option(parser)
+    parser.set_defaults(run=run_growth)
+
+
+def run_growth(options: argparse.Namespace) -> int:
+    """Time frames of growing models."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import growth as bench_growth
+
+    check_within("--rounds", options.rounds, 1, 1000)
+    refuse_unwritable(options.page, options.picture)
+    if options.picture is not None:
+        from eitskin.view.sheets import check_picture
+
+        check_picture(options.picture)
+    result = bench_growth.run(options.rounds, options.cache, progress=progress_bar)
+    if options.picture is not None:
+        from eitskin_studies.pictures.growth_picture import draw_growth
+
+        draw_growth(options.picture, result)
+    command = f"eitskin bench growth --rounds {options.rounds}"
+    filling = bench_growth.for_page(result, command)
+    return show(options, result, bench_growth.as_text(result), filling)
