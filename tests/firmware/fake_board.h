@@ -12,14 +12,15 @@
 
 #include <setjmp.h>
 
-enum {
-    FAKE_SPI_LOG = 64,
-    FAKE_EVENTS = 256,
-    FAKE_WIRE = 1 << 20,
-    FAKE_BANK = 128 * 1024,
-    FAKE_WORKSPACE = 192 * 1024,
-    FAKE_ROWS = 4096
-};
+/* The fuzzer has its own: it copies a whole board before each input. */
+#ifndef FAKE_BANK
+#define FAKE_WIRE      (1 << 20)
+#define FAKE_BANK      (128 * 1024)
+#define FAKE_WORKSPACE (192 * 1024)
+#define FAKE_ROWS      4096
+#endif
+
+enum { FAKE_SPI_LOG = 64, FAKE_EVENTS = 256 };
 
 typedef enum fake_kind { FAKE_SPI, FAKE_LINES } fake_kind;
 
@@ -86,14 +87,14 @@ typedef struct fake_board {
     fw_status erase_status, program_status;
     uint32_t erases, rewrites; /* rewrites: a bit was to be programmed from 0 to 1 */
 
-    /* link */
-    uint8_t to_board[FAKE_WIRE], to_host[FAKE_WIRE];
+    uint32_t feeds, resets, leds;
+    _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
+
+    /* link; the bytes under way last, so that a copy may leave them out */
     size_t to_board_size, to_board_at, to_host_size;
     size_t host_room; /* bytes that the link still takes; SIZE_MAX: any */
     bool ended;
-
-    uint32_t feeds, resets, leds;
-    _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
+    uint8_t to_board[FAKE_WIRE], to_host[FAKE_WIRE];
 } fake_board;
 
 /* Erased, at time start_us, with no voltage. */

@@ -111,17 +111,85 @@ static void scripts(void)
     }
 }
 
+/* Of the board: every command as usual and with an odd field; every model uploaded, also with the
+ * power gone at some write; every fault in a running stream. */
+static void boards(void)
+{
+    for (unsigned k = 0; k < 12 * 14; ++k) { /* 0, 1 and the greatest in every field */
+        const uint8_t type = (uint8_t)(1 + k / 14), at = (uint8_t)(4 + 2 * (k % 14));
+        const uint8_t field[] = {2, 0, type, 1,  at, 0,    0, 3,  20, 0, type, 1, at,
+                                 0, 1, 3,    20, 0,  type, 1, at, 0,  8, 3,    20};
+        keep("field", k, field, sizeof field);
+    }
+    /* 1 kHz in 1000 samples: more current than is safe */
+    const uint8_t slow[] = {2, 0,  3, 2,   4,    1, 200, 0x40, 0x42, 0x0F,
+                            0, 12, 0, 200, 0xE8, 3, 0,   0,    3,    9};
+    keep("slow", 0, slow, sizeof slow);
+    for (unsigned k = 0; k < 20; ++k) {
+        const uint8_t odd[] = {3, 0, (uint8_t)k, 0,          3, 20, 0, (uint8_t)k, 1, 4,
+                               1, 6, 0,          (uint8_t)k, 1, 8,  0, 12,         3, 60};
+        keep("command", k, odd, sizeof odd);
+        const uint8_t fault[] = {
+            (uint8_t)(2 + k % 2), 6, (uint8_t)(k + 48 * (k / 12)), 5, 3, 80, 0, 3, 0, 3, 90};
+        keep("fault", k, fault, sizeof fault);
+        const uint8_t model = (uint8_t)(k % 6 + 6 * (k / 6));
+        const uint8_t upload[] = {(uint8_t)(k % 4),
+                                  5,
+                                  model,
+                                  2,
+                                  4,
+                                  2,
+                                  1,
+                                  9,
+                                  1,
+                                  9,
+                                  1,
+                                  3,
+                                  0,
+                                  0,
+                                  0,
+                                  2,
+                                  0,
+                                  3,
+                                  60,
+                                  0,
+                                  1,
+                                  0,
+                                  7,
+                                  40,
+                                  150,
+                                  3,
+                                  60};
+        keep("upload", k, upload, sizeof upload);
+        const uint8_t cut[] = {(uint8_t)(k % 4),
+                               6,
+                               (uint8_t)(k % 2 ? 47 : 23),
+                               (uint8_t)(k * 8),
+                               5,
+                               (uint8_t)(k % 6),
+                               1,
+                               3,
+                               60,
+                               5,
+                               1,
+                               1,
+                               3,
+                               20};
+        keep("cut", k, cut, sizeof cut);
+    }
+}
+
 int main(int argc, char **argv)
 {
     static const struct {
         const char *target;
         void (*write)(void);
-    } all[] = {{"model", models}, {"link", packets}, {"frame", scripts}};
+    } all[] = {{"model", models}, {"link", packets}, {"frame", scripts}, {"board", boards}};
     folder = argc == 3 ? argv[2] : ".";
     for (size_t k = 0; argc == 3 && k < sizeof all / sizeof all[0]; ++k) {
         if (strcmp(argv[1], all[k].target) == 0)
             return all[k].write(), 0;
     }
-    fprintf(stderr, "seeds model|link|frame FOLDER\n");
+    fprintf(stderr, "seeds model|link|frame|board FOLDER\n");
     return 2;
 }
