@@ -1,6 +1,7 @@
 """Put small mistakes into the sources, one at a time, and see whether the tests notice.
 
-    python tests/tools/mutate.py [--sample COUNT] [--python COUNT] [--only WORD] [--workers COUNT]
+    python tests/tools/mutate.py [--sample COUNT] [--python COUNT] [--only WORD] [--seed WORD]
+        [--workers COUNT]
 
 Mistakes are made from the syntax (mutants.py): of all of them a sample, the same in every run, over
 the core and the firmware (tried by the C tests) and over the Python package (by the tests that call
@@ -14,6 +15,7 @@ more.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import math
 import sys
 import tempfile
@@ -47,10 +49,13 @@ class Outcome:
     noticed: str
 
 
-def all_mutants(files: Iterable[str], only: str) -> list[Mutant]:
-    """Of these sources, in the order in which samples take them."""
+def all_mutants(files: Iterable[str], only: str, seed: str) -> list[Mutant]:
+    """Of these sources, in the order in which samples take them: another one for each seed."""
     found = [mutant for file in files for mutant in mutants_of(file)]
-    return sorted((m for m in found if only in f"{m}"), key=lambda mutant: mutant.place)
+    return sorted(
+        (m for m in found if only in f"{m}"),
+        key=lambda m: hashlib.sha256((seed + m.place).encode()).digest() if seed else m.place,
+    )
 
 
 def read_judged() -> set[tuple[str, str, str, str]]:
@@ -156,11 +161,13 @@ def main() -> int:
     parser.add_argument("--sample", metavar="COUNT", type=int, default=200, help="mutants of C")
     parser.add_argument("--python", metavar="COUNT", type=int, default=40, help="and of Python")
     parser.add_argument("--only", metavar="WORD", default="", help="those whose text has this")
+    parser.add_argument("--seed", metavar="WORD", default="", help="another sample")
     parser.add_argument("--workers", metavar="COUNT", type=int, default=2)
     options = parser.parse_args()
     judged = read_judged()
     in_c, in_python = (
-        all_mutants(files, options.only) for files in (mutate_c.sources(), mutate_python.sources())
+        all_mutants(files, options.only, options.seed)
+        for files in (mutate_c.sources(), mutate_python.sources())
     )
     stale = judged - {mutant.key for mutant in (*in_c, *in_python)} if not options.only else set()
     for key in sorted(stale):

@@ -6,7 +6,6 @@ from __future__ import annotations
 import zlib
 
 import numpy as np
-import pytest
 
 from eitskin.device.client import Device
 from eitskin.device.wire import link_table as commands
@@ -44,62 +43,6 @@ def test_a_model_over_the_wire(image: bytes) -> None:
     again = restarted(device)
     assert (again.board.model_crc, again.board.bank) == (zlib.crc32(model), 1)
     clean(board)
-
-
-class PowerLost(Exception):
-    """Noticed by the host at once, to spare the test the host's patience."""
-
-
-def upload_until(device: Device, model: bytes, words: int) -> None:
-    """Upload until so many words have been programmed; then the power goes."""
-    board, transport = board_of(device), device.transport
-    last, read = board.flash.words_programmed + words, transport.read
-
-    def watched() -> None:
-        if board.flash.words_programmed == last:
-            board.lose_power()
-
-    def read_while_there_is_power(timeout_s: float) -> bytes:
-        data = read(min(timeout_s, 0.05))
-        if board.flash.words_programmed >= last:
-            raise PowerLost
-        return data
-
-    board.flash.word_programmed = watched
-    transport.read = read_while_there_is_power  # type: ignore[method-assign]
-    with pytest.raises(PowerLost):
-        device.upload_model(model)
-    board.flash.word_programmed = lambda: None
-    assert board.flash.words_programmed == last
-
-
-def test_an_upload_cut_at_any_word_leaves_the_old_model(image: bytes) -> None:
-    """Power goes during the erase, in the middle, at the last word of the model and in each word of
-    the record but its last."""
-    model, (_, old) = small_blob(), load_prebuilt()
-    total = -(-len(model) // 4) + 8
-    chosen = np.random.default_rng(4).integers(2, total - 8, 3).tolist()
-    board = power_up(image)
-    for words in (1, *chosen, total - 8, total - 7, total - 4, total - 1):
-        device = connect(board)
-        assert device.board.model_crc == zlib.crc32(old)
-        upload_until(device, model, words)
-        board.run_until(board.clock.now + TICKS_PER_US)
-    device = connect(board)
-    assert device.board.model_crc == zlib.crc32(old)
-    assert device.upload_model(model).model_crc == zlib.crc32(model)
-    assert board.flash.not_erased == 0
-
-
-def test_power_lost_while_erasing(image: bytes) -> None:
-    board = power_up(image)
-    device = connect(board)
-    model = small_blob()
-    request = commands.ModelBegin(len(model), zlib.crc32(model)).payload(77)
-    device.link.send(commands.ModelBegin.TYPE, request)
-    board.run_until(board.clock.now + 2 * TICKS_PER_S, lambda: board.flash.sectors_erased == 1)
-    board.lose_power()
-    assert connect(board).board.model_crc == zlib.crc32(load_prebuilt()[1])
 
 
 def test_a_wrong_checksum_is_refused_and_the_old_model_stays(image: bytes) -> None:
