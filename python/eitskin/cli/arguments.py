@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from eitskin.errors import UsageError
+
+MAX_RING_OHM = 1e7
+
 
 def option(
     parser: Any,
@@ -34,3 +38,15 @@ def option(
         said = f"default: %(default){'g' if isinstance(default, float) else 's'}"
         text = f"{text} ({said})" if text else said
     parser.add_argument(*listed, type=kind, default=default, help=text, **more)
+
+
+def check_ring(resistance_ohm: float) -> None:
+    """Check what ``--resistor-ring`` says.
+
+    Raises:
+        UsageError: no resistor has that resistance.
+    """
+    if not 0 < resistance_ohm <= MAX_RING_OHM:
+        raise UsageError(
+            f"--resistor-ring {resistance_ohm:g} is out of range; use ohms up to {MAX_RING_OHM:g}"
+        )

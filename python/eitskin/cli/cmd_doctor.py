@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import check_ring, option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.cli.import_options import (
     add_import_options,
@@ -60,6 +60,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             " negative"
         ),
     )
+    option(
+        parser,
+        "--resistor-ring OHM",
+        "a ring of equal resistors between neighbouring electrodes stands in for the skin",
+        float,
+    )
     option(parser, "--touch-in FRAME", "the frame with these touches; else the largest change")
     add_import_options(parser)
     parser.set_defaults(run=run)
@@ -72,6 +78,13 @@ def run(options: argparse.Namespace) -> int:
 
     if (options.source is None) == (options.device is None):
         raise UsageError("doctor: name frames to examine, or a board: --device URL")
+    ring_ohm = options.resistor_ring
+    if ring_ohm is not None:
+        check_ring(ring_ohm)
+        if options.touch or options.skin is not None:
+            raise UsageError(
+                "--resistor-ring: a ring stands in for the skin; leave --skin and --touch out"
+            )
     if options.picture is not None:
         from eitskin.view.sheets import check_picture
 
@@ -85,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
     )
     if options.touch:
         subject = _with_touches(subject, options.touch, options.touch_in)
-    report, case = examine_case(subject)
+    report, case = examine_case(_with_ring(subject, ring_ohm))
     if options.save_layout is not None:
         repaired = _repaired(options, report.repair)
         named = read_options(repaired)
@@ -125,7 +138,7 @@ def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
         subject = board_subject(device, found, known, skin)
     if options.touch:
         subject = _with_touches(subject, options.touch, options.touch_in)
-    report, case = examine_case(subject)
+    report, case = examine_case(_with_ring(subject, options.resistor_ring))
     return _tell(options, board_findings(report, found), case)
 
 
@@ -139,6 +152,15 @@ def _tell(options: argparse.Namespace, report: Report, case: Case) -> int:
     else:
         print("\n".join(report.lines()))
     return report.exit_code
+
+
+def _with_ring(subject: Subject, ring_ohm: float | None) -> Subject:
+    if ring_ohm is None:
+        return subject
+    from eitskin.frames.homogeneous import resistor_ring
+
+    n_electrodes = subject.readings[0][1].protocol.n_electrodes
+    return replace(subject, skin=None, stand_in=resistor_ring(n_electrodes, ring_ohm))
 
 
 def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subject:

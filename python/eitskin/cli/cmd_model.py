@@ -1,4 +1,4 @@
-"""``eitskin model build | info | verify | upload``."""
+"""``eitskin model build | voltages | info | verify | upload``."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import check_ring, option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.errors import UsageError, VerificationError
 
 if TYPE_CHECKING:
     from eitskin.model.model import Model
+    from eitskin.skin.protocol import Protocol
+    from eitskin.skin.skin import Skin
 
 NUMPY_BOUND = 1e-4
 
@@ -55,6 +57,21 @@ def add_parser(subparsers: Any) -> None:
     )
     option(build, "--json")
     build.set_defaults(run=run_build)
+    voltages = actions.add_parser(
+        "voltages",
+        help="the boundary voltages to expect of each row, and the current and gain that suit",
+        description=(
+            "Print the voltage of each row of the untouched skin, or of a ring of equal resistors"
+            " in its place, and say whether the instrument's current and gain suit."
+        ),
+    )
+    option(voltages, "skin SKIN.toml", "skin description", Path, nargs="?")
+    option(voltages, "--paper", "the paper's 194 mm disk instead of a file")
+    option(
+        voltages, "--resistor-ring OHM", "between neighbouring electrodes, in place of it", float
+    )
+    option(voltages, "--json")
+    voltages.set_defaults(run=run_voltages)
     info = actions.add_parser("info", help="what is in a model")
     option(info, "model MODEL.eitm", "default: the prebuilt one", Path, nargs="?")
     option(info, "--json")
@@ -83,13 +100,12 @@ def run_build(options: argparse.Namespace) -> int:
     """Build and write a model."""
     from eitskin.cli.progress import bar
     from eitskin.fileio import refuse_unwritable
+    from eitskin.frames.front_end import advice, demand_of
+    from eitskin.frames.homogeneous_fem import transfer_by_elements
     from eitskin.model.build import BuildSettings, build_model
     from eitskin.model.eitm import save_model
-    from eitskin.skin.protocol import adjacent
-    from eitskin.skin.skin import load_skin, paper_skin
 
-    if (options.skin is None) == (not options.paper):
-        raise UsageError("model build: name a SKIN.toml, or give --paper: one of the two")
+    skin, protocol = _skin_of(options)
     refuse_unwritable(options.output)
     if not 100 <= options.elements <= 500_000:
         raise UsageError(
@@ -99,7 +115,6 @@ def run_build(options: argparse.Namespace) -> int:
         raise UsageError(
             f"model build: --touch-change {options.touch_change:g} is out of range; use 0 to 100"
         )
-    skin, protocol = (paper_skin(), adjacent(16)) if options.paper else load_skin(options.skin)
     settings = BuildSettings(
         rank=options.rank or 0,
         pixels_across=options.pixels,
@@ -113,6 +128,48 @@ def run_build(options: argparse.Namespace) -> int:
     model = build_model(skin, protocol, settings, progress=bar("random skins"))
     size = save_model(options.output, model)
     _print_info(model, size, str(options.output), options.json)
+    if not options.json:
+        print("\n".join(advice(demand_of(transfer_by_elements(skin), protocol))))
+    return 0
+
+
+def _skin_of(options: argparse.Namespace) -> tuple[Skin, Protocol]:
+    from eitskin.skin.protocol import adjacent
+    from eitskin.skin.skin import load_skin, paper_skin
+
+    if (options.skin is None) == (not options.paper):
+        raise UsageError(
+            f"model {options.action}: name a SKIN.toml, or give --paper: one of the two"
+        )
+    return (paper_skin(), adjacent(16)) if options.paper else load_skin(options.skin)
+
+
+def run_voltages(options: argparse.Namespace) -> int:
+    """Predict what each row measures."""
+    from eitskin.frames.front_end import advice, demand_of
+    from eitskin.frames.homogeneous import resistor_ring, voltages_of
+    from eitskin.frames.homogeneous_fem import transfer_by_elements
+
+    skin, protocol = _skin_of(options)
+    ring_ohm = options.resistor_ring
+    if ring_ohm is None:
+        transfer_ohm, of = transfer_by_elements(skin), f"skin {skin.name!r}"
+    else:
+        check_ring(ring_ohm)
+        ring = resistor_ring(protocol.n_electrodes, ring_ohm)
+        transfer_ohm, of = ring.transfer_ohm, ring.source
+    rows = protocol.drive_measure.astype(int)
+    volts = voltages_of(transfer_ohm, rows) * protocol.current_a
+    if options.json:
+        table = [[*row, volt] for row, volt in zip(rows.tolist(), volts.tolist(), strict=True)]
+        facts = {"of": of, "current_a": protocol.current_a, "columns": "I+ I- V+ V- V"}
+        print(json.dumps(facts | {"rows": table}, indent=None))
+        return 0
+    print(f"{of}, {protocol.current_a * 1e3:g} mA; electrodes count from 0")
+    print("  row   I+  I-  V+  V-     volts")
+    for k, (row, volt) in enumerate(zip(rows, volts, strict=True)):
+        print(f"{k:5d} {row[0]:4d}{row[1]:4d}{row[2]:4d}{row[3]:4d} {volt:10.6f}")
+    print("\n".join(advice(demand_of(transfer_ohm, protocol))))
     return 0
 
 

@@ -99,6 +99,19 @@ def homogeneous(skin: Skin | None, n_electrodes: int) -> Homogeneous:
     return Homogeneous(transfer, "closed form, disk")
 
 
+def resistor_ring(n_electrodes: int, resistance_ohm: float) -> Homogeneous:
+    """What a ring of equal resistors gives, each of ``resistance_ohm`` between neighbours: what
+    stands in for the skin when an instrument is tried first.
+
+    Between electrodes k apart lie k and n - k resistors side by side, R k (n - k) / n together; a
+    row's voltage is a difference of such resistances (Klein and Randic, J. Math. Chem. 12 (1993)
+    81).
+    """
+    apart = np.abs(np.subtract.outer(np.arange(n_electrodes), np.arange(n_electrodes)))
+    between = resistance_ohm * apart * (n_electrodes - apart) / n_electrodes
+    return Homogeneous(-between / 2, f"a ring of resistors of {resistance_ohm:g} ohm")
+
+
 def touch_transfer(
     skin: Skin, xy_mm: FloatArray, radius_mm: FloatArray, sign: NDArray[np.int8]
 ) -> FloatArray:

@@ -24,6 +24,11 @@ def fem_prediction(skin: Skin) -> FemPrediction:
     return FemPrediction(skin)
 
 
+def transfer_by_elements(skin: Skin) -> FloatArray:
+    """Potentials (n, n) in ohm as ``FemPrediction.transfer_ohm``, contact impedances included."""
+    return fem_prediction(skin).transfer_ohm()
+
+
 class FemPrediction:
     """One mesh of ``skin``, solved homogeneous or with touches; every frame is read off a transfer
     matrix (n, n)."""

@@ -18,6 +18,7 @@ PAGES = (
     "docs/guide/import-and-doctor.md",
     "docs/guide/scenes.md",
     "docs/guide/shapes.md",
+    "docs/guide/build-a-skin.md",
     "docs/guide/calibration.md",
     "docs/guide/board.md",
     "docs/guide/gestures.md",

@@ -10,7 +10,12 @@ import numpy as np
 from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.clipping import check_clipping
 from eitskin.frames.doctor.finite import check_finite
-from eitskin.frames.doctor.gain import check_gain, check_resemblance, check_unit
+from eitskin.frames.doctor.gain import (
+    check_gain,
+    check_level,
+    check_resemblance,
+    check_unit,
+)
 from eitskin.frames.doctor.noise import check_noise
 from eitskin.frames.doctor.numbering import check_numbering
 from eitskin.frames.doctor.order import check_flips, check_frames, check_sign, choose_order
@@ -85,13 +90,14 @@ def examine_case(subject: Subject) -> tuple[Report, Case]:
         check_reciprocity(case),
         check_noise(case),
     ]
-    outcomes += [check_orientation(case, numbering.untold), check_unit(case, subject.unit_known)]
+    outcomes.append(check_orientation(case, numbering.untold))
+    outcomes.append(check_level(case) if subject.stand_in else check_unit(case, subject.unit_known))
     return _report(subject, case, outcomes), case
 
 
 def _case(frames: Frames, subject: Subject) -> Case:
     rows = np.asarray(frames.protocol.drive_measure, dtype=np.int64)
-    prediction = homogeneous(subject.skin, frames.protocol.n_electrodes)
+    prediction = subject.stand_in or homogeneous(subject.skin, frames.protocol.n_electrodes)
     return Case(
         frames,
         subject.skin,

@@ -36,6 +36,7 @@ MANY = 0.5
 FOREIGN_BELOW = 0.9
 MIN_CHANNELS = 8
 UNIT_OFF = 30.0
+LEVEL_FAULT = 0.1
 
 
 def channel_gains(case: Case) -> tuple[FloatArray, BoolArray]:
@@ -151,6 +152,25 @@ def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
         f"{case.frames.protocol.current_a:g} A; {said}: check unit, gain, current and conductivity"
     )
     return CheckOutcome((Finding("unit", NOTE, text, measured, ""),), measured=measured)
+
+
+def check_level(case: Case) -> CheckOutcome:
+    """Whether all voltages are as high as what stands in for the skin makes them, whose size is
+    known: generator, current source and receiver together."""
+    strong = channel_gains(case)[1]
+    if not strong.any():
+        return CheckOutcome()
+    current_a = case.frames.protocol.current_a
+    predicted = case.predicted[strong] * current_a
+    level = float(np.median(case.reference[strong] / predicted))
+    measured = {"reference_per_predicted": round(level, 4)}
+    if abs(level - 1) <= LEVEL_FAULT:
+        return CheckOutcome(measured=measured)
+    text = (
+        f"the voltages are {level:.3g} times those of {case.prediction.source} at {current_a:g} A:"
+        " check the generator's amplitude, the current source and the receiver's gain"
+    )
+    return CheckOutcome((Finding("level", FAULT, text, measured),), measured=measured)
 
 
 def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: float) -> list[Finding]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.frames.frames import Frames, load_frames
+from eitskin.frames.homogeneous import Homogeneous
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.importer import import_frames
 from eitskin.frames.orders import ORDERS, match_rows, source_table
@@ -25,8 +26,9 @@ class Subject:
     """``readings``: (order, frames), the channels in the protocol's order if the source stands in
     that order.
 
-    ``given``: the order that was said. ``remarks``: what had to be assumed to read it.
-    ``unit_known``: whether the numbers are said to be volts.
+    ``stand_in``: what was measured in place of the skin, as a ring of resistors. ``given``: the
+    order that was said. ``remarks``: what had to be assumed to read it. ``unit_known``: whether the
+    numbers are said to be volts.
     """
 
     source: str
@@ -35,6 +37,7 @@ class Subject:
     skin: Skin | None
     remarks: tuple[str, ...] = ()
     unit_known: bool = True
+    stand_in: Homogeneous | None = None
 
 
 def subject_from_frames(frames: Frames, skin: Skin | None, source: str = "frames") -> Subject:

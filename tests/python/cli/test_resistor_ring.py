@@ -1,0 +1,82 @@
+"""A ring of resistors in place of the skin: its voltages, the doctor before it, and which current
+and gain suit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.cli.main import main
+from eitskin.frames.front_end import FrontEnd, demand_of, resistor_from, suitable
+from eitskin.frames.homogeneous import resistor_ring, voltages_of
+from eitskin.skin.protocol import Protocol, adjacent, opposite
+
+OHM = 1000.0
+
+
+def by_node_voltages(protocol: Protocol) -> np.ndarray:
+    """Kirchhoff's current law at every node of the ring, at the protocol's current."""
+    n = protocol.n_electrodes
+    laplacian = 2 * np.eye(n) - np.roll(np.eye(n), 1, axis=0) - np.roll(np.eye(n), -1, axis=0)
+    potentials = np.linalg.pinv(laplacian / OHM)
+    return voltages_of(potentials, protocol.drive_measure.astype(int)) * protocol.current_a
+
+
+@pytest.mark.parametrize("protocol", [adjacent(16), opposite(16), adjacent(9)])
+def test_voltages_are_those_of_the_network(protocol: Protocol) -> None:
+    rows = protocol.drive_measure.astype(int)
+    volts = resistor_ring(protocol.n_electrodes, OHM).voltages(rows, protocol.current_a)
+    assert np.allclose(volts, by_node_voltages(protocol), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "named", "code"),
+    [
+        (lambda frames: frames, set(), 0),
+        (lambda frames: 0.7 * frames, {"level"}, 11),
+        (lambda frames: frames * np.where(np.arange(208) == 17, 1.5, 1.0), {"channel-gain"}, 11),
+    ],
+    ids=["healthy", "30 % too low", "one channel 50 % too high"],
+)
+def test_the_doctor_compares_with_the_ring(
+    spoil: Callable[[np.ndarray], np.ndarray],
+    named: set[str],
+    code: int,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    volts = by_node_voltages(adjacent(16))
+    frames = volts * np.random.default_rng(1).normal(1, 1e-3, (12, 208))
+    np.savetxt(tmp_path / "ring.csv", spoil(frames), delimiter=",")
+    given = [
+        "doctor", str(tmp_path / "ring.csv"), "--protocol", "adjacent", "--electrodes", "16",
+        "--reference-frames", "0:12", "--scale", "1", "--resistor-ring", "1000", "--json",
+    ]  # fmt: skip
+    found = main(given)
+    report = json.loads(capsys.readouterr().out)
+    faults = {one["name"] for one in report["findings"] if one["severity"] == "fault"}
+    assert (faults, found) == (named, code)
+
+
+@pytest.mark.parametrize("conductivity", [0.001, 0.01, 0.1, 1.0, 10.0])
+def test_what_is_proposed_suits(conductivity: float) -> None:
+    """A ring as conductive as skins from dry gel to saline."""
+    for protocol in (adjacent(16), opposite(16)):
+        transfer = resistor_ring(16, 100.0 / conductivity).transfer_ohm
+        demand = demand_of(transfer, protocol)
+        proposed = suitable(demand)
+        assert demand.suits(proposed), (demand, proposed)
+        assert demand.suits(FrontEnd()) == (proposed == FrontEnd())
+
+
+def test_resistors_are_of_the_series() -> None:
+    assert [resistor_from(ohm) for ohm in (1000.0, 1001.0, 8300.0)] == [1000.0, 1100.0, 9100.0]
+
+
+def test_a_resistance_below_zero_is_a_mistake(refused: Callable[..., str]) -> None:
+    said = refused(2, "model", "voltages", "--paper", "--resistor-ring", "-5")
+    assert "--resistor-ring -5 is out of range" in said
