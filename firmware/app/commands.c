@@ -160,6 +160,7 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
     fw_stop_scan(instrument);
     if (fw_scan_configure(&instrument->scan, &settings) == FW_OK) {
         instrument->settings = settings;
+        fw_engine_set_noise_floor(&instrument->engine, fw_noise_floor_v(instrument));
         instrument->engine.tared = instrument->engine.phase_known = false;
         instrument->stream.what &= EITS_STREAM_RAW;
     } else {

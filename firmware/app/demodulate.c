@@ -2,6 +2,8 @@
 
 #include "app/sincos.h"
 
+#include <math.h>
+
 static uint64_t greatest_divisor(uint64_t a, uint64_t b)
 {
     while (b != 0) {
@@ -32,6 +34,16 @@ uint32_t fw_volts_per_code_nv(const fw_capture *capture)
                    gain = capture->front_end_gain_ppm;
     return (uint32_t)(((uint64_t)capture->reference_uv * 1000000000u + steps * gain / 2) /
                       (steps * gain));
+}
+
+float fw_rounding_v(uint32_t volts_per_code_nv, uint32_t excitation_millihz, uint32_t rate_hz,
+                    uint32_t samples)
+{
+    const uint64_t periods = (uint64_t)excitation_millihz * samples / ((uint64_t)rate_hz * 1000u);
+    const float step_nv = (float)volts_per_code_nv,
+                phases = (float)(samples / greatest_divisor(samples, periods));
+    /* a code's variance is step^2 / 12, an amplitude's 2 / phases of that */
+    return sqrtf(step_nv * step_nv / (6.0f * phases)) * 1e-9f;
 }
 
 static int16_t to_q15(float value)

@@ -35,6 +35,11 @@ uint32_t fw_nearest_integer(uint32_t excitation_millihz, uint32_t rate_hz, uint3
 /* Volts at the electrodes of one step of the converter, in nanovolts, rounded. */
 uint32_t fw_volts_per_code_nv(const fw_capture *capture);
 
+/* What rounding to whole codes alone does to an amplitude (rms, volts), of samples as above.
+ * Without other noise every period is rounded alike, so that only its different phases average. */
+float fw_rounding_v(uint32_t volts_per_code_nv, uint32_t excitation_millihz, uint32_t rate_hz,
+                    uint32_t samples);
+
 /* Tables and scale for bursts of `samples` (whole periods). mclk_hz must be a multiple of 1 MHz.
  * Errors: FW_E_ARGUMENT. */
 fw_status fw_demodulate_setup(fw_demodulator *demodulator, const fw_capture *capture,

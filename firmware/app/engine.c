@@ -74,6 +74,7 @@ static eits_status start_core(fw_engine *engine)
         return status;
     eits_options options = *eits_get_options(engine->ctx);
     (void)eits_options_track(&options);
+    options.noise_floor_v = engine->noise_floor_v;
     return eits_set_options(engine->ctx, &options);
 }
 
@@ -100,6 +101,16 @@ void fw_engine_close(fw_engine *engine)
     engine->cosine = 1;
     engine->sine = 0;
     engine->used_bytes = 0;
+}
+
+void fw_engine_set_noise_floor(fw_engine *engine, float volts)
+{
+    engine->noise_floor_v = volts;
+    if (!engine->open)
+        return;
+    eits_options options = *eits_get_options(engine->ctx);
+    options.noise_floor_v = volts;
+    (void)eits_set_options(engine->ctx, &options);
 }
 
 fw_scan_table fw_engine_table(const fw_engine *engine)

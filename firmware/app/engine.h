@@ -21,8 +21,9 @@ typedef struct fw_engine {
     eits_model model;
     eits_context *ctx; /* at the workspace's start; of no use while none is open */
     bool open, tared;
-    bool phase_known;   /* learned at a tare; else it is estimated from each frame */
-    float cosine, sine; /* of the angle that the voltages' phase has */
+    float noise_floor_v; /* of the scan: its converter's steps */
+    bool phase_known;    /* learned at a tare; else it is estimated from each frame */
+    float cosine, sine;  /* of the angle that the voltages' phase has */
     fw_frame frames[2];
     uint16_t *unique; /* rows that are no other's reciprocal */
     uint32_t n_unique;
@@ -40,6 +41,9 @@ size_t fw_engine_needs(const eits_model *model);
  * open then. */
 eits_status fw_engine_open(fw_engine *engine, const eits_model *model);
 void fw_engine_close(fw_engine *engine);
+
+/* No row has less noise than this, in volts: for the open model and those that are opened later. */
+void fw_engine_set_noise_floor(fw_engine *engine, float volts);
 
 /* The table that the scan measures. */
 fw_scan_table fw_engine_table(const fw_engine *engine);

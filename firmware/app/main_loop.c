@@ -29,6 +29,7 @@ void fw_instrument_init(fw_instrument *instrument, const fw_board *board)
                  (fw_fault_detail){.words = last->words});
     fw_fault_set(&instrument->faults, EITS_FAULT_WATCHDOG, last->watchdog != 0,
                  (fw_fault_detail){0});
+    fw_engine_set_noise_floor(&instrument->engine, fw_noise_floor_v(instrument));
     fw_open_newest(instrument);
     fw_start_scan(instrument);
     fw_send_info(instrument, 0);

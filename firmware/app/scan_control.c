@@ -7,6 +7,15 @@ void fw_stop_scan(fw_instrument *instrument)
     (void)fw_scan_stop(&instrument->scan);
 }
 
+float fw_noise_floor_v(const fw_instrument *instrument)
+{
+    const fw_scan_settings *s = &instrument->settings;
+    if (instrument->board->frames_given)
+        return 0;
+    return fw_rounding_v(fw_volts_per_code_nv(&instrument->board->capture), s->excitation_millihz,
+                         s->sample_rate_hz, s->samples);
+}
+
 /* The generator at the tuning word that the settings ask for; it is left alone where it has it
  * already, for its phase. */
 static fw_status start_generator(fw_instrument *instrument)

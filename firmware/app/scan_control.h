@@ -9,6 +9,10 @@
 void fw_start_scan(fw_instrument *instrument);
 void fw_stop_scan(fw_instrument *instrument);
 
+/* What the converter's steps alone make of noise with the scan's settings; 0 where the frames are
+ * another instrument's. */
+float fw_noise_floor_v(const fw_instrument *instrument);
+
 /* A tare that cannot go on is answered, and the last reference put back. */
 void fw_fail_tare(fw_instrument *instrument, eits_status why);
 

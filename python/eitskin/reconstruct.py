@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -124,6 +125,7 @@ def reconstruct_frames(
     frames, chosen = read(path, how.only)
     how = replace(how, track=how.tracked(frames))
     reconstructor, blob, name = choose_model(path, frames, how)
+    know_converter(reconstructor, frames)
     point = apply_options(reconstructor, how, notes)
     reference = take_reference(path, reconstructor, frames, notes)
     results, refused = solve(reconstructor, blob, frames, chosen, how, progress)
@@ -192,6 +194,13 @@ def choose_model(
     except EitskinError as error:
         raise type(error)(f"{path} and {name}: {error}") from None
     return reconstructor, blob, name
+
+
+def know_converter(reconstructor: Reconstructor, frames: Frames) -> None:
+    """The steps of the frames' converter, where they tell, are the least noise of a row."""
+    step_v = frames.meta.get("lsb_v")
+    if isinstance(step_v, (int, float)) and 0 < step_v < math.inf:
+        reconstructor.with_options(noise_floor_v=step_v / math.sqrt(12))
 
 
 def apply_options(

@@ -57,6 +57,9 @@ static void test_scale(void)
     CHECK_EQUAL(fw_volts_per_code_nv(&CAPTURE), 805664); /* 3.3 V / 4096 */
     const fw_capture gained = {NULL, NULL, 4095, 3300000, 2500000};
     CHECK_EQUAL(fw_volts_per_code_nv(&gained), 322266);
+    /* 4 periods of 20 samples, 12 of 25 that are no more than 25 phases */
+    CHECK_NEAR(fw_rounding_v(805664, 50000000, 1000000, 80), 805.664e-6 / sqrt(6 * 20), 1e-10);
+    CHECK_NEAR(fw_rounding_v(805664, 40000000, 1000000, 300), 805.664e-6 / sqrt(6 * 25), 1e-10);
     CHECK_EQUAL(fw_demodulate_setup(&d, &gained, 8000000, 1677722, 50000000, 1000000, 80), FW_OK);
     make_burst(80, 1e6, 50e3, 0.5, 0, 322.266e-6, 2048);
     fw_iq z;

@@ -28,6 +28,7 @@ static void mirror_start(uint32_t untouched)
                 EITS_OK);
     eits_options options = *eits_get_options(mirror.ctx);
     CHECK_EQUAL(eits_options_track(&options), EITS_OK); /* as the firmware does */
+    options.noise_floor_v = eits_get_options(b.host.instrument.engine.ctx)->noise_floor_v;
     options.warm_start = 1; /* of both, so that a frame depends on those before it */
     b.host.instrument.engine.ctx->options.warm_start = 1;
     CHECK_EQUAL(eits_set_options(mirror.ctx, &options), EITS_OK);

@@ -96,6 +96,7 @@ static void test_starts_and_ends(void)
     CHECK(memcmp(info->serial, "00112233445566778899AABB", 24) == 0);
     CHECK_EQUAL(info->excitation_millihz, 50000012);
     CHECK_EQUAL(info->volts_per_code_nv, 805664);
+    CHECK_NEAR(eits_get_options(b.host.instrument.engine.ctx)->noise_floor_v, 73.547e-6, 1e-9);
     CHECK_EQUAL(info->slot_us, 100);
     b.board.ended = true;
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &b.board.board), 0);

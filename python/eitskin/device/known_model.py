@@ -6,7 +6,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -95,9 +95,12 @@ def _usual(electrodes: int) -> Iterator[Protocol]:
             yield make(electrodes)
 
 
-def board_options(model: Model, *, track: bool = True) -> Options:
-    """The options that a board starts with: the model's own, and touches tracked; or without
-    that."""
+def board_options(model: Model, board: BoardInfo | None = None, *, track: bool = True) -> Options:
+    """The options that a board starts with: the model's own, the noise floor of ``board``'s
+    converter, and touches tracked; or without that."""
     from eitskin.solve.options import default_options, tracking
 
-    return tracking(default_options(model)) if track else default_options(model)
+    options = default_options(model)
+    if board is not None:
+        options = replace(options, noise_floor_v=board.noise_floor_v)
+    return tracking(options) if track else options

@@ -158,7 +158,7 @@ def set_up(
                 f" model, {device.board.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
             )
         return None
-    options = solver.applied(known.model)
+    options = solver.applied(known.model, device.board)
     device.solver(options)
     return options
 

@@ -8,6 +8,7 @@ from typing import Any
 from eitskin.core.results import Options
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
+from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
 
@@ -53,10 +54,10 @@ class SolverSettings:
         """What is to be changed."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
-    def applied(self, model: Model) -> Options:
-        """The options that a board with ``model`` starts with, with these changes."""
+    def applied(self, model: Model, board: BoardInfo) -> Options:
+        """The options that ``board`` with ``model`` starts with, with these changes."""
         changes = {name: value for name, value in self.named.items() if name != "track"}
-        return replace(board_options(model, track=self.track is not False), **changes)
+        return replace(board_options(model, board, track=self.track is not False), **changes)
 
 
 def check_tare_frames(frames: int) -> int:

@@ -391,7 +391,9 @@ class Session:
         known = self.known
         if known is None:
             known = need_model(self.device.board, self.settings.model, self.name, "a budget")
-        point = chosen_point(target, known.model, named.applied(known.model), board_takes())
+        point = chosen_point(
+            target, known.model, named.applied(known.model, self.device.board), board_takes()
+        )
         self._say(settings_text(point, target.board))
         kept = {
             name: value

@@ -7,6 +7,7 @@ Without touches a scene is exact where none is reported.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -42,9 +43,9 @@ class FoundTouch(Protocol):
         """Its radius."""
 
 
-Finder = Callable[[FloatArray, FloatArray], Sequence[FoundTouch]]
-"""Touches of a frame (m,), given the quiet frames (q, m) of its session, in V; it may raise
-FrameError."""
+Finder = Callable[[FloatArray, FloatArray, float], Sequence[FoundTouch]]
+"""Touches of a frame (m,), given the quiet frames (q, m) of its session, in V, and a step of its
+converter, 0 without; it may raise FrameError."""
 
 
 @dataclass(frozen=True)
@@ -101,13 +102,12 @@ class CoreFinder:
         """Changes of ``sign`` from now on; None: as the solver was told at first."""
         self.solver.with_options(sign=sign or self._own_sign)
 
-    def __call__(self, quiet_v: FloatArray, frame_v: FloatArray) -> Sequence[FoundTouch]:
-        """Touches of a frame (m,), given the quiet frames (q, m) of its session."""
-        return self.touches_of(quiet_v, frame_v)
-
-    def touches_of(self, quiet_v: FloatArray, frame_v: FloatArray) -> tuple[Touch, ...]:
-        """The same with all that the core says of each."""
+    def __call__(
+        self, quiet_v: FloatArray, frame_v: FloatArray, step_v: float
+    ) -> tuple[Touch, ...]:
+        """As ``Finder``; a board tells its step, too (``BoardInfo.noise_floor_v``)."""
         self.diagnostics = ()
+        self.solver.with_options(noise_floor_v=step_v / math.sqrt(12))
         self.solver.tare(quiet_v)
         self.solver.forget()
         result = self.solver.reconstruct(frame_v)
@@ -121,9 +121,9 @@ def score_set(found_by: Finder, of: WorldScenes) -> WorldScore:
         found_by.look_for(of.world.sign)
     matchings, ratios, refused = [], [], 0
     warned: list[bool] = []
-    for scene, quiet_v, frame_v in zip(of.scenes, of.quiet_v, of.frames_v, strict=True):
+    for scene, *measured in zip(of.scenes, of.quiet_v, of.frames_v, of.step_v, strict=True):
         try:
-            found = found_by(quiet_v, frame_v)
+            found = found_by(*measured)
         except FrameError:
             found, refused = (), refused + 1
         one = match(scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found])

@@ -50,7 +50,7 @@ class WorldScenes:
     """A set, simulated: scene k has ``quiet_v[k]`` (q, m) for its tare and ``frames_v[k]`` (m,), in
     V.
 
-    ``scenes[k]`` holds its touches.
+    ``scenes[k]`` holds its touches, ``step_v[k]`` a step of its converter, 0 without.
     """
 
     name: str
@@ -58,6 +58,7 @@ class WorldScenes:
     scenes: tuple[TouchScene, ...]
     quiet_v: FloatArray
     frames_v: FloatArray
+    step_v: FloatArray
 
 
 @dataclass(eq=False)
@@ -114,11 +115,11 @@ class WorldFactory:
             for k in range(count)
         ]
         exact = self._kept(role, world.errors, drawn, seed, progress)
-        quiet_v, frames_v = _measured(exact, world, seed, role)
+        measured = _measured(exact, world, seed, role)
         scenes = tuple(
             TouchScene(f"{name}-{family}-s{seed}-{k}", touches) for k, touches in enumerate(drawn)
         )
-        return WorldScenes(name, world, scenes, quiet_v, frames_v)
+        return WorldScenes(name, world, scenes, *measured)
 
     def _kept(
         self,
@@ -320,11 +321,12 @@ def _shaped(
 
 def _measured(
     exact_v: FloatArray, world: World, seed: int, role: str
-) -> tuple[FloatArray, FloatArray]:
-    """Quiet frames (k, q, m) and touched frames (k, m) with noise and converter."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Quiet frames (k, q, m) and touched frames (k, m) with noise and converter, and its steps
+    (k,)."""
     how = Measurement() if world.snr_db is None else converter_for(world.snr_db)
     bits = how.adc_bits if world.adc_bits is None else world.adc_bits
-    quiet, frames = [], []
+    quiet, frames, steps = [], [], []
     for k, (untouched, touched) in enumerate(exact_v):
         rms = float(np.sqrt((untouched**2).mean()))
         noise_v = 0.0 if world.snr_db is None else rms * 10 ** (-world.snr_db / 20)
@@ -334,4 +336,5 @@ def _measured(
         noisy, _ = measure(many, noise_v, lsb_v, span_v, seed, f"{role} {k}")
         quiet.append(noisy[:-1])
         frames.append(noisy[-1])
-    return np.array(quiet), np.array(frames)
+        steps.append(lsb_v)
+    return np.array(quiet), np.array(frames), np.array(steps)

@@ -110,16 +110,17 @@ def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
         BoardFrames(load_scene(folder / "new.toml")),
         [bank_bytes(blob, 1), bytes([ERASED]) * BANK_BYTES],
     )
-    options = board_options(decode_model(blob, "made"))
-    with Device(SimTransport("test", board)) as device, Recorder(path, device, options):
+    with Device(SimTransport("test", board)) as device:
+        options = board_options(decode_model(blob, "made"), device.board)
         device.solver(options)
-        take_reference(device, 16, streamed=True)
-        device.start_scene()
-        return [
-            item
-            for item in follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES)
-            if isinstance(item, LiveFrame)
-        ]
+        with Recorder(path, device, options):
+            take_reference(device, 16, streamed=True)
+            device.start_scene()
+            return [
+                item
+                for item in follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES)
+                if isinstance(item, LiveFrame)
+            ]
 
 
 def test_a_board_with_that_model_sends_the_same_load_bits(folder: Path, tmp_path: Path) -> None:

@@ -109,7 +109,9 @@ def test_what_is_not_looked_for_is_not_found() -> None:
         device.tare(QUIET)
         open_bit = 1 << DIAGNOSTICS.index("electrode open")
         device.solver(
-            replace(board_options(prebuilt()[0]), diagnostics=ALL_DIAGNOSTICS & ~open_bit)
+            replace(
+                board_options(prebuilt()[0], device.board), diagnostics=ALL_DIAGNOSTICS & ~open_bit
+            )
         )
         device.start_scene()
         items = list(device.stream(Stream.TOUCHES))
@@ -119,8 +121,8 @@ def test_what_is_not_looked_for_is_not_found() -> None:
 
 def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_path: Path) -> None:
     path = tmp_path / "run.eits"
-    options = board_options(prebuilt()[0])
     with sim_device(board()) as device:
+        options = board_options(prebuilt()[0], device.board)
         device.solver(options)
         with Recorder(path, device, options):
             take_reference(device, QUIET, streamed=True)
@@ -154,7 +156,7 @@ def test_the_check_tells_findings_apart(tmp_path: Path) -> None:
         return b"".join(encode(kind, k, bytes(payload)) for kind, k, payload in packets)
 
     path, hiding = tmp_path / "run.eits", Damaging(SimTransport("hides", board()), same, hide)
-    with Device(hiding) as device, Recorder(path, device, board_options(prebuilt()[0])):
+    with Device(hiding) as device, Recorder(path, device):
         device.solver(board_options(prebuilt()[0]))
         take_reference(device, QUIET, streamed=True)
         device.start_scene()

@@ -37,13 +37,13 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit() -> None:
         device.tare(QUIET)
         quiet = [device.next_item(0.0) for _ in range(QUIET)]
         device.start_scene()
-        items = list(device.stream(ALL))
+        board, items = device.board, list(device.stream(ALL))
     raws, images, touches = (
         by_kind(items, kind) for kind in (RawFrame, SolvedImage, SolvedTouches)
     )
     assert len(raws) == len(images) == len(touches) == FRAMES
     assert [type(item) for item in items[:3]] == [RawFrame, SolvedImage, SolvedTouches]
-    skin = Reconstructor(model, blob=blob, options=board_options(model))
+    skin = Reconstructor(model, blob=blob, options=board_options(model, board))
     skin.tare(np.array([raw.voltage_v for raw in quiet]))
     for raw, image, found in zip(raws, images, touches, strict=True):
         result = skin.reconstruct(raw.voltage_v)

@@ -76,7 +76,7 @@ def twin_check(
         taken.append(item)
     device.start_scene()
     model = decode_model(blob, "the model")
-    twin = HostTwin(KnownModel(model, blob), board_options(model))
+    twin = HostTwin(KnownModel(model, blob), board_options(model, device.board))
     for item in taken:
         if isinstance(item, RawFrame) and item.quiet:
             twin.take(LiveFrame(item.frame, 0, item.time_us, raw=item))

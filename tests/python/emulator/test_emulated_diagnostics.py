@@ -64,7 +64,7 @@ def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
     for frame in seen:
         if frame.number in whole:
             assert frame.solved is not None
-            assert names(frame.solved.diagnostics) == ("electrode open",)
+            assert set(names(frame.solved.diagnostics)) - {"crowded"} == {"electrode open"}
             assert frame.solved.masked == uses.sum()
             assert frame.raw is not None
             assert np.isfinite(frame.raw.voltage_v).all()

@@ -121,7 +121,7 @@ def test_the_voltages_are_the_skins(run: Run) -> None:
 def test_the_same_bits_as_the_host(run: Run) -> None:
     model, blob = load_prebuilt()
     host = CoreEngine(blob)
-    host.set_options(board_options(model))
+    host.set_options(board_options(model, of(BoardInfo, run.packets)[-1]))
     raws = of(RawFrame, run.packets)
     host.set_reference(np.array([raw.voltage_v for raw in raws if raw.quiet], dtype=np.float64))
     images = {one.solved.frame: one for one in of(SolvedImage, run.packets)}

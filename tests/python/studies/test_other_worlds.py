@@ -79,7 +79,7 @@ def test_scores_count_exact_false_missed_and_refused_scenes(factory):
     of = factory.scenes("eight_at_4_radii", 4, 1)
     answers = iter(range(4))
 
-    def find(quiet_v, frame_v):
+    def find(quiet_v, frame_v, step_v):
         k = next(answers)
         if k == 3:
             raise FrameError("rejected")

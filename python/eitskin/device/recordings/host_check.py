@@ -202,7 +202,9 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
     options = recorded_options(path)
     with Device(FileTransport(path)) as device:
         known = need_model(device.board, model, str(path), "the comparison")
-        twin = HostTwin(known, board_options(known.model) if options is None else options)
+        twin = HostTwin(
+            known, board_options(known.model, device.board) if options is None else options
+        )
         return (
             twin.follow(follow(device, recorded_kinds(path))),
             options is not None,

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -54,6 +55,17 @@ class BoardInfo(InfoPacket):
     @property
     def has_model(self) -> bool:
         return self.model_bytes > 0
+
+    @property
+    def noise_floor_v(self) -> float:
+        """The board's own ``noise_floor_v``, to the bit: what its converter's steps alone make of
+        noise. Without other noise every period is rounded alike: only different phases average."""
+        if self.frames_given:
+            return 0.0
+        periods = round(self.excitation_millihz * self.samples / (1000 * self.sample_rate_hz))
+        phases = np.float32(self.samples // math.gcd(self.samples, periods))
+        step_nv = np.float32(self.volts_per_code_nv)
+        return float(np.sqrt(step_nv * step_nv / (np.float32(6) * phases)) * np.float32(1e-9))
 
     @property
     def frames_given(self) -> bool:

@@ -62,9 +62,9 @@ def frames_of(finder: CoreFinder, of: WorldScenes) -> list[dict[str, Any]]:
     distance from the true place in mm and that over what it is said to be (Mahalanobis, squared);
     None where that is not known."""
     frames = []
-    for scene, quiet_v, frame_v in zip(of.scenes, of.quiet_v, of.frames_v, strict=True):
+    for scene, *measured in zip(of.scenes, of.quiet_v, of.frames_v, of.step_v, strict=True):
         try:
-            found = finder.touches_of(quiet_v, frame_v)
+            found = finder(*measured)
         except FrameError:
             continue
         pairs = match(scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found]).pairs

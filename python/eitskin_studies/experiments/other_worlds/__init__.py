@@ -84,9 +84,9 @@ def run(workspace: Workspace) -> ExperimentOutcome:
 def _first_wrong(finder: CoreFinder, of: WorldScenes) -> dict[str, Any]:
     """The first scene that is not exact, or the last: true touches' rims and found discs."""
     example: dict[str, Any] = {}
-    for scene, quiet_v, frame_v in zip(of.scenes, of.quiet_v, of.frames_v, strict=True):
+    for scene, *measured in zip(of.scenes, of.quiet_v, of.frames_v, of.step_v, strict=True):
         try:
-            found = finder(quiet_v, frame_v)
+            found = finder(*measured)
         except FrameError:
             found = ()
         discs = [(t.x_mm, t.y_mm, t.radius_mm) for t in found]
