@@ -25,7 +25,7 @@ extern "C" {
 
 /* A file of another major version is rejected; of a later minor one, what is new is skipped. */
 #define EITS_MODEL_MAJOR          1
-#define EITS_MODEL_MINOR          4
+#define EITS_MODEL_MINOR          5
 #define EITS_MODEL_ALIGNMENT      16
 #define EITS_MAX_RANK             1024
 #define EITS_MAX_PIXELS           65535
@@ -103,10 +103,13 @@ typedef struct eits_defaults {
     float follow_mm;
     float touch_radius_weight;
     uint32_t solver; /* eits_solver; files of format 1.0 have 0 here */
-    /* bits of eits_touch_fit (options.h) that are not set by default; files before 1.2 have 0 here
-     */
+    /* bits of eits_touch_fit (options.h) that are not set by default, and EITS_GAIN_DRIFT_KEPT;
+     * files before 1.2 have 0 here */
     uint32_t touch_fit_left_out;
 } eits_defaults;
+/* By default changes along the reference frame are data like others: a taught model has learned
+ * what drifts. From format 1.5. */
+#define EITS_GAIN_DRIFT_KEPT 8u
 
 /* The self-test inside a model: frames, and what a float32 solve with the defaults must give. */
 typedef struct eits_golden {

@@ -73,7 +73,8 @@ typedef struct eits_options {
     eits_solver solver;
     /* 1: start from the last frame's coefficients, momentum reset (solve.h) */
     uint32_t warm_start;
-    /* 1: ignore changes along the reference frame, that is drift of the gain */
+    /* 1: ignore changes along the reference frame, that is drift of the gain; 0 by default in
+     * taught models */
     uint32_t project_reference;
     /* > 0: this lambda; 0: the greater of those that lambda_rel and lambda_noise_factor give */
     eits_real lambda_abs;

@@ -53,7 +53,7 @@ static eits_options usual_options(const eits_defaults *d)
         .sign = (eits_sign)EITS_SIGN_INCREASE,
         .solver = (eits_solver)d->solver,
         .warm_start = (uint32_t)0,
-        .project_reference = (uint32_t)1,
+        .project_reference = (uint32_t)0,
         .lambda_abs = (eits_real)0,
         .lambda_rel = (eits_real)d->lambda_rel,
         .lambda_noise_factor = (eits_real)d->lambda_noise_factor,

@@ -6,7 +6,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-ACTIONS: tuple[str, ...] = ()
+ACTIONS = ("fit",)
 
 
 def add_parser(subparsers: Any) -> None:

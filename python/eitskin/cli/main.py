@@ -17,7 +17,7 @@ from eitskin.config import nearest
 from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = (
-    "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate", "recommend",
+    "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate", "teach", "recommend",
     "devices", "info", "tare", "view", "stream", "record", "replay", "flash", "completion",
 )  # fmt: skip
 FIRST = "eitskin stream --device sim:swipe"

@@ -42,6 +42,9 @@ class OptionFields:
     max_masked: int
     # fista, working-set, coordinate or active-set (solve.h)
     solver: str
+    # 1: ignore changes along the reference frame, that is drift of the gain; 0 by default in taught
+    # models
+    project_reference: bool
     # lambda, where lambda_abs is 0, is at least this fraction of lambda_max
     lambda_rel: float
     # and at least this multiple of lambda_noise
@@ -73,8 +76,6 @@ class OptionFields:
     sign: str = "increase"
     # 1: start from the last frame's coefficients, momentum reset (solve.h)
     warm_start: bool = False
-    # 1: ignore changes along the reference frame, that is drift of the gain
-    project_reference: bool = True
     # > 0: this lambda; 0: the greater of those that lambda_rel and lambda_noise_factor give
     lambda_abs: float = 0.0
     # > 0: stop once the duality gap <= gap_rel |y|^2 / 2

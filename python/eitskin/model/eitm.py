@@ -19,7 +19,7 @@ from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
 from eitskin.model.force_law import decode_load, encode_load
-from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
+from eitskin.model.model import DATA_KINDS, GAIN_DRIFT_KEPT, Defaults, Fields, Golden, Model
 from eitskin.model.model_errors import decode_model_errors
 from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
@@ -27,7 +27,7 @@ from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 4
+MAJOR, MINOR = 1, 5
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
@@ -97,7 +97,8 @@ def encode_model(model: Model) -> bytes:
         sections["FLDS"] = (
             FIELDS_HEAD.pack(model.fields.volts, model.fields.per_sheet) + halves.tobytes()
         )
-    return _assemble(sections, model.protocol.hash)
+    taught = bool(model.defaults.touch_fit_left_out & GAIN_DRIFT_KEPT)
+    return _assemble(sections, model.protocol.hash, taught)
 
 
 def _encode_defaults(defaults: Defaults) -> bytes:
@@ -140,7 +141,7 @@ def _padded(content: bytes) -> bytes:
     return content + bytes(-len(content) % 16)
 
 
-def _assemble(sections: Sections, protocol_hash: int) -> bytes:
+def _assemble(sections: Sections, protocol_hash: int, taught: bool) -> bytes:
     offset = HEADER.size + len(sections) * ENTRY.size
     entries, bodies = [], []
     for tag, content in sections.items():
@@ -149,7 +150,7 @@ def _assemble(sections: Sections, protocol_hash: int) -> bytes:
         bodies.append(_padded(content))
         offset += len(bodies[-1])
     body = b"".join(entries + bodies)
-    minor = MINOR if "UNCE" in sections else MINOR - 1
+    minor = MINOR if taught else MINOR - 1 if "UNCE" in sections else MINOR - 2
     tail = HEADER.pack(MAGIC, MAJOR, minor, offset, 0, len(sections), 0, protocol_hash)[16:]
     crc = zlib.crc32(tail + body)
     return HEADER.pack(MAGIC, MAJOR, minor, offset, crc, len(sections), 0, protocol_hash) + body
@@ -348,7 +349,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     )
     in_range = (
         1 <= d.iterations <= MAX_ITERATIONS
-        and d.touch_fit_left_out <= ALL_TOUCH_FIT
+        and d.touch_fit_left_out <= ALL_TOUCH_FIT | GAIN_DRIFT_KEPT
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
         and MIN_RADIUS_MM

@@ -18,6 +18,7 @@ from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin, skin_from_table
 
 DATA_KINDS = ("difference", "normalised", "log-ratio")
+GAIN_DRIFT_KEPT = 8  # of touch_fit_left_out: changes along the reference are data like others
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Defaults:
 
     Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t
     max(x); ``solver`` is one of ``core.results.SOLVERS``; ``touch_fit_left_out``: bits of
-    ``Options.touch_fit`` that are not set.
+    ``Options.touch_fit`` that are not set, and ``GAIN_DRIFT_KEPT``.
     """
 
     iterations: int = 60

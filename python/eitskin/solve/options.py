@@ -14,7 +14,7 @@ from eitskin.core.constants_table import (
 )
 from eitskin.core.options_table import ALL_TOUCH_FIT, MAX_TOUCHES, OF_MODEL
 from eitskin.core.results import Options
-from eitskin.model.model import Model
+from eitskin.model.model import GAIN_DRIFT_KEPT, Model
 
 
 def default_options(model: Model) -> Options:
@@ -25,6 +25,7 @@ def default_options(model: Model) -> Options:
         max_touches=min(d.max_touches, MAX_TOUCHES),
         max_masked=model.protocol.n_rows // 2,
         touch_fit=ALL_TOUCH_FIT & ~d.touch_fit_left_out,
+        project_reference=not d.touch_fit_left_out & GAIN_DRIFT_KEPT,
     )
 
 

@@ -1,0 +1,116 @@
+"""``eitskin teach fit PRESSES -o MODEL``: the model and its report."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.cli.arguments import option
+from eitskin.errors import FrameError
+
+if TYPE_CHECKING:
+    from eitskin.skin.skin import Skin
+    from eitskin.teaching.presses import Presses
+
+
+def add_parser(actions: Any) -> None:
+    """Add ``fit``."""
+    parser = actions.add_parser("fit", help="presses to a model, with what it is worth")
+    option(parser, "presses PRESSES.npz", "from  eitskin teach record", Path)
+    option(parser, "-o --output MODEL.eitm", None, Path, required=True)
+    option(parser, "--skin SKIN.toml", "default: the description in the presses' file", Path)
+    option(
+        parser,
+        "--place-sd MM",
+        "how far places given by hand may be off, an axis; they are refined",
+        default=0.0,
+    )
+    option(parser, "--picture OUT.png", "presses, where the others put them, and the rows", Path)
+    option(parser, "--json")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fit, write, say."""
+    from eitskin.cli.progress import bar
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.model.eitm import save_model
+    from eitskin.teaching.presses import load_presses
+    from eitskin.teaching.teach import teach
+
+    refuse_unwritable(options.output, options.picture)
+    presses = load_presses(options.presses)
+    skin = described_skin(presses, options.skin)
+
+    def progress(items: Iterable[Any], what: str) -> Iterable[Any]:
+        return bar(what)(items)
+
+    try:
+        taught = teach(presses, skin, place_sd_mm=options.place_sd, progress=progress)
+    except FrameError as error:
+        raise FrameError(f"{options.presses}: {error}") from None
+    if options.picture is not None:
+        from eitskin.view.taught_picture import draw_taught
+
+        draw_taught(options.picture, taught)
+    save_model(options.output, taught.model)
+    if options.json:
+        print(json.dumps({"output": str(options.output), **taught.report}, indent=2))
+    else:
+        print("\n".join(report_lines(taught.report)))
+        print(f"{options.output}: tare, then touches; eitskin model upload sends it to a board")
+    return 0
+
+
+def described_skin(presses: Presses, path: Path | None) -> Skin | None:
+    """The skin of the file ``path``, else of the presses' own description, else None. Their own
+    table of rows stands, whatever protocol the description has."""
+    import tomllib
+
+    from eitskin.skin.skin import load_skin, skin_from_table
+
+    if path is not None:
+        return load_skin(path)[0]
+    if not presses.skin:
+        return None
+    try:
+        table = tomllib.loads(presses.skin)
+    except tomllib.TOMLDecodeError as error:
+        raise FrameError(
+            f"presses: their description of the skin is no TOML ({error}); give --skin"
+        ) from None
+    return skin_from_table(table, "the presses' own description")
+
+
+def report_lines(report: dict[str, Any]) -> list[str]:
+    """The report as a person reads it."""
+    error, place = report["error_mm"], report["placement"]
+    curve = report["held_out_by_presses"]
+    lines = [
+        f"presses          {report['presses']}, {report['fit_s']:g} s",
+        f"error            left out {error['left_out_median']:.1f} mm median,"
+        f" {error['left_out_p95']:.1f} mm p95;"
+        f" as the core solves presses held out {error['held_out_median']:.1f},"
+        f" {error['held_out_p95']:.1f}",
+        f"counted as one   {100 * report['counted_as_one']:.0f} % of presses held out,"
+        f" lambda_rel {report['lambda_rel']:g}",
+        f"noise            {100 * report['noise']['of_a_press']:.0f} % of a press",
+        "more presses     "
+        + ", ".join(
+            f"{name.split('_')[1]}: {value:.1f} mm"
+            + (" (expected)" if name.startswith("expected") else "")
+            for name, value in curve.items()
+        ),
+        "90 % ellipse     "
+        + (
+            "too few presses to tell"
+            if report["ellipse_factor"] is None
+            else f"the fit's covariance times {report['ellipse_factor']:.2f}"
+        ),
+        f"skin             {place['text']}",
+        "rows without use " + (", ".join(map(str, report["silent_rows"][:20])) or "none"),
+    ]
+    return lines + [f"note             {note}" for note in report["notes"]]

@@ -1,0 +1,253 @@
+"""From presses to what a skin answers to a press anywhere: geometry and hyperparameters by marginal
+likelihood, amplitudes and noise from presses left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from math import exp, log
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import FrameError, missing_extra
+from eitskin.teaching.kernel import Kernel, Placement
+from eitskin.teaching.process import Process, condition
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[Iterable[Any]], Iterable[Any]]
+
+START_ANGLES = 32
+MAX_FOR_LIKELIHOOD = 150
+KNOWN_ROUNDS, UNKNOWN_ROUNDS = 3, 8
+NEAR = 0.18  # of the skin's width: presses that near are compared to begin with
+SCALE_SD = 0.05  # of log scale: a skin is about as large as it is described
+LOG_BOUND = 12.0
+PLACE_ROUNDS, PLACE_KEPT = 5, 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The covariance of a row's noise: ``whitening`` W (m, m), W C W' = I, for rows over their
+    units; ``shrinkage`` of the correlations, 1 for none trusted."""
+
+    whitening: FloatArray
+    covariance: FloatArray
+    shrinkage: float
+
+
+def differences(difference: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Each row over its rms, (n, m), and that rms (m,); rows that carry nothing get the greatest
+    rms, which keeps them at zero.
+
+    Raises:
+        FrameError: no row changes.
+    """
+    rms = np.sqrt(np.mean(difference**2, axis=0))
+    if not rms.max() > 0:
+        raise FrameError(
+            "presses: no row differs between untouched and pressed; record both frames of a press"
+        )
+    unit = np.where(rms > 1e-9 * rms.max(), rms, rms.max())
+    return difference / unit, unit
+
+
+def chosen_kernel(
+    kernel: Kernel,
+    place_mm: FloatArray,
+    amplitude: FloatArray,
+    data: FloatArray,
+    *,
+    angles: int = START_ANGLES,
+    progress: Progress = iter,
+) -> tuple[Kernel, float]:
+    """``kernel`` with placement, own-row term and noise of the greatest likelihood, and its log.
+
+    Raises:
+        MissingExtraError: scipy is not installed.
+    """
+    try:
+        from scipy.optimize import minimize
+    except ImportError:
+        raise missing_extra("model", "scipy") from None
+    few = slice(None)
+    if len(place_mm) > MAX_FOR_LIKELIHOOD:
+        few = np.linspace(0, len(place_mm) - 1, MAX_FOR_LIKELIHOOD).astype(int)  # type: ignore[assignment]
+    place, size, rows = place_mm[few], amplitude[few], data[few]
+    stationary = kernel.sensitivity is None
+
+    def at(numbers: FloatArray) -> Kernel:
+        turn, log_scale, log_noise, log_own = np.clip(numbers, -1e3, 1e3).tolist()
+        bounded = [min(max(one, -LOG_BOUND), LOG_BOUND) for one in (log_scale, log_noise, log_own)]
+        return replace(
+            kernel,
+            placement=replace(kernel.placement, turn_deg=turn, scale=exp(bounded[0])),
+            noise=exp(bounded[1]),
+            own=0.0 if stationary else exp(bounded[2]),
+        )
+
+    def cost(numbers: FloatArray) -> float:
+        spread = 1.0 if stationary else SCALE_SD
+        try:
+            found = condition(at(numbers), place, size, rows).log_likelihood
+        except np.linalg.LinAlgError:
+            return 1e30
+        return -found + 0.5 * (float(numbers[1]) / spread) ** 2
+
+    begin = [log(kernel.placement.scale), log(kernel.noise), log(max(kernel.own, 1e-3))]
+    if stationary or angles == 1:
+        starts = [np.array([kernel.placement.turn_deg, *begin])]
+    else:
+        starts = [np.array([360 * k / angles, *begin]) for k in range(angles)]
+    costs = [cost(one) for one in progress(starts)]
+    best = None
+    for k in np.argsort(costs)[:4]:
+        start = starts[k]
+        simplex = start + np.vstack([np.zeros(4), np.diag([6.0, 0.04, 0.7, 0.7])])
+        found = minimize(
+            cost, start, method="Nelder-Mead",
+            options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.05, "maxfev": 250},
+        )  # fmt: skip
+        if best is None or found.fun < best.fun:
+            best = found
+    assert best is not None
+    return at(best.x), -float(best.fun)
+
+
+def first_amplitudes(
+    place_mm: FloatArray, data: FloatArray, given: FloatArray | None, near_mm: float
+) -> FloatArray:
+    """Where a fit begins, mean 1: in proportion to ``given`` depths or forces; else |y| over its
+    mean nearby."""
+    size = np.linalg.norm(data, axis=1)
+    away = np.linalg.norm(place_mm[:, None] - place_mm[None], axis=-1)
+    near = (away < near_mm) * 1.0
+    amplitude = size / np.maximum(near @ size / near.sum(axis=1), 1e-300)
+    if given is not None:
+        known = np.isfinite(given) & (given > 0)
+        if known.any():
+            amplitude = np.where(known, given / np.mean(given[known]), amplitude)
+    return np.asarray(np.clip(amplitude, 0.05, 20) / np.mean(np.clip(amplitude, 0.05, 20)))
+
+
+def noise_of(residual: FloatArray) -> Noise:
+    """The covariance of residuals (n, m): correlations shrunk after Schaefer and Strimmer (Stat.
+    Appl. Genet. Mol. Biol. 4, 2005, article 32), variances to their median likewise."""
+    count, rows = residual.shape
+    squares = residual**2
+    variance = squares.mean(axis=0)
+    spread = squares.var(axis=0, ddof=1) / count if count > 1 else variance**2
+    median = float(np.median(variance[variance > 0])) if (variance > 0).any() else 1.0
+    towards = min(1.0, float(spread.sum() / max(((variance - median) ** 2).sum(), 1e-300)))
+    variance = towards * median + (1 - towards) * variance
+    variance = np.maximum(variance, 1e-6 * median)
+    x = residual / np.sqrt(np.maximum(squares.mean(axis=0), 1e-12 * median))
+    correlation = x.T @ x / count
+    second = (x**2).T @ (x**2) / count
+    off = ~np.eye(rows, dtype=bool)
+    uncertain = (second - correlation**2)[off].sum() / max(count - 1, 1)
+    shrinkage = float(np.clip(uncertain / max((correlation[off] ** 2).sum(), 1e-300), 0.01, 1))
+    correlation = np.where(off, (1 - shrinkage) * correlation, 1.0)
+    sd = np.sqrt(variance)
+    covariance = sd[:, None] * correlation * sd
+    lower = np.linalg.cholesky(correlation)
+    return Noise(np.linalg.inv(lower) / sd, covariance, shrinkage)
+
+
+def refitted_amplitudes(process: Process, noise: Noise, given: FloatArray | None) -> FloatArray:
+    """What each press's amplitude is by the others, mean 1; presses of one given depth get their
+    median, depths that hardly repeat a power law."""
+    residual = process.left_out()
+    answer = (process.data - residual) / process.amplitude[:, None] @ noise.whitening.T
+    seen = process.data @ noise.whitening.T
+    energy = np.maximum((answer**2).sum(axis=1), 1e-300)
+    amplitude = np.clip((seen * answer).sum(axis=1) / energy, 0.05, 20)
+    if given is not None:
+        amplitude = _by_given(amplitude, given)
+    return np.asarray(amplitude / amplitude.mean())
+
+
+def _by_given(amplitude: FloatArray, given: FloatArray) -> FloatArray:
+    known = np.isfinite(given) & (given > 0)
+    levels, which, counts = np.unique(given[known], return_inverse=True, return_counts=True)
+    if not len(levels):
+        return amplitude
+    out, logs = amplitude.copy(), np.log(amplitude[known])
+    if counts.mean() >= 3:
+        out[known] = np.exp([np.median(logs[which == k]) for k in range(len(levels))])[which]
+    elif len(levels) >= 3:
+        x = np.log(given[known])
+        slope = float(np.clip(np.polyfit(x, logs, 1)[0], 0, 3))
+        out[known] = np.exp(slope * (x - x.mean()) + np.median(logs - slope * (x - x.mean())))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What presses teach: ``process`` and ``noise`` for rows over ``unit`` (m,) V; ``likelihood``;
+    ``kernel``; places as refined."""
+
+    process: Process
+    noise: Noise
+    unit: FloatArray
+    log_likelihood: float
+
+    @property
+    def kernel(self) -> Kernel:
+        """The kernel in use."""
+        return self.process.kernel
+
+    def whitened(self, difference: FloatArray) -> FloatArray:
+        """Differences (n, m) V in the noise's own metric."""
+        return np.asarray((difference / self.unit) @ self.noise.whitening.T)
+
+
+def learn(
+    kernel: Kernel,
+    place_mm: FloatArray,
+    difference: FloatArray,
+    given: FloatArray | None,
+    width_mm: float,
+    *,
+    choose: bool = True,
+    angles: int = START_ANGLES,
+    amplitude: FloatArray | None = None,
+    progress: Progress = iter,
+) -> Learned:
+    """Learn from presses; ``choose`` False keeps the kernel's numbers, as for presses held out.
+
+    Raises:
+        FrameError: no row changes.
+        MissingExtraError: scipy is not installed.
+    """
+    data, unit = differences(difference)
+    if amplitude is None:
+        amplitude = first_amplitudes(place_mm, data, given, NEAR * width_mm)
+    likelihood = 0.0
+    if choose:
+        kernel, likelihood = chosen_kernel(
+            kernel, place_mm, amplitude, data, angles=angles, progress=progress
+        )
+    process = condition(kernel, place_mm, amplitude, data)
+    noise = noise_of(process.left_out())
+    for _ in range(KNOWN_ROUNDS if given is not None else UNKNOWN_ROUNDS):
+        amplitude = refitted_amplitudes(process, noise, given)
+        process = condition(kernel, place_mm, amplitude, data)
+        noise = noise_of(process.left_out())
+    if choose:
+        kernel, likelihood = chosen_kernel(kernel, place_mm, amplitude, data, angles=1)
+        process = condition(kernel, place_mm, amplitude, data)
+        noise = noise_of(process.left_out())
+    return Learned(process, noise, unit, likelihood)
+
+
+def default_kernel(
+    skin_kernel: tuple[Any, tuple[float, float]] | None, place_mm: FloatArray
+) -> Kernel:
+    """The kernel before the likelihood: of a skin's sensitivity and centre, or stationary."""
+    if skin_kernel is not None:
+        return Kernel(skin_kernel[0], skin_kernel[1])
+    middle = place_mm.mean(axis=0)
+    reach = float(np.linalg.norm(place_mm - middle, axis=1).max())
+    return Kernel(None, (float(middle[0]), float(middle[1])), 0.5 * reach, Placement(), own=0.0)

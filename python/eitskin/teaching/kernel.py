@@ -1,0 +1,164 @@
+"""The physics as a kernel: what the fields of a skin's electrodes say of how alike two presses
+answer.
+
+A press at p changes row r by about J_r(p) = -E_drive(p) . E_measure(p). How much, with which sign
+and gain, differs on a real instrument from row to row; that places alike in all rows answer alike
+does not. So the answer s_c of row c over the skin is a Gaussian process with the kernel
+
+    k_c(p, q) = (1/m) sum_r J_r(p) J_r(q) + g J_c(p) J_c(q).
+
+The first term leaves a turn by one electrode open; the second, the row's own, fixes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import cos, degrees, radians, sin
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.fem.grid import grid_for
+from eitskin.skin.outline import disk, polygon
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+
+FloatArray = npt.NDArray[np.float64]
+# J_r at places (n, 2) mm: (n, m)
+Sensitivity = Callable[[FloatArray], FloatArray]
+
+FIELD_PIXELS, FIELD_ELEMENTS = 64, 6000
+MATERN_LENGTH = 0.2  # of the places' greatest distance from their middle, times exp(log scale)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How the places lie against the skin as described: mirrored in y first where ``mirrored``,
+    then turned by ``turn_deg`` counterclockwise about the outline's centre and scaled."""
+
+    turn_deg: float = 0.0
+    scale: float = 1.0
+    mirrored: bool = False
+
+    def to_skin(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
+        """Places (n, 2) in the description's coordinates."""
+        away = (place_mm - centre_mm) * (1, -1 if self.mirrored else 1)
+        return np.asarray(centre_mm + self.scale * away @ _rotation(self.turn_deg).T)
+
+    def skin_in_places(self, skin: Skin) -> Skin:
+        """The skin as the places see it."""
+        outline, electrodes = skin.outline, skin.electrodes
+        if outline.diameter_mm is not None:
+            moved = disk(outline.diameter_mm / self.scale)
+        else:
+            away = (np.array(outline.vertices_mm) - outline.centre_mm) @ _rotation(self.turn_deg)
+            away = away / self.scale * (1, -1 if self.mirrored else 1)
+            moved = polygon([(x, y) for x, y in away + outline.centre_mm])
+        start = electrodes.start_angle_deg - self.turn_deg
+        along = electrodes.positions_mm
+        return replace(
+            skin,
+            outline=moved,
+            electrodes=replace(
+                electrodes,
+                start_angle_deg=(-start if self.mirrored else start) % 360,
+                clockwise=electrodes.clockwise != self.mirrored,
+                width_mm=electrodes.width_mm / self.scale,
+                positions_mm=None if along is None else tuple(s / self.scale for s in along),
+            ),
+        )
+
+
+def _rotation(turn_deg: float) -> FloatArray:
+    c, s = cos(radians(turn_deg)), sin(radians(turn_deg))
+    return np.array([[c, -s], [s, c]])
+
+
+def field_sensitivity(skin: Skin, protocol: Protocol) -> Sensitivity:
+    """J of ``skin`` as described: products of its electrodes' fields, between pixels linear,
+    outside the outline as at its nearest pixel; of rms 1.
+
+    Raises:
+        GeometryError, MissingExtraError: as ``fem.mesh``.
+        ProtocolError: skin and protocol have different numbers of electrodes.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    from eitskin.fem.cem import ForwardModel
+    from eitskin.fem.fields import electrode_fields
+    from eitskin.fem.mesh import mesh_for_elements
+
+    grid = grid_for(skin.outline, FIELD_PIXELS)
+    forward = ForwardModel(mesh_for_elements(skin, FIELD_ELEMENTS), skin, protocol)
+    kept = electrode_fields(forward, skin.conductivity_s_per_m, grid)
+    drive, measure = ([protocol.drive_measure[:, k].astype(int) for k in pair]
+                      for pair in ((0, 1), (2, 3)))  # fmt: skip
+    fields = np.zeros((grid.ny, grid.nx, *kept.shape[1:]))
+    fields[grid.index[:, 1], grid.index[:, 0]] = kept
+    near = distance_transform_edt(grid.number < 0, return_distances=False, return_indices=True)
+    fields = fields[tuple(near)]
+    size = np.array([grid.nx, grid.ny])
+
+    def products(e: FloatArray) -> FloatArray:
+        return -np.asarray(
+            ((e[..., drive[0]] - e[..., drive[1]]) * (e[..., measure[0]] - e[..., measure[1]])).sum(
+                axis=-2
+            )
+        )
+
+    unit = float(np.sqrt(np.mean(products(kept) ** 2)))
+
+    def at(place_mm: FloatArray) -> FloatArray:
+        cell = (place_mm - grid.origin_mm) / grid.pixel_mm - 0.5
+        cell = np.clip(cell, 0, size - 1.001)
+        low = cell.astype(int)
+        (u, v), (i, j) = (cell - low).T[..., None, None], low.T
+        e = (1 - v) * ((1 - u) * fields[j, i] + u * fields[j, i + 1]) + v * (
+            (1 - u) * fields[j + 1, i] + u * fields[j + 1, i + 1]
+        )
+        return products(e) / unit
+
+    return at
+
+
+def matern(p: FloatArray, q: FloatArray, length_mm: float) -> FloatArray:
+    """The stationary kernel of smoothness 5/2, (n, k): what is left without a description."""
+    r = np.sqrt(5) / length_mm * np.linalg.norm(p[:, None] - q[None], axis=-1)
+    return np.asarray((1 + r + r**2 / 3) * np.exp(-r))
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """The kernel of places. ``sensitivity`` None: Matern 5/2 of ``length_mm`` times the scale.
+
+    ``placement``, ``own`` (g) and ``noise`` (lambda) are what the likelihood chooses; the kernel's
+    mean over the places in ``scaled_to`` is 1, each row's own term likewise.
+    """
+
+    sensitivity: Sensitivity | None
+    centre_mm: tuple[float, float]
+    length_mm: float = 1.0
+    placement: Placement = Placement()
+    own: float = 1.0
+    noise: float = 0.03
+
+    def features(self, place_mm: FloatArray) -> FloatArray:
+        """J at places (n, 2): (n, m); for the stationary kernel (n, 0)."""
+        if self.sensitivity is None:
+            return np.zeros((len(place_mm), 0))
+        return self.sensitivity(self.placement.to_skin(place_mm, self.centre_mm))
+
+    def common(self, p: FloatArray, q: FloatArray, jp: FloatArray, jq: FloatArray) -> FloatArray:
+        """The part that all rows share, (n, k), not yet scaled."""
+        if self.sensitivity is None:
+            return matern(p, q, self.length_mm * self.placement.scale)
+        return np.asarray(jp @ jq.T / jp.shape[1])
+
+
+def placement_text(placement: Placement) -> str:
+    """For a report."""
+    return (
+        f"turned by {degrees(radians(placement.turn_deg)):.1f} degrees, scaled by"
+        f" {placement.scale:.3f}" + (", mirrored" if placement.mirrored else "")
+    )

@@ -1,0 +1,94 @@
+"""What the presses say of each other: where the others alone would put each, how surely, and
+whether it fits them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.fem.grid import Grid
+from eitskin.teaching.fit import PLACE_KEPT, PLACE_ROUNDS, Learned, learn
+
+FloatArray = npt.NDArray[np.float64]
+
+CHI2_90 = 4.605  # the .9 quantile of two squared normal numbers
+TEMPERATURE = 2.0  # of scores as probabilities: residuals are heavier than normal
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """n presses, each placed by the others: ``place_mm`` (n, 2); ``error_mm`` (n,);
+    ``mahalanobis2`` (n,) of the error in the fit's own covariance; ``score`` (n, k) on the grid,
+    chi^2 less its least; ``misfit`` (n,) the residual at the press's given place over the median;
+    ``explained`` (m,) of each row's energy."""
+
+    place_mm: FloatArray
+    error_mm: FloatArray
+    mahalanobis2: FloatArray
+    score: npt.NDArray[np.float32]
+    misfit: FloatArray
+    explained: FloatArray
+
+
+def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
+    """Place each press by the others, at the least of |W (y - a s(q))|^2 over q and a > 0."""
+    process, whitening = learned.process, learned.noise.whitening
+    at = grid.centres_mm()
+    mean = process.mean(at)
+    h, v, w = process.corrections(at)
+    residual = process.left_out()
+    seen, white_residual = process.data @ whitening.T, residual @ whitening.T
+    count = len(seen)
+    misfit = np.sum(white_residual**2, axis=1)
+    found, mahalanobis2 = np.zeros((count, 2)), np.zeros(count)
+    scores = np.zeros((count, grid.n_pixels), dtype=np.float32)
+    for i in range(count):
+        answer = (mean - (h[:, i : i + 1] + v[i] * w) * residual[i]) @ whitening.T
+        energy = np.maximum(np.sum(answer**2, axis=1), 1e-300)
+        along = np.maximum(answer @ seen[i], 0)
+        score = seen[i] @ seen[i] - along**2 / energy
+        # the scale of the noise is the press's own: what is left at the best place
+        scale = max(float(score.min()) / (process.data.shape[1] - 3), 1.0)
+        score = (score - score.min()) / scale
+        scores[i] = score
+        chance = np.exp(-0.5 * np.minimum(score, 1400))
+        chance /= chance.sum()
+        found[i] = chance @ at
+        away = at - found[i]
+        covariance = (chance[:, None] * away).T @ away + np.eye(2) * grid.pixel_mm**2 / 12
+        error = found[i] - process.place_mm[i]
+        mahalanobis2[i] = error @ np.linalg.solve(covariance, error)
+    explained = 1 - np.sum(residual**2, axis=0) / np.maximum(
+        np.sum(process.data**2, axis=0), 1e-300
+    )
+    return LeftOut(
+        found, np.linalg.norm(found - process.place_mm, axis=1), mahalanobis2, scores,
+        misfit / np.median(misfit), explained,
+    )  # fmt: skip
+
+
+def refined_places(
+    learned: Learned,
+    grid: Grid,
+    given_mm: FloatArray,
+    sd_mm: float,
+    difference: FloatArray,
+    depth: FloatArray | None,
+    width_mm: float,
+) -> Learned:
+    """Places given by hand with an error of ``sd_mm`` an axis, drawn to where the other presses put
+    them; the answers learned again with them."""
+    at = grid.centres_mm()
+    prior = -0.5 * np.sum((at[None] - given_mm[:, None]) ** 2, axis=2) / sd_mm**2
+    for round_ in range(PLACE_ROUNDS):
+        log_chance = prior - 0.5 * leave_one_out(learned, grid).score / TEMPERATURE
+        chance = np.exp(log_chance - log_chance.max(axis=1, keepdims=True))
+        chance /= chance.sum(axis=1, keepdims=True)
+        place = PLACE_KEPT * learned.process.place_mm + (1 - PLACE_KEPT) * chance @ at
+        learned = learn(
+            learned.kernel, place, difference, depth, width_mm,
+            choose=round_ == PLACE_ROUNDS - 1, angles=1, amplitude=learned.process.amplitude,
+        )  # fmt: skip
+    return learned

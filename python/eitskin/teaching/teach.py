@@ -1,0 +1,408 @@
+"""Presses in, a model and an honest report out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import EitskinError, FrameError, ProtocolError, UsageError
+from eitskin.fem.grid import Grid, grid_for
+from eitskin.model.force_law import LoadLaw
+from eitskin.model.model import Model
+from eitskin.skin.outline import disk
+from eitskin.skin.skin import Skin, skin_to_table
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin.teaching.fit import Learned, chosen_kernel, default_kernel, differences, learn
+from eitskin.teaching.fit import first_amplitudes as begin_amplitudes
+from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity, placement_text
+from eitskin.teaching.left_out import CHI2_90, LeftOut, leave_one_out, refined_places
+from eitskin.teaching.make import LAMBDA_RELS, taught_model
+from eitskin.teaching.presses import Presses
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[Iterable[Any], str], Iterable[Any]]
+
+MIN_PRESSES, FEW_PRESSES = 5, 50
+FOLDS, COUNTED_ONCE, MAX_HELD_OUT = 5, 0.97, 250
+PIXELS_ACROSS = 32
+MISFIT = 4.0  # times the median: a press that does not fit the others
+FAINT = 0.1  # of the median change: no press
+NOTHING = 0.1  # of a row's energy explained: it carries nothing
+MIRROR_GAIN = 10.0  # of log likelihood
+UNITS = {"cm": 10.0, "m": 1000.0, "inches": 25.4, "µm": 0.001}
+LEAST_COVER, FAIR_COVER = 0.02, 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class Taught:
+    """A taught ``model``, what was ``learned``, each press ``left_out``, and the ``report``."""
+
+    model: Model
+    learned: Learned
+    left_out: LeftOut
+    report: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Presses solved by the C core with models that did not know them: error (k,) mm of the
+    strongest touch, how many touches, strength of the strongest, and which presses they are."""
+
+    error_mm: FloatArray
+    count: npt.NDArray[np.int64]
+    strength: FloatArray
+    which: npt.NDArray[np.int64]
+
+
+def quiet_progress(items: Iterable[Any], what: str) -> Iterable[Any]:
+    """Shows nothing."""
+    return items
+
+
+def teach(
+    presses: Presses,
+    skin: Skin | None,
+    *,
+    place_sd_mm: float = 0.0,
+    progress: Progress = quiet_progress,
+) -> Taught:
+    """Learn a model from ``presses`` of ``skin``; None where it is not known. ``place_sd_mm``: how
+    far places given by hand may be off, an axis.
+
+    Raises:
+        FrameError: the presses cannot teach; the text says which, and what to do.
+        ProtocolError: ``skin`` has another number of electrodes.
+        MissingExtraError: scipy or netgen is not installed.
+    """
+    begun = time.monotonic()
+    if not 0 <= place_sd_mm <= 1000:
+        raise UsageError("teach: the places' sd must be 0 to 1000 mm")
+    notes = check_presses(presses, skin)
+    if skin is not None and skin.electrodes.count != presses.protocol.n_electrodes:
+        raise ProtocolError(
+            f"teach: the skin has {skin.electrodes.count} electrodes, the presses were scanned with"
+            f" {presses.protocol.n_electrodes}; give the description of that skin"
+        )
+    given = known_size(presses)
+    kernel, width_mm = starting_kernel(presses, skin)
+    if skin is None:
+        notes.append(
+            "no description of the skin: places that were not pressed are guessed from near ones"
+            " alone, and errors are about twice as large; give --skin"
+        )
+    else:
+        kernel, mirrored = mirrored_or_not(kernel, presses, given, width_mm)
+        if mirrored:
+            notes.append(
+                "the places are mirrored against the description; the model follows the places"
+            )
+    learned = learn(
+        kernel, presses.place_mm, presses.difference, given, width_mm,
+        progress=lambda items: progress(items, "angles"),
+    )  # fmt: skip
+    seen_as = seen_skin(learned, skin, presses)
+    grid = grid_for(seen_as.outline, PIXELS_ACROSS)
+    if place_sd_mm > 0:
+        learned = refined_places(
+            learned, grid, presses.place_mm, place_sd_mm, presses.difference, given, width_mm
+        )
+    left_out = leave_one_out(learned, grid)
+    lambda_rel, held = chosen_lambda(learned, presses, given, grid, width_mm, progress)
+    meta = {"teach": {"presses": len(presses)}}
+    if skin is not None:
+        meta["skin"] = skin_to_table(seen_as)
+    model = taught_model(learned, presses.protocol, grid, presses.untouched, lambda_rel, meta)
+    law, law_note = size_law(presses, held, grid)
+    notes += law_note
+    report = _report(presses, learned, left_out, held, lambda_rel, notes)
+    report["held_out_by_presses"] = learning_curve(
+        learned, presses, given, grid, width_mm, lambda_rel, held
+    )
+    report["fit_s"] = round(time.monotonic() - begun, 2)
+    model = replace(model, load=law, meta={**model.meta, "teach": report})
+    return Taught(model, learned, left_out, report)
+
+
+def known_size(presses: Presses) -> FloatArray | None:
+    """What is known of how hard each press was: force, else depth; None for nothing."""
+    return presses.force_n if presses.force_n is not None else presses.depth_mm
+
+
+def starting_kernel(presses: Presses, skin: Skin | None) -> tuple[Kernel, float]:
+    """The kernel before any fit, and the skin's width in mm."""
+    if skin is None:
+        kernel = default_kernel(None, presses.place_mm)
+        return kernel, 4 * kernel.length_mm
+    x0, y0, x1, y1 = skin.outline.bounding_box_mm
+    sensitivity = field_sensitivity(skin, presses.protocol)
+    return (
+        default_kernel((sensitivity, skin.outline.centre_mm), presses.place_mm),
+        max(x1 - x0, y1 - y0),
+    )
+
+
+def seen_skin(learned: Learned, skin: Skin | None, presses: Presses) -> Skin:
+    """The skin in the presses' coordinates; without a description a disk around them."""
+    if skin is not None:
+        return learned.kernel.placement.skin_in_places(skin)
+    from eitskin.skin.electrodes import Electrodes
+
+    reach = float(np.linalg.norm(presses.place_mm, axis=1).max())
+    count = presses.protocol.n_electrodes
+    return Skin("unknown", disk(2.2 * reach), Electrodes(count=count, width_mm=3.0 * reach / count))
+
+
+def check_presses(presses: Presses, skin: Skin | None) -> list[str]:
+    """Refuse what cannot teach; the rest as notes.
+
+    Raises:
+        FrameError: see the text.
+    """
+    if len(presses) < MIN_PRESSES:
+        raise FrameError(
+            f"teach: {len(presses)} presses are too few; record at least {MIN_PRESSES}, better 20"
+            " (eitskin teach plan says where)"
+        )
+    notes: list[str] = []
+    size = np.linalg.norm(presses.difference, axis=1)
+    faint = np.flatnonzero(size < FAINT * np.median(size))
+    if len(faint) or not np.median(size) > 0:
+        listed = ", ".join(map(str, faint[:8]))
+        raise FrameError(
+            f"teach: presses {listed} (from 0) hardly differ from their untouched frame; leave them"
+            " out, or take the untouched frame before the finger is down"
+        )
+    if skin is None:
+        return notes
+    centre = np.array(skin.outline.centre_mm)
+    corners = np.array(skin.outline.vertices_mm) - centre
+    reach = float(np.linalg.norm(corners, axis=1).max())
+    furthest = float(np.linalg.norm(presses.place_mm - centre, axis=1).max())
+    if not 0.25 * reach <= furthest <= 1.15 * reach:
+        for unit, factor in UNITS.items():
+            if 0.5 * reach <= factor * furthest <= 1.1 * reach:
+                raise FrameError(
+                    f"teach: the places reach {furthest:g} mm from the middle of a skin of"
+                    f" {reach:g} mm; they look like {unit}: multiply place_mm by {factor:g}"
+                )
+    if furthest > 1.15 * reach:
+        far = int(np.argmax(np.linalg.norm(presses.place_mm - centre, axis=1)))
+        raise FrameError(
+            f"teach: press {far} (from 0) lies {furthest:.0f} mm from the middle of a skin that"
+            f" reaches {reach:.0f} mm; correct its place, or the skin's description"
+        )
+    cover = hull_area(presses.place_mm) / skin.outline.area_mm2
+    if cover < LEAST_COVER:
+        raise FrameError(
+            f"teach: the presses cover {100 * cover:.1f} % of the skin; press all over it"
+            " (eitskin teach plan says where)"
+        )
+    if cover < FAIR_COVER:
+        notes.append(
+            f"the presses cover {100 * cover:.0f} % of the skin; elsewhere the model is the"
+            " physics' guess: press there too"
+        )
+    return notes
+
+
+def hull_area(place_mm: FloatArray) -> float:
+    """The area of the convex hull of places, mm²; 0 for places on a line."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return float(ConvexHull(place_mm).volume)
+    except (QhullError, ValueError):
+        return 0.0
+
+
+def mirrored_or_not(
+    kernel: Kernel, presses: Presses, given: FloatArray | None, width_mm: float
+) -> tuple[Kernel, bool]:
+    """``kernel``, mirrored where that is far more likely."""
+    few = np.linspace(0, len(presses) - 1, min(len(presses), 60)).astype(int)
+    data, _ = differences(presses.difference[few])
+    place = presses.place_mm[few]
+    amplitude = begin_amplitudes(
+        place, data, None if given is None else given[few], 0.18 * width_mm
+    )
+    other = replace(kernel, placement=Placement(mirrored=True))
+    (_, plain), (_, turned) = (
+        chosen_kernel(one, place, amplitude, data, angles=32) for one in (kernel, other)
+    )
+    return (other, True) if turned > plain + MIRROR_GAIN else (kernel, False)
+
+
+def solve_presses(model: Model, presses: Presses) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """By the C core, each against its own untouched frame: error (n,) mm of the strongest touch
+    (the skin's width for none), number of touches, its strength."""
+    core = Reconstructor(model)
+    width = model.grid.pixel_mm * max(model.grid.nx, model.grid.ny)
+    out = np.zeros((3, len(presses)))
+    for i in range(len(presses)):
+        core.forget()
+        core.tare(presses.untouched[i])
+        touches = core.reconstruct(presses.pressed[i]).touches
+        out[:, i] = width, len(touches), 0
+        if touches:
+            first = max(touches, key=lambda one: abs(one.strength_s_per_m_mm2))
+            away = np.array([first.x_mm, first.y_mm]) - presses.place_mm[i]
+            out[0, i], out[2, i] = np.linalg.norm(away), abs(first.strength_s_per_m_mm2)
+    return out[0], out[1], out[2]
+
+
+def model_without(
+    learned: Learned,
+    presses: Presses,
+    given: FloatArray | None,
+    kept: npt.NDArray[np.int64],
+    grid: Grid,
+    width_mm: float,
+    lambda_rel: float,
+) -> Model:
+    """A model of some of the presses with the kernel of all."""
+    less = learn(
+        learned.kernel, learned.process.place_mm[kept], presses.difference[kept],
+        None if given is None else given[kept], width_mm, choose=False,
+        amplitude=learned.process.amplitude[kept],
+    )  # fmt: skip
+    return taught_model(less, presses.protocol, grid, presses.untouched[kept], lambda_rel)
+
+
+def chosen_lambda(
+    learned: Learned,
+    presses: Presses,
+    given: FloatArray | None,
+    grid: Grid,
+    width_mm: float,
+    progress: Progress,
+) -> tuple[float, HeldOut]:
+    """The least lambda_rel at which presses held out, in five folds, count as one touch; and what
+    the core gives for them with it."""
+    count = len(presses)
+    fold = np.random.default_rng(1).permutation(count) % min(FOLDS, count)
+    limit = MAX_HELD_OUT // FOLDS
+    models, tested = [], []
+    for k in progress(range(int(fold.max()) + 1), "held-out presses"):
+        models.append(
+            model_without(
+                learned, presses, given, np.flatnonzero(fold != k), grid, width_mm, LAMBDA_RELS[0]
+            )
+        )
+        tested.append(np.flatnonzero(fold == k)[:limit])
+    for lambda_rel in LAMBDA_RELS:
+        parts = [
+            solve_presses(
+                replace(one, defaults=replace(one.defaults, lambda_rel=lambda_rel)),
+                presses.take(which),
+            )
+            for one, which in zip(models, tested, strict=True)
+        ]
+        error, number, strength = (np.concatenate(part) for part in zip(*parts, strict=True))
+        if np.mean(number == 1) >= COUNTED_ONCE:
+            break
+    return lambda_rel, HeldOut(error, number.astype(np.int64), strength, np.concatenate(tested))
+
+
+def learning_curve(
+    learned: Learned,
+    presses: Presses,
+    given: FloatArray | None,
+    grid: Grid,
+    width_mm: float,
+    lambda_rel: float,
+    held: HeldOut,
+) -> dict[str, float]:
+    """Median error by number of presses: measured with a quarter, a half and four fifths of them,
+    and by that power law what twice and four times as many would bring."""
+    order, count = np.random.default_rng(2).permutation(len(presses)), len(presses)
+    points = {}
+    for few in (count // 4, count // 2):
+        if few < MIN_PRESSES:
+            continue
+        model = model_without(learned, presses, given, order[:few], grid, width_mm, lambda_rel)
+        points[few] = float(np.median(solve_presses(model, presses.take(order[-count // 4 :]))[0]))
+    points[count * 4 // 5] = float(np.median(held.error_mm))
+    sizes, errors = np.log(list(points)), np.log(list(points.values()))
+    slope = float(np.clip(np.polyfit(sizes, errors, 1)[0], -1, -0.15)) if len(points) > 1 else -0.4
+    last = points[count * 4 // 5]
+    expected = {k * count: last * (1.25 * k) ** slope for k in (2, 4)}
+    return {
+        **{f"measured_{k}": round(v, 2) for k, v in points.items()},
+        **{f"expected_{k}": round(v, 2) for k, v in expected.items()},
+    }
+
+
+def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | None, list[str]]:
+    """The law from strength to force, or where presses have a depth to that, from presses held
+    out."""
+    from eitskin.calibration.fit import calibrate
+    from eitskin.calibration.presses import Presses as Weights
+
+    given = known_size(presses)
+    if given is None:
+        return None, []
+    size = given[held.which]
+    good = np.isfinite(size) & (size > 0) & (held.strength > 0) & (held.count == 1)
+    reach = float(np.hypot(*grid.centres_mm().T).max())
+    unit = "force in newtons" if presses.force_n is not None else "depth in mm, in place of newtons"
+    try:
+        places = presses.place_mm[held.which][good]
+        found = calibrate(Weights(size[good], held.strength[good], places), reach, resamples=0)
+    except EitskinError as error:
+        return None, [f"touches have no force: {error}"]
+    rms = float(np.sqrt(np.mean((found.left_out * size[good]) ** 2)))
+    return found.law, [f"touches have a force: {unit}; rms of presses held out {rms:.2g}"]
+
+
+def _report(
+    presses: Presses,
+    learned: Learned,
+    left_out: LeftOut,
+    held: HeldOut,
+    lambda_rel: float,
+    notes: list[str],
+) -> dict[str, Any]:
+    placement, kernel = learned.kernel.placement, learned.kernel
+    strangers = np.flatnonzero(left_out.misfit > MISFIT)
+    silent = np.flatnonzero(left_out.explained < NOTHING)
+    factor = float(np.quantile(left_out.mahalanobis2, 0.9) / CHI2_90)
+    few = len(presses) < FEW_PRESSES
+    if few:
+        notes.append(f"{len(presses)} presses are too few to tell 90 % ellipses")
+    if len(strangers):
+        notes.append(
+            "presses that do not fit the others (two fingers at once, a slip, a wrong place);"
+            " leave them out or record them again: " + ", ".join(map(str, strangers[:12]))
+        )
+    return {
+        "presses": len(presses),
+        "error_mm": {
+            "left_out_median": round(float(np.median(left_out.error_mm)), 2),
+            "left_out_p95": round(float(np.quantile(left_out.error_mm, 0.95)), 2),
+            "held_out_median": round(float(np.median(held.error_mm)), 2),
+            "held_out_p95": round(float(np.quantile(held.error_mm, 0.95)), 2),
+        },
+        "counted_as_one": round(float(np.mean(held.count == 1)), 3),
+        "lambda_rel": lambda_rel,
+        "noise": {
+            "of_a_press": round(float(np.sqrt(np.mean(learned.process.left_out() ** 2))), 3),
+            "shrinkage": round(learned.noise.shrinkage, 3),
+        },
+        "ellipse_factor": None if few else round(factor, 3),
+        "placement": {
+            "turn_deg": round(placement.turn_deg % 360, 2),
+            "scale": round(placement.scale, 4),
+            "mirrored": placement.mirrored,
+            "text": "none: stationary kernel"
+            if kernel.sensitivity is None
+            else placement_text(placement),
+        },
+        "strange_presses": strangers.tolist(),
+        "silent_rows": silent.tolist(),
+        "notes": notes,
+    }

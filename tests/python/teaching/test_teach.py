@@ -1,0 +1,90 @@
+"""A model taught from a few presses finds others where physics has no signs; what cannot teach is
+refused with a remedy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulated_presses import RADIUS_MM, SKIN, TRUE, fields, presses
+
+from eitskin.errors import FrameError
+from eitskin.model.eitm import decode_model, encode_model
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin.teaching.kernel import Placement
+from eitskin.teaching.left_out import leave_one_out
+from eitskin.teaching.teach import Taught, check_presses, solve_presses, teach
+
+
+@pytest.fixture(scope="module")
+def taught() -> Taught:
+    return teach(presses(30), SKIN)
+
+
+def test_presses_never_seen_are_found(taught: Taught) -> None:
+    error, count, _ = solve_presses(taught.model, presses(40, seed=2))
+    assert np.median(error) < 0.05 * 2 * RADIUS_MM and np.mean(count == 1) > 0.9
+    own = taught.report["error_mm"]["held_out_median"]
+    assert 0.3 * np.median(error) < own < 3 * np.median(error)
+    turn = taught.report["placement"]["turn_deg"]
+    assert (
+        turn == pytest.approx(TRUE.turn_deg, abs=3) and not taught.report["placement"]["mirrored"]
+    )
+    assert taught.report["notes"][0].startswith("touches have a force: depth")
+
+
+def test_shuffled_places_teach_nothing() -> None:
+    """Then the answer is about the middle, or anywhere."""
+    some = presses(30)
+    shuffled = replace(some, place_mm=some.place_mm[np.random.default_rng(3).permutation(30)])
+    error, _, _ = solve_presses(teach(shuffled, SKIN).model, presses(40, seed=2))
+    assert np.median(error) > 0.25 * 2 * RADIUS_MM
+
+
+def test_the_file_brings_its_own_options_and_every_engine_agrees(taught: Taught) -> None:
+    model = decode_model(encode_model(taught.model), "taught")
+    one = presses(1, seed=5)
+    found = []
+    for engine in ("c", "c64", "numpy"):
+        core = Reconstructor(model, engine=engine)
+        assert not core.options.project_reference and core.options.touch_fit == 0
+        core.tare(one.untouched[0])
+        found.append(core.reconstruct(one.pressed[0]))
+    assert found[1].image == pytest.approx(found[2].image, abs=1e-9 * found[2].image.max())
+    assert found[0].touches[0].x_mm == pytest.approx(found[2].touches[0].x_mm, abs=0.01)
+
+
+def test_mirrored_places_are_told_and_taught() -> None:
+    taught = teach(presses(30, placement=Placement(20.0, 1.0, mirrored=True)), SKIN)
+    assert taught.report["placement"]["mirrored"]
+    assert any("mirrored" in note for note in taught.report["notes"])
+
+
+def test_a_press_that_does_not_fit_is_named(taught: Taught) -> None:
+    some = presses(30)
+    pressed = some.pressed.copy()
+    pressed[7] += pressed[(7 + 11) % 30] - some.untouched[(7 + 11) % 30]
+    report = teach(replace(some, pressed=pressed), SKIN).report
+    assert 7 in report["strange_presses"] and len(report["strange_presses"]) <= 4
+
+
+def test_without_a_description_a_stationary_kernel_says_what_is_lost() -> None:
+    taught = teach(presses(30), None)
+    assert any("give --skin" in note for note in taught.report["notes"])
+    assert np.isfinite(leave_one_out(taught.learned, taught.model.grid).error_mm).all()
+
+
+def test_what_cannot_teach_is_refused() -> None:
+    some = presses(12)
+    for changed, words in (
+        (some.take([0, 1, 2]), "3 presses are too few"),
+        (replace(some, place_mm=some.place_mm / 10), "look like cm: multiply place_mm by 10"),
+        (replace(some, place_mm=0.01 * some.place_mm + 30), "press all over it"),
+        (replace(some, place_mm=some.place_mm + 60), "correct its place"),
+        (replace(some, untouched=np.where(np.arange(12)[:, None] == 3, some.pressed,
+                                          some.untouched)), "presses 3 .* untouched frame"),
+    ):  # fmt: skip
+        with pytest.raises(FrameError, match=words):
+            check_presses(changed, SKIN)
+    assert fields() is fields()
