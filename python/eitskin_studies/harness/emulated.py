@@ -32,6 +32,10 @@ from eitskin_studies.harness.emulated_steps import (
 
 BUILD_TOOLS = ("arm-none-eabi-gcc", "cmake", "ninja")
 QEMU = "qemu-system-arm"
+BOARD = (
+    *(QEMU, "-M", "mps2-an500", "-nographic", "-monitor", "none"),
+    *("-semihosting-config", "enable=on,target=native", "-icount", "shift=6", "-kernel"),
+)
 PROGRAM = Path("tests") / "emulated" / "frames_m7.elf"
 MAX_SECONDS = 300
 STATUS = re.compile(r"(model|choose|quiet) status (-?\d+)(?: workspace (\d+) kernels (\S+))?")
@@ -176,24 +180,27 @@ def run_frames(
 
 
 def run_steps(
-    program: Path, folder: Path, steps: Sequence[Step], *, portable: bool = False
+    program: Path,
+    folder: Path,
+    steps: Sequence[Step],
+    *,
+    portable: bool = False,
+    emulator: Sequence[str] = BOARD,
 ) -> EmulatedRun:
     """The emulated board's results for ``steps``, what it refuses included; a model that is refused
     must be the last step.
 
     ``folder`` is where the program finds its files. ``portable``: plain C instead of the
-    processor's own kernels.
+    processor's own kernels. ``emulator``: the command that runs the program.
 
     Raises:
         UsageError: QEMU is missing or the program fails.
     """
-    need_tools(QEMU)
+    need_tools(emulator[0])
     write_steps(folder, steps, portable=portable)
-    command = [QEMU, "-M", "mps2-an500", "-nographic", "-monitor", "none", "-semihosting-config"]
-    command += ["enable=on,target=native", "-icount", "shift=6", "-kernel", str(program)]
     try:
         done = subprocess.run(
-            command,
+            [*emulator, str(program)],
             cwd=folder,
             capture_output=True,
             text=True,
