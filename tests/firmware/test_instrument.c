@@ -368,6 +368,13 @@ static void test_self_test_keeps_the_tare(void)
     mirror_follow();
     CHECK(mirror.images >= 8);
     CHECK_EQUAL(mirror.different, 0);
+    /* nor does it forget the voltages' angle: what turns now is not followed */
+    b.board.extra_turn += 1 / 6.0;
+    host_run(&b.host, 60);
+    float volts;
+    memcpy(&volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
+           sizeof volts);
+    CHECK_NEAR(volts, 0.5 * bench_volts(&b, 0), 0.5 * fake_lsb_v(&b.board));
     bench_stop(&b);
 }
 

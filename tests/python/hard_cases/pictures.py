@@ -9,6 +9,7 @@ from pathlib import Path
 import touch_scenes
 from everywhere import on_host
 from losses import LEVELS, UNITS, all_steps, errors_of
+from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_steps
 from touch_scenes import frames_of, groups
 
 from eitskin.scene.random_touches import TouchScene
@@ -83,9 +84,44 @@ def draw_losses(path: Path) -> None:
         save_picture(figure, path)
 
 
+def draw_precision(path: Path) -> None:
+    """Errors of float32 over the condition number, and over the size of the change."""
+    by_number, sizes = by_condition(on_host(condition_steps())[1]), by_change()
+    panels = (
+        (
+            "condition number of S",
+            CONDITIONS,
+            {
+                "coefficients": [one.coefficients for one in by_number],
+                "S x": [one.data for one in by_number],
+            },
+        ),
+        (
+            "size of the change, golden frame: 1",
+            CHANGES,
+            {"image": [one.image for one in sizes], "reduced data": [one.data for one in sizes]},
+        ),
+    )
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(9.0, 3.2), layout="constrained")
+        for k, (label, at, lines) in enumerate(panels):
+            axes = figure.add_subplot(1, 2, k + 1)
+            for (name, values), style in zip(lines.items(), ("o-", "s--"), strict=True):
+                axes.loglog(at, values, style, label=name)
+            axes.set_xlabel(label, color=INK)
+            axes.legend(frameon=False)
+            if k == 0:
+                axes.set_ylabel("float32 from float64,\nshare of the norm", color=INK)
+            else:
+                axes.invert_xaxis()
+        save_picture(figure, path)
+
+
 DRAWN: dict[str, Callable[[Path], None]] = {
     "hard-touches.png": draw_touches,
     "hard-losses.png": draw_losses,
+    "hard-precision.png": draw_precision,
 }
 
 

@@ -1,0 +1,40 @@
+"""Errors of float32 over the condition number, and over the size of the change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from everywhere import SameEverywhere
+from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_steps
+
+from eitskin.solve.options import default_options
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
+from margins import Margins
+from small_models import prebuilt
+
+
+def test_error_over_the_condition_number(same_everywhere: SameEverywhere, margins: Margins) -> None:
+    """What the data say is as exact at any condition; coefficients lose with it."""
+    _, outcomes = same_everywhere.steps(condition_steps())
+    for condition, found in zip(CONDITIONS, by_condition(outcomes), strict=True):
+        what = f"S x, float32 from float64, condition {condition:.0e}"
+        margins.everywhere("problem/condition", what, found.data, found.allowed, "|y|")
+        assert np.isfinite(found.coefficients)
+
+
+def test_change_down_to_the_last_bit(same_everywhere: SameEverywhere, margins: Margins) -> None:
+    """The error of the data is what rounding each voltage costs; where nothing is left of the
+    change, there is no image and no touch; a last bit in every row gives finite numbers."""
+    for size, found in zip(CHANGES, by_change(), strict=True):
+        what = f"y, float32 from the change itself, change times {size:.1g}"
+        margins.everywhere("problem/cancellation", what, found.data, found.allowed, "|y|")
+    model, blob = prebuilt()
+    reference = model.golden.reference_v
+    last_bit = np.nextafter(reference, np.float32(np.inf))
+    options = replace(default_options(model), detection_factor=0.0, lambda_noise_factor=0.0)
+    steps = [Load(blob), Choose(options), TareStep(reference[None])]
+    _, (none, least) = same_everywhere.steps([*steps, Play(np.stack([reference, last_bit]))])
+    assert none.status == least.status == 0
+    assert not none.image.any() and not none.touches
+    assert least.finite()
