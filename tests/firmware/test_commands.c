@@ -405,59 +405,6 @@ static void test_bad_bytes(void)
     CHECK(!b.host.instrument.reset_wanted);
 }
 
-/* Any command with anything in it: each is answered, and afterwards the board is as good as before.
- */
-static void test_random_commands(void)
-{
-    uint64_t state = 20240918;
-    uint32_t silent = 0, taken = 0;
-    for (int n = 0; n < 4000; ++n) {
-        uint8_t payload[64] = {0};
-        const uint32_t pick = (uint32_t)(100 * (1 + small_random(&state)));
-        const eits_packet_type type = (eits_packet_type)(EITS_PACKET_GET_INFO + pick % 15u);
-        const size_t sizes[] = {4, 12, 8, 24, 36, 12, 16, 4, 8, 8, 4, 4, 4, 4, 4};
-        for (size_t k = 4; k < sizeof payload; ++k) { /* small numbers, great ones, zeros */
-            const double value = small_random(&state);
-            payload[k] =
-                (uint8_t)(k % 4u < 2 ? 127 * (1 + value) * (value > 0) : (value > 0.9 ? 255 : 0));
-        }
-        if (type == EITS_PACKET_GET_INFO || type == EITS_PACKET_GET_STATS ||
-            type == EITS_PACKET_TARE || type == EITS_PACKET_RESET)
-            host_send(&b.host, (uint8_t)type, payload,
-                      n % 7 == 0 ? 6 : (type == EITS_PACKET_RESET ? 5 : sizes[pick % 15u]));
-        else {
-            const eits_packet_reply reply = host_command(
-                &b.host, type, payload, n % 5 == 0 ? pick % 40u + 4 : sizes[pick % 15u]);
-            silent += reply.status == 0xFFFF;
-            taken += reply.status == EITS_REPLY_OK;
-        }
-        if (b.host.packets > HOST_PACKETS / 2)
-            host_forget(&b.host);
-    }
-    CHECK_EQUAL(silent, 0);
-    CHECK(taken > 300);
-    host_forget(&b.host);
-    /* an upload that was left, if any, is given up; a tare fails or is done */
-    host_run(&b.host, 11000);
-    for (int wait = 0; wait < 200 && b.host.instrument.tare.active; ++wait)
-        host_run(&b.host, 1000);
-    for (uint16_t i = 0; i < 208; ++i) {
-        eits_command_mask_row mask = {.row = i};
-        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
-                    EITS_REPLY_OK);
-    }
-    REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
-    REPLY(scan_with(host_default_scan()), EITS_REPLY_OK, 0, 0);
-    REPLY(host_plain(&b.host, EITS_PACKET_SELF_TEST), EITS_REPLY_OK, 0, 0);
-    REPLY(host_tare(&b.host, 4), EITS_REPLY_OK, 0, 0);
-    REPLY(host_stream(&b.host, 7, 1, 3), EITS_REPLY_OK, 0, 0);
-    host_forget(&b.host);
-    host_run(&b.host, 200);
-    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_IMAGE), 3);
-    CHECK_EQUAL(host_info(&b.host).model_crc, b.model.crc);
-    CHECK_EQUAL(b.board.resets, 0);
-}
-
 int main(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -474,7 +421,6 @@ int main(void)
     test_stats_again();
     test_busy();
     test_bad_bytes();
-    test_random_commands();
     bench_stop(&b);
     return checks_report("commands");
 }

@@ -1,4 +1,5 @@
-/* Model banks: which one is opened, uploads, and power that goes at every step of one. */
+/* Model banks: which one is opened, and uploads. Power cuts are the fuzzer's (tests/fuzz) and the
+ * emulated board's (tests/python/emulator/test_power_cuts.py). */
 #include "bench.h"
 #include "check.h"
 
@@ -282,46 +283,6 @@ static void test_flash_fails(void)
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
 }
 
-/* Power goes at one step of an upload; the board starts again. Returns whether it went. */
-static int cut_upload(uint32_t step)
-{
-    start_with_adjacent();
-    b.board.flash_steps = 0;
-    b.board.cut_at = step;
-    if (setjmp(b.board.cut) == 0) {
-        CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status,
-                    EITS_REPLY_OK);
-        return 0;
-    }
-    bench_restart(&b);
-    return 1;
-}
-
-/* At each step of erasing, programming and committing: the old model is there until the record is
- * whole. */
-static void test_cut_everywhere(void)
-{
-    CHECK_EQUAL(cut_upload(0), 0);
-    const uint32_t steps = b.board.flash_steps;
-    CHECK_EQUAL(steps, 2 + opposite.size / 4 + 8); /* sectors, words, and the record's */
-    uint32_t old_one = 0, new_one = 0, scanning = 0;
-    for (uint32_t step = 1; step <= steps; step += step < 20 || step > steps - 30 ? 1 : 53) {
-        CHECK_EQUAL(cut_upload(step), 1);
-        const eits_packet_info info = host_info(&b.host);
-        old_one += info.model_crc == adjacent.crc && info.bank == 0 && info.faults == 0;
-        new_one += info.model_crc == opposite.crc;
-        scanning += b.host.instrument.scan.running;
-        if (step % 7 == 0 || step > steps - 9) /* and it can be done again */
-            CHECK_EQUAL(
-                host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status,
-                EITS_REPLY_OK);
-    }
-    CHECK(old_one > 60);
-    CHECK_EQUAL(new_one, 0);
-    CHECK_EQUAL(scanning, old_one);
-    CHECK_EQUAL(b.board.rewrites, 0);
-}
-
 int main(void)
 {
     adjacent = skin_model_make(&SKIN_ADJACENT);
@@ -334,7 +295,6 @@ int main(void)
     test_offsets();
     test_odd_end();
     test_flash_fails();
-    test_cut_everywhere();
     skin_model_free(&adjacent);
     skin_model_free(&opposite);
     return checks_report("store");

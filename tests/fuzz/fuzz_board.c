@@ -257,7 +257,13 @@ static void command(fuzz_bytes *in)
         size = fuzz_u8(in);
     const uint32_t request = (how & 8) != 0 ? m.request : ++m.request;
     memcpy(payload, &request, sizeof request);
+    const bool heard = fake.host_room == SIZE_MAX;
+    last_reply.status = UINT16_MAX;
     send(type, payload, size);
+    /* these are answered by packets of their own, or later */
+    if (type == EITS_PACKET_GET_INFO || type == EITS_PACKET_GET_STATS || type == EITS_PACKET_TARE)
+        return;
+    MUST(!heard || size < 4 || (last_reply.status != UINT16_MAX && last_reply.request == request));
 }
 
 /* ---- models ---- */
