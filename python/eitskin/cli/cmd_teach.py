@@ -6,7 +6,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-ACTIONS = ("fit",)
+ACTIONS = ("plan", "record", "fit")
 
 
 def add_parser(subparsers: Any) -> None:

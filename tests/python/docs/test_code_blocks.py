@@ -19,6 +19,7 @@ PAGES = (
     "docs/guide/scenes.md",
     "docs/guide/shapes.md",
     "docs/guide/build-a-skin.md",
+    "docs/guide/teaching.md",
     "docs/guide/calibration.md",
     "docs/guide/board.md",
     "docs/guide/gestures.md",

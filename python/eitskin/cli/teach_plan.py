@@ -1,0 +1,66 @@
+"""``eitskin teach plan SKIN -n N``: where to press, as a list and as a template to lay on."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from eitskin.cli.arguments import option
+
+
+def add_parser(actions: Any) -> None:
+    """Add ``plan``."""
+    parser = actions.add_parser(
+        "plan",
+        help="where to press, and a template in true size to lay on the skin",
+        description=(
+            "Choose places that leave the least unknown of the skin's answer, by the physics alone."
+            " The first n of a longer plan are a plan of n: stop when you like."
+        ),
+    )
+    option(parser, "skin SKIN.toml", "skin description", Path)
+    option(parser, "-n --presses N", "how many places", default=50)
+    option(parser, "-o --output PLAN.csv", "the places, for  teach record", Path)
+    option(parser, "--picture TEMPLATE.pdf", "in true size, on A4 pages; .svg: one sheet", Path)
+    option(
+        parser,
+        "--practice SCENE.toml",
+        "a scene with a finger that presses so, to try  teach record --device sim:SCENE.toml",
+        Path,
+    )
+    option(parser, "--json")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Choose, draw, write, print."""
+    from eitskin.fileio import refuse_unwritable, write_beside
+    from eitskin.skin.skin import load_skin
+    from eitskin.teaching.plan import plan_places, save_plan
+    from eitskin.teaching.practice import practice_scene
+
+    refuse_unwritable(options.output, options.picture, options.practice)
+    skin, protocol = load_skin(options.skin)
+    plan = plan_places(skin, protocol, options.presses)
+    if options.picture is not None:
+        from eitskin.view.template_picture import draw_template
+
+        pages = draw_template(options.picture, skin, plan.place_mm)
+    if options.output is not None:
+        save_plan(options.output, plan)
+    if options.practice is not None:
+        with write_beside(options.practice) as temporary:
+            temporary.write_text(
+                practice_scene(skin, options.skin.resolve(), plan), encoding="utf-8"
+            )
+    if options.json:
+        print(json.dumps({"skin": skin.name, "place_mm": plan.place_mm.round(2).tolist()}))
+        return 0
+    print(f"skin {skin.name!r}: press here, in this order (mm, as the description has x and y)")
+    for number, (x, y) in enumerate(plan.place_mm):
+        print(f"{number + 1:4d} {x:8.1f} {y:8.1f}")
+    if options.picture is not None:
+        print(f"{options.picture}: {pages} page{'s' * (pages > 1)}; print at 100 %")
+    return 0

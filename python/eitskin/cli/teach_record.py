@@ -1,0 +1,168 @@
+"""``eitskin teach record --plan PLAN -o PRESSES``: guides a person press by press."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.cli.arguments import option
+from eitskin.cli.device_options import add_device, say
+from eitskin.errors import UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from eitskin.frames.frames import Frames
+    from eitskin.live.session import Session
+    from eitskin.skin.protocol import Protocol
+    from eitskin.teaching.guide import GuideEvent
+    from eitskin.teaching.plan import Plan
+
+    TimedFrames = Iterator[tuple[np.ndarray, float]]
+
+
+def add_parser(actions: Any) -> None:
+    """Add ``record``."""
+    parser = actions.add_parser(
+        "record",
+        help="press where the plan says; each good press goes to the file at once",
+        description=(
+            "Guide through the places of a plan: which is next, when to press, when to lift. The"
+            " untouched frame just before each press is taken with it. A press that was not held,"
+            " moved or slipped is asked for again. Stop with Ctrl-C and go on later with the same"
+            " command. On a terminal: b and Enter goes back to the press before, s leaves a place"
+            " out, q ends."
+        ),
+    )
+    option(parser, "--plan PLAN.csv", "from  teach plan, or x_mm,y_mm by hand", Path, required=True)
+    option(parser, "-o --output PRESSES.npz", None, Path, required=True)
+    option(parser, "--overwrite", "begin again where the output exists")
+    option(parser, "--skin SKIN.toml", "kept in the file, for  teach fit", Path)
+    option(
+        parser,
+        "--frames FRAMES.npz",
+        "a frames file in place of a board: the skin untouched and pressed in turn, in time",
+        Path,
+    )
+    each = parser.add_mutually_exclusive_group()
+    option(each, "--depth-mm MM", "of every press, where the plan says none", float)
+    option(each, "--force-n N", "of every press, where the plan says none", float)
+    add_device(parser, json=False)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Guide; say what came of it."""
+    from eitskin.fileio import read_bytes, refuse_unwritable
+    from eitskin.frames.frames import load_frames
+    from eitskin.skin.skin import load_skin
+    from eitskin.teaching.plan import load_plan
+
+    plan = _with_given(load_plan(options.plan), options)
+    refuse_unwritable(options.output)
+    text = ""
+    if options.skin is not None:
+        load_skin(options.skin)
+        text = read_bytes(options.skin, "skin description", 1_000_000).decode("utf-8")
+    if options.frames is not None:
+        frames = load_frames(options.frames, allow_nonfinite=True)
+        return _guide(options, plan, text, frames.protocol, _in_time(frames))
+    return _before_a_board(options, plan, text)
+
+
+def _with_given(plan: Plan, options: argparse.Namespace) -> Plan:
+    from dataclasses import replace
+
+    import numpy as np
+
+    given = {"depth_mm": options.depth_mm, "force_n": options.force_n}
+    for name, value in given.items():
+        if value is None:
+            continue
+        if not 0 <= value <= 1e6:
+            flag = "--" + name.replace("_", "-")
+            raise UsageError(f"{flag} {value:g} is out of range; use 0 to 1000000")
+        old = getattr(plan, name)
+        plan = replace(plan, **{name: np.where(np.isnan(old), value, old)})
+    return plan
+
+
+def _in_time(frames: Frames) -> TimedFrames:
+    for number, frame in enumerate(frames.voltage_v):
+        yield frame, float(number if frames.time_s is None else frames.time_s[number])
+
+
+def _before_a_board(options: argparse.Namespace, plan: Plan, text: str) -> int:
+    from eitskin.device.known_model import scanned_protocol
+    from eitskin.device.settings import ScanSettings
+    from eitskin.device.wire.link_table import Stream
+    from eitskin.live.session import Session, SessionSettings
+
+    settings = SessionSettings(
+        mode=Stream.RAW, every=1, model=options.model, firmware=options.firmware,
+        scan=ScanSettings(check_every=1),
+    )  # fmt: skip
+    with Session(options.device, settings, say=say) as session:
+        protocol = scanned_protocol(session.device.board, session.known, session.name)
+        return _guide(options, plan, text, protocol, _live(session))
+
+
+def _live(session: Session) -> TimedFrames:
+    from eitskin.device.live import LiveFrame
+
+    for item in session.items():
+        if isinstance(item, LiveFrame) and item.raw is not None and not item.raw.quiet:
+            yield item.raw.voltage_v, item.time_us / 1e6
+
+
+def _guide(
+    options: argparse.Namespace, plan: Plan, text: str, protocol: Protocol, frames: TimedFrames
+) -> int:
+    from eitskin.teaching.guide import PressFile, PressGuide, guide_presses
+
+    if options.overwrite:
+        options.output.unlink(missing_ok=True)
+    file = PressFile(options.output, plan, protocol, text)
+    if file.numbers:
+        say(f"{options.output}: {len(file.numbers)} presses are there; going on")
+    guide = PressGuide(plan, start=file.following)
+
+    def shown(event: GuideEvent) -> None:
+        if event.number >= len(plan):
+            print(event.text, flush=True)
+            return
+        x, y = plan.place_mm[event.number]
+        where = f"{event.number + 1:3d} of {len(plan)}, at ({x:.1f}, {y:.1f}) mm"
+        print(f"{where}: {event.text}", flush=True)
+
+    try:
+        guide_presses(frames, guide, file, shown, _keys())
+    except KeyboardInterrupt:
+        print("eitskin: stopped", file=sys.stderr)
+    left = len(plan) - file.following
+    print(f"{options.output}: {len(file.numbers)} presses" + (f", {left} places left" * (left > 0)))
+    return 0
+
+
+def _keys() -> Callable[[], str]:
+    """The letter of the last line that was typed since; nothing where nobody can type."""
+    if not sys.stdin or not sys.stdin.isatty():
+        return lambda: ""
+    import queue
+    import threading
+
+    typed: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            typed.put(line.strip()[:1].lower())
+
+    threading.Thread(target=read, daemon=True).start()
+
+    def key() -> str:
+        return "" if typed.empty() else typed.get()
+
+    return key

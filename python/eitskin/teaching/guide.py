@@ -1,0 +1,328 @@
+"""A person presses where the plan says: which place is next, when to press, when to lift, and
+whether a press is good. It sees frames and nothing else, so that the command line, the page and a
+program guide alike.
+
+A press is seen by its distance from the skin at rest, in units of the noise at rest: the rms over
+rows of change over the row's noise. It counts when it was held: two halves of the hold differ by
+little, neither in strength (it went on sinking, or was let go) nor in direction over the rows (it
+moved or slipped). The untouched frame is the mean of the frames just before.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import FrameError, UsageError
+from eitskin.skin.protocol import Protocol
+from eitskin.teaching.plan import Plan
+from eitskin.teaching.presses import Presses, joined, load_presses, save_presses
+
+FloatArray = npt.NDArray[np.float64]
+
+SAME_PLACE_MM = 0.02
+
+
+class Step(Enum):
+    """What the person is asked to do."""
+
+    REST = "leave the skin untouched"
+    PRESS = "press"
+    HOLD = "hold still"
+    LIFT = "lift"
+    DONE = "done"
+
+
+@dataclass(frozen=True)
+class GuideSettings:
+    """How presses are seen.
+
+    Attributes:
+        rest_frames: of which the untouched frame is the mean.
+        settle_frames: after contact, before the hold counts.
+        hold_frames: of which the pressed frame is the mean.
+        patience_frames: that a skin which never rests is waited for.
+        press_above: a change of so many times the noise is a press.
+        lifted_below: one of so small a part of the press is none any more.
+        strength_change: between the halves of a hold, at most.
+        turn: 1 - cosine between the changes of the two halves, at most, beside what noise makes.
+    """
+
+    rest_frames: int = 12
+    settle_frames: int = 8
+    hold_frames: int = 12
+    patience_frames: int = 200
+    press_above: float = 8.0
+    lifted_below: float = 0.2
+    strength_change: float = 0.1
+    turn: float = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class GuideEvent:
+    """What changed with a frame: ``step`` is what to do now, at place ``number`` (from 0); ``text``
+    says it to the person; ``accepted`` and ``rejected`` what became of a press."""
+
+    step: Step
+    number: int
+    text: str
+    accepted: bool = False
+    rejected: str = ""
+
+
+class PressGuide:
+    """Guides through ``plan`` from place ``start`` on. ``feed`` it every frame; ``taken`` is the
+    last good press: untouched and pressed frame (m,), time in s.
+
+    Raises:
+        UsageError: the plan has no place ``start``.
+    """
+
+    def __init__(self, plan: Plan, settings: GuideSettings | None = None, start: int = 0) -> None:
+        if not 0 <= start <= len(plan):
+            raise UsageError(f"teach: the plan has {len(plan)} places, so not number {start + 1}")
+        self.plan, self.settings = plan, settings or GuideSettings()
+        self.number = start
+        self.taken: tuple[FloatArray, FloatArray, float] | None = None
+        self.step = Step.REST if start < len(plan) else Step.DONE
+        self._rest: deque[FloatArray] = deque(maxlen=self.settings.rest_frames)
+        self._noise: FloatArray | None = None
+        self._untouched: FloatArray | None = None
+        self._hold: list[FloatArray] = []
+        self._strength, self._good, self._waited = 0.0, True, 0
+
+    @property
+    def place_mm(self) -> tuple[float, float]:
+        """Where to press now; the last place at the end."""
+        x, y = self.plan.place_mm[min(self.number, len(self.plan) - 1)]
+        return float(x), float(y)
+
+    def back(self, number: int) -> GuideEvent:
+        """Ask for place ``number`` again."""
+        self.number = number
+        return self._rests(f"place {number + 1} again")
+
+    def skip(self) -> GuideEvent:
+        """Leave this place out."""
+        return self._next("left out")
+
+    def feed(self, voltage_v: npt.ArrayLike, time_s: float) -> GuideEvent | None:
+        """Take a frame (m,) at ``time_s``; None where nothing changed. Frames with rows that were
+        not measured are passed over."""
+        frame = np.asarray(voltage_v, dtype=np.float64)
+        if self.step is Step.DONE or not np.isfinite(frame).all():
+            return None
+        return {
+            Step.REST: self._at_rest,
+            Step.PRESS: self._waiting,
+            Step.HOLD: self._holding,
+            Step.LIFT: self._lifting,
+        }[self.step](frame, time_s)
+
+    def _at_rest(self, frame: FloatArray, _: float) -> GuideEvent | None:
+        """Wait until the skin rests: two halves of the last frames agree to within the noise. One
+        that creeps for ever is taken as it is after ``patience_frames``."""
+        self._rest.append(frame)
+        self._waited += 1
+        if len(self._rest) < self.settings.rest_frames:
+            return None
+        frames = np.array(self._rest)
+        spread = np.diff(frames, axis=0).std(axis=0) / np.sqrt(2)
+        noise = np.maximum(spread, 0.2 * np.median(spread) + np.finfo(float).tiny)
+        self._noise = noise if self._noise is None else 0.8 * self._noise + 0.2 * noise
+        half = len(frames) // 2
+        moved = _rms((frames[half:].mean(axis=0) - frames[:half].mean(axis=0)) / self._noise)
+        patient = self._waited < self.settings.patience_frames
+        if moved > self.settings.press_above / 4 and patient:
+            return None
+        self._untouched = frames.mean(axis=0)
+        return self._asks(Step.PRESS, "press")
+
+    def _waiting(self, frame: FloatArray, _: float) -> GuideEvent | None:
+        assert self._noise is not None
+        assert self._untouched is not None
+        if self._size(frame) <= self.settings.press_above:
+            self._rest.append(frame)
+            self._untouched = np.array(self._rest)[: -(len(self._rest) // 4)].mean(axis=0)
+            return None
+        self._hold = []
+        return self._asks(Step.HOLD, "hold still")
+
+    def _holding(self, frame: FloatArray, time_s: float) -> GuideEvent | None:
+        self._hold.append(frame)
+        wanted = self.settings
+        if len(self._hold) < wanted.settle_frames + wanted.hold_frames:
+            if self._size(frame) > wanted.press_above / 2:
+                return None
+            return self._refuses("it was let go too early; hold it until you are told to lift")
+        frames = np.array(self._hold[wanted.settle_frames :])
+        wrong = self._judged(frames)
+        pressed = frames.mean(axis=0)
+        self._strength = self._size(pressed)
+        if wrong:
+            return self._refuses(wrong)
+        assert self._untouched is not None
+        self.taken = (self._untouched, pressed, time_s)
+        self.step = Step.LIFT
+        return GuideEvent(Step.LIFT, self.number, "good; lift", accepted=True)
+
+    def _judged(self, frames: FloatArray) -> str:
+        """What is wrong with a hold, or nothing."""
+        assert self._noise is not None
+        assert self._untouched is not None
+        half = len(frames) // 2
+        first, second = (
+            (part.mean(axis=0) - self._untouched) / self._noise
+            for part in (frames[:half], frames[half:])
+        )
+        sizes = np.linalg.norm(first), np.linalg.norm(second)
+        change = sizes[1] / sizes[0] - 1
+        noisy = len(first) * 2 / half / sizes[0] ** 2  # what the noise of both halves makes of it
+        if 1 - first @ second / (sizes[0] * sizes[1]) > self.settings.turn + noisy:
+            return "it moved or slipped"
+        if abs(change) > self.settings.strength_change + 2 * np.sqrt(noisy / len(first)):
+            return f"it was not held: its strength changed by {100 * change:+.0f} %"
+        return ""
+
+    def _lifting(self, frame: FloatArray, _: float) -> GuideEvent | None:
+        limit = max(self.settings.press_above, self.settings.lifted_below * self._strength)
+        if self._size(frame) > limit:
+            return None
+        return self._next("") if self._good else self._rests("")
+
+    def _refuses(self, why: str) -> GuideEvent:
+        self._good = False
+        self.step = Step.LIFT
+        self._strength = max(self._strength, self._size(self._hold[-1]))
+        return GuideEvent(Step.LIFT, self.number, f"again, please: {why}; lift first", rejected=why)
+
+    def _next(self, text: str) -> GuideEvent:
+        self.number += 1
+        if self.number < len(self.plan):
+            return self._rests(text)
+        self.step = Step.DONE
+        return GuideEvent(Step.DONE, self.number, "all places are done")
+
+    def _rests(self, text: str) -> GuideEvent:
+        self._rest.clear()
+        self._good, self._waited = True, 0
+        return self._asks(
+            Step.REST, f"{text}; leave the skin untouched" if text else Step.REST.value
+        )
+
+    def _asks(self, step: Step, text: str) -> GuideEvent:
+        self.step = step
+        return GuideEvent(step, self.number, text)
+
+    def _size(self, frame: FloatArray) -> float:
+        """The change over the noise."""
+        assert self._noise is not None
+        assert self._untouched is not None
+        return _rms((frame - self._untouched) / self._noise)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+class PressFile:
+    """The presses of a session on disk, whole after each: one that is killed goes on later where it
+    stopped. ``following`` is the place after the last that is there.
+
+    Raises:
+        FrameError: an earlier file has another protocol, or places that are not the plan's.
+        FileError: it cannot be read or written.
+    """
+
+    def __init__(self, path: Path, plan: Plan, protocol: Protocol, skin: str) -> None:
+        self.path, self.plan, self.protocol, self.skin = path, plan, protocol, skin
+        self.presses = load_presses(path) if path.exists() else None
+        self.numbers: list[int] = []
+        if self.presses is None:
+            return
+        if self.presses.protocol.hash != protocol.hash:
+            raise FrameError(f"{path}: made with another protocol; give another -o, or --overwrite")
+        for place in self.presses.place_mm:
+            away = np.linalg.norm(plan.place_mm - place, axis=1)
+            self.numbers.append(int(np.argmin(away)))
+            if away.min() > SAME_PLACE_MM or self.numbers != sorted(set(self.numbers)):
+                raise FrameError(
+                    f"{path}: its places are not this plan's; give another -o, or --overwrite"
+                )
+
+    @property
+    def following(self) -> int:
+        """The place after the last press, from 0."""
+        return self.numbers[-1] + 1 if self.numbers else 0
+
+    def add(self, number: int, untouched: FloatArray, pressed: FloatArray, time_s: float) -> None:
+        """One more press, at place ``number``; on disk when this returns."""
+        one = np.array([number])
+        new = Presses(
+            self.protocol, untouched[None], pressed[None], self.plan.place_mm[one],
+            depth_mm=_known(self.plan.depth_mm[one]), force_n=_known(self.plan.force_n[one]),
+            time_s=np.array([time_s]), skin=self.skin,
+        )  # fmt: skip
+        if self.presses is not None:
+            times = self.presses.time_s
+            new = joined(self.presses, new)
+            if times is not None:
+                new = replace(new, time_s=np.append(times, time_s))
+        save_presses(self.path, new)
+        self.presses = new
+        self.numbers.append(number)
+
+    def back(self) -> int:
+        """Forget the last press; returns its place, 0 where there was none."""
+        if self.presses is None:
+            return 0
+        number = self.numbers.pop()
+        if self.numbers:
+            self.presses = self.presses.take(np.arange(len(self.numbers)))
+            save_presses(self.path, self.presses)
+        else:
+            self.presses = None
+            self.path.unlink(missing_ok=True)
+        return number
+
+
+def _known(values: FloatArray) -> FloatArray | None:
+    return None if np.isnan(values).all() else values
+
+
+def guide_presses(
+    frames: Iterable[tuple[npt.ArrayLike, float]],
+    guide: PressGuide,
+    file: PressFile,
+    say: Callable[[GuideEvent], None],
+    key: Callable[[], str] = lambda: "",
+) -> None:
+    """Guide until all places are done or ``frames`` (voltages (m,), time in s) end.
+
+    ``key`` is asked before each frame: "b" goes back to the press before, "s" leaves a place out,
+    "q" ends.
+    """
+    if guide.step is not Step.DONE:
+        say(GuideEvent(guide.step, guide.number, Step.REST.value))
+    for voltage_v, time_s in frames:
+        pressed = key()
+        if pressed == "q" or guide.step is Step.DONE:
+            return
+        if pressed == "b":
+            say(guide.back(file.back()))
+        elif pressed == "s":
+            say(guide.skip())
+        event = guide.feed(voltage_v, time_s)
+        if event is None:
+            continue
+        if event.accepted and guide.taken is not None:
+            file.add(event.number, *guide.taken)
+        say(event)
+        if event.step is Step.DONE:
+            return

@@ -1,0 +1,45 @@
+"""A scene in which a finger presses where a plan says, one press after another, at the pace of a
+person: to try teaching without a skin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from eitskin.skin.skin import Skin
+from eitskin.teaching.plan import Plan
+
+REST_S, PRESS_S = 1.2, 1.2
+RATE_HZ = 40.0
+RADIUS_PER_SIZE = 0.04
+
+
+def practice_scene(skin: Skin, path: Path, plan: Plan) -> str:
+    """The scene's TOML for ``skin``, whose description is the file ``path``: insulating presses,
+    since a probe that conducts would make other changes than most do."""
+    low_x, low_y, high_x, high_y = skin.outline.bounding_box_mm
+    radius = RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
+    period = REST_S + PRESS_S
+    lines = [
+        "[scene]",
+        'name = "practice"',
+        f'description = "A finger presses {len(plan)} places of a plan."',
+        f'skin = "{path.as_posix()}"',
+        f"frames = {round((period * len(plan) + REST_S) * RATE_HZ)}",
+        f"rate_hz = {RATE_HZ:g}",
+        "elements = 3000",
+        "",
+        "[effects.noise]",
+        "snr_db = 60.0",
+    ]
+    for number, (x, y) in enumerate(plan.place_mm):
+        start = REST_S + period * number
+        lines += [
+            "",
+            "[[touch]]",
+            f"radius_mm = {radius:.2f}",
+            f"x_mm = {x:.2f}",
+            f"y_mm = {y:.2f}",
+            f"from_s = {start:.3f}",
+            f"to_s = {start + PRESS_S:.3f}",
+        ]
+    return "\n".join(lines) + "\n"

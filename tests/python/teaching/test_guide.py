@@ -1,0 +1,151 @@
+"""Guiding a person through a plan: places, presses that are good and that are not, going on after a
+kill, and a whole session before a simulated board."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.cli.main import main
+from eitskin.errors import FrameError
+from eitskin.skin.electrodes import Electrodes
+from eitskin.skin.outline import disk
+from eitskin.skin.protocol import adjacent, opposite
+from eitskin.skin.skin import Skin
+from eitskin.teaching.guide import GuideEvent, PressFile, PressGuide, Step, guide_presses
+from eitskin.teaching.plan import Plan, load_plan, plan_places, save_plan
+from eitskin.teaching.presses import load_presses
+
+ROWS = opposite(8)
+SKIN = """
+[skin]
+name = "small"
+diameter_mm = 100.0
+thickness_mm = 5.0
+conductivity_s_per_m = 0.02
+[electrodes]
+count = 8
+width_mm = 5.0
+[protocol]
+kind = "opposite"
+"""
+
+
+def plan_of(count: int) -> Plan:
+    place = np.column_stack([np.arange(count) * 10.0, np.zeros(count)])
+    return Plan(place, np.full(count, np.nan), np.full(count, np.nan))
+
+
+class Finger:
+    """Frames of a skin at 1 V a row with noise of 1 mV, and presses of 50 mV along a pattern of
+    their own."""
+
+    def __init__(self) -> None:
+        self.draw = np.random.default_rng(3)
+        self.frames: list[np.ndarray] = []
+        self.pattern = self.draw.normal(size=(9, ROWS.n_rows))
+
+    def add(self, count: int, strength: np.ndarray | float = 0.0, pattern: int = 0) -> Finger:
+        change = 0.05 * np.broadcast_to(strength, count)[:, None] * self.pattern[pattern]
+        self.frames += list(1 + change + 1e-3 * self.draw.normal(size=change.shape))
+        return self
+
+    def good(self, pattern: int = 0) -> Finger:
+        return self.add(20).add(25, 1.0, pattern)
+
+    def guided(self, path: Path, count: int) -> tuple[PressFile, list[GuideEvent]]:
+        said: list[GuideEvent] = []
+        file = PressFile(path, plan_of(count), ROWS, "")
+        guide = PressGuide(plan_of(count), start=file.following)
+        timed = ((frame, 0.02 * k) for k, frame in enumerate(self.frames))
+        guide_presses(timed, guide, file, said.append)
+        return file, said
+
+
+def test_good_presses_are_taken_with_the_frame_before(tmp_path: Path) -> None:
+    finger = Finger().good(0).good(1).good(2).add(20)
+    _, said = finger.guided(tmp_path / "p.npz", 3)
+    presses = load_presses(tmp_path / "p.npz")
+    assert [event.step for event in said[:5]] == [
+        Step.REST, Step.PRESS, Step.HOLD, Step.LIFT, Step.REST
+    ]  # fmt: skip
+    assert said[-1].step is Step.DONE
+    assert np.array_equal(presses.place_mm, plan_of(3).place_mm)
+    assert np.abs(presses.difference - 0.05 * finger.pattern[:3]).max() < 2e-3
+    assert np.abs(presses.untouched - 1).max() < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("bad", "why"),
+    [
+        (lambda f: f.add(9, 1.0), "let go too early"),
+        (lambda f: f.add(25, np.linspace(0.6, 1.6, 25)), "was not held"),
+        (lambda f: f.add(13, 1.0, 0).add(12, 1.0, 5), "moved or slipped"),
+    ],
+    ids=["short", "sinking", "slipping"],
+)
+def test_a_bad_press_is_asked_for_again(bad, why: str, tmp_path: Path) -> None:
+    finger = Finger().add(20)
+    bad(finger)
+    _, said = finger.good(1).add(20).guided(tmp_path / "p.npz", 1)
+    rejected = [event.rejected for event in said if event.rejected]
+    assert len(rejected) == 1 and why in rejected[0]
+    presses = load_presses(tmp_path / "p.npz")
+    assert np.abs(presses.difference - 0.05 * finger.pattern[1]).max() < 2e-3
+
+
+def test_a_killed_session_goes_on_and_can_go_back(tmp_path: Path) -> None:
+    path = tmp_path / "p.npz"
+    Finger().good(0).good(1).guided(path, 3)
+    file, said = Finger().good(2).add(20).guided(path, 3)
+    assert file.numbers == [0, 1, 2] and said[-1].step is Step.DONE
+    assert file.back() == 2 and len(load_presses(path)) == 2
+    with pytest.raises(FrameError, match="its places are not this plan's"):
+        PressFile(path, plan_of(1), ROWS, "")
+    with pytest.raises(FrameError, match="made with another protocol"):
+        PressFile(path, plan_of(3), adjacent(8), "")
+
+
+def test_places_spread_over_the_skin(tmp_path: Path) -> None:
+    skin = Skin("disk", disk(100.0), Electrodes(count=8, width_mm=5.0))
+    plan = plan_places(skin, opposite(8), 12)
+    assert np.linalg.norm(plan.place_mm, axis=1).max() < 46
+    apart = np.linalg.norm(plan.place_mm[:, None] - plan.place_mm[None], axis=2)
+    assert apart[~np.eye(12, dtype=bool)].min() > 8
+    save_plan(tmp_path / "plan.csv", plan)
+    assert np.allclose(load_plan(tmp_path / "plan.csv").place_mm, plan.place_mm, atol=0.006)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("a,b\n1,2\n", "x_mm,y_mm"), ("x_mm,y_mm\n1,\n", "line 2"), ("x_mm,y_mm\n1,two\n", "two")],
+)
+def test_a_plan_that_is_none(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "plan.csv").write_text(text)
+    with pytest.raises(FrameError, match=said):
+        load_plan(tmp_path / "plan.csv")
+
+
+def test_a_session_before_a_simulated_board(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Plan, practice, record, fit, as a person would."""
+    skin, plan, scene, presses, model = (
+        str(tmp_path / name)
+        for name in ("skin.toml", "plan.csv", "scene.toml", "presses.npz", "taught.eitm")
+    )
+    Path(skin).write_text(SKIN)
+    assert main(["model", "build", skin, "--samples", "0", "-o", str(tmp_path / "m.eitm")]) == 0
+    assert main(["teach", "plan", skin, "-n", "12", "-o", plan, "--practice", scene,
+                 "--picture", str(tmp_path / "template.pdf")]) == 0  # fmt: skip
+    assert (tmp_path / "template.pdf").read_bytes()[:5] == b"%PDF-"
+    device = ["--device", f"sim:{scene}", "--model", str(tmp_path / "m.eitm")]
+    assert main(["teach", "record", "--plan", plan, "-o", presses, "--skin", skin, *device]) == 0
+    assert "all places are done" in capsys.readouterr().out
+    assert np.allclose(load_presses(presses).place_mm, load_plan(plan).place_mm)
+    assert main(["teach", "fit", presses, "-o", model, "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["presses"] == 12
