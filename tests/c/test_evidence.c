@@ -427,10 +427,11 @@ static void ghosts_beside_touches_go(void)
         const uint32_t before = f.count;
         eits_test_touches(ctx, &ctx->scratch, &f);
         CHECK_EQUAL(f.tested, 1);
-        CHECK(f.count >= ctx->reference.far && f.count <= before);
+        /* one disc for two touches may become two */
+        CHECK(f.count >= ctx->reference.far && f.count <= (before > 2 ? before : 2));
         for (uint32_t k = 0; k < f.count; ++k)
             CHECK(f.rise[k] > 0 && f.place_mm2[k][0] > 0 && f.place_mm2[k][2] > 0);
-        for (uint32_t k = 0; size == 0 && k < 2 && k < before; ++k) {
+        for (uint32_t k = 0; size == 0 && before > 1 && k < 2; ++k) {
             double nearest = 1e9;
             for (uint32_t l = 0; l < f.count; ++l)
                 nearest = fmin(nearest, hypot((double)(f.disc[l].x_mm - discs[k].x_mm),
@@ -441,8 +442,53 @@ static void ghosts_beside_touches_go(void)
     }
 }
 
+/* One wide disc for two at random, side by side: where two are found they lie by the true ones. One
+ * for one stays one; so does what is as many as may be. */
+static void two_side_by_side_are_split(void)
+{
+    uint64_t state = 5;
+    int split = 0, left = 0;
+    for (int round = 0; round < 60; ++round) {
+        bench b;
+        eits_context *ctx = set_up(&b, round & 1);
+        const double angle = 3 * small_random(&state), apart = 8 + 3 * small_random(&state),
+                     c = cos(angle), s = sin(angle);
+        eits_disc two[2] = {ONE, ONE}, one = ONE;
+        for (int k = 0; k < 2; ++k) {
+            two[k].x_mm = (eits_real)((k == 0 ? apart : -apart) * c);
+            two[k].y_mm = (eits_real)((k == 0 ? apart : -apart) * s);
+            two[k].radius_mm = 7;
+        }
+        one.x_mm = one.y_mm = 0;
+        one.radius_mm = R(11.5);
+        one.change = R(0.0125);
+        for (int i = 0; i < PACKED; ++i)
+            b.errors[i] *= round % 3 == 0 ? 1.0f : 0.001f;
+        stage_discs(&b, round < 50 ? two : &one, round < 50 ? 2 : 1);
+        ctx->options.max_touches = round % 10 == 9 ? 1 : 8;
+        eits_fit f = fit_of(ctx, &one, 1);
+        eits_test_touches(ctx, &ctx->scratch, &f);
+        CHECK_EQUAL(f.tested, 1);
+        CHECK(f.count == 1 || (f.count == 2 && round < 50 && round % 10 < 9));
+        left += f.count == 1 && round < 50 && round % 10 < 9;
+        split += f.count == 2;
+        for (uint32_t k = 0; f.count == 2 && k < 2; ++k) {
+            double nearest = 1e9;
+            for (uint32_t l = 0; l < 2; ++l)
+                nearest = fmin(nearest, hypot((double)(f.disc[l].x_mm - two[k].x_mm),
+                                              (double)(f.disc[l].y_mm - two[k].y_mm)));
+            CHECK(nearest < 4);
+            CHECK(f.rise[k] > 0 && f.place_mm2[k][0] > 0 && f.place_mm2[k][2] > 0);
+        }
+        dense_bench_close(&b.b);
+    }
+    CHECK(split > 5);
+    CHECK(left > 0);
+}
+
 int main(void)
 {
+    two_side_by_side_are_split();
     leaving_out_is_solving_again_without();
     refitting_lowers_the_misfit_by_limited_steps();
     what_model_errors_could_have_made_goes();

@@ -127,6 +127,47 @@ static void pairs_bulge_where_their_dipole_does_not(void)
     CHECK(eits_pair_score(&scratch, &answer, &likelihood, 0) == -1);
 }
 
+/* The line of a bulge at some angle, and two discs on it, of the area and strength of the one; none
+ * where they would lie off the skin, or there is no shape. */
+static void two_lie_on_the_line_of_the_bulge(void)
+{
+    eits_likelihood likelihood = {.count = 2 * EITS_SHAPE_PARAMETERS};
+    eits_answer one = {.count = 2, .parameters = EITS_SHAPE_PARAMETERS}, two;
+    const eits_disc disc = {5, -3, 8, R(0.02), 1};
+    one.disc[0] = one.disc[1] = disc;
+    one.shape[0][0] = R(0.1);
+    eits_real line[2];
+    for (int k = -17; k <= 18; ++k) {
+        const double angle = k * 3.14159265358979 / 36;
+        likelihood.step[4] = (eits_real)(0.3 * cos(2 * angle) - 0.1);
+        likelihood.step[5] = (eits_real)(0.3 * sin(2 * angle));
+        eits_pair_line(&one, &likelihood, 0, line);
+        CHECK_NEAR(fabs((double)line[0] * cos(angle) + (double)line[1] * sin(angle)), 1, 1e-4);
+        ctx->options.touch_min_radius_mm = k < 0 ? 7 : 2;
+        CHECK(eits_split_disc(ctx, &one, 0, line, &two));
+        const eits_disc *a = &two.disc[0], *b = &two.disc[2];
+        CHECK(two.count == 3 && two.disc[1].x_mm == disc.x_mm);
+        CHECK_NEAR((double)(a->x_mm + b->x_mm) / 2, 5, 1e-5);
+        CHECK_NEAR((double)(a->x_mm - b->x_mm), 2 * (double)EITS_SPLIT_APART * 8 * (double)line[0],
+                   1e-4);
+        CHECK_NEAR((double)(a->y_mm - b->y_mm), 2 * (double)EITS_SPLIT_APART * 8 * (double)line[1],
+                   1e-4);
+        CHECK_NEAR((double)a->radius_mm, k < 0 ? 7 : 8 / sqrt(2), 1e-5);
+        CHECK_NEAR((double)(a->change * a->radius_mm * a->radius_mm), 0.02 * 64 / 2, 1e-5);
+    }
+    eits_pair_line(&one, &likelihood, 1, line); /* which has no bulge */
+    for (int k = 0; k < 2; ++k) {
+        one.disc[0].x_mm = k == 0 ? 1000 : -1000;
+        CHECK(!eits_split_disc(ctx, &one, 0, line, &two));
+    }
+    one.disc[0].x_mm = 0;
+    one.count = 8; /* more than there are data for */
+    CHECK(!eits_split_disc(ctx, &one, 0, line, &two));
+    one.parameters = EITS_PLACE_PARAMETERS;
+    eits_pair_line(&one, &likelihood, 0, line);
+    CHECK(line[0] == 0 && line[1] == 0);
+}
+
 /* An axis at some angle, told by its dipole's evidence: its direction, and its length by hand; an
  * insulating touch lies across. */
 static void an_ellipse_lies_along_its_dipole(void)
@@ -178,6 +219,7 @@ int main(void)
     places_get_factor_floor_distance_and_what_the_test_would_move();
     what_is_not_known_is_zero();
     pairs_bulge_where_their_dipole_does_not();
+    two_lie_on_the_line_of_the_bulge();
     an_ellipse_lies_along_its_dipole();
     crowded_where_one_may_be_two_or_none();
     dense_bench_close(&bench);

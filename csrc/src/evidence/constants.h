@@ -153,6 +153,24 @@
 /* above which a touch may be two [log odds]. larger: fewer frames are crowded */
 #define EITS_PAIR_ODDS R(1.0)
 
+/* above which a touch is tried as two [log odds]. larger: two fingers stay one touch; smaller:
+ * costs */
+#define EITS_SPLIT_ODDS R(0.0)
+
+/* what F is to fall by for two in the place of one, of even odds [of the threshold]. larger: two
+ * fingers stay one touch; smaller: long fingers become two */
+#define EITS_SPLIT_RISE R(4.0)
+
+/* less than that [of the threshold, for each of log odds]. as PAIR_BULGE */
+#define EITS_SPLIT_RISE_OF_ODDS R(0.75)
+
+/* but at least [of the threshold]. as SPLIT_RISE */
+#define EITS_SPLIT_MIN_RISE R(0.4)
+
+/* from the middle at which the two start [of the radius]. further from it: the fit may end
+ * elsewhere */
+#define EITS_SPLIT_APART R(0.75)
+
 /* below which a touch may be none. larger: more frames are crowded */
 #define EITS_MIN_CONFIDENCE R(0.7)
 

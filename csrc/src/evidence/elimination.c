@@ -10,7 +10,9 @@
  * As soon as the data are found not to fit, the same is done for a sheet that has drifted since its
  * reference (+ D). The likelier of the two stands, by F + threshold n + log det Sigma: allowing for
  * a drift that is not there would cost light touches. What has no drift is gone on with only where
- * F as it is leaves it a chance. */
+ * F as it is leaves it a chance.
+ *
+ * At last what its shape says to be two rather than one is tried as two. */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
@@ -25,8 +27,10 @@ typedef struct verdict {
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
     eits_real best_mm[EITS_MAX_TOUCHES][2]; /* where the linearisation has the disc */
     eits_real pair[EITS_MAX_TOUCHES];       /* log odds that it is two (pair.c) */
+    eits_real line[EITS_MAX_TOUCHES][2];    /* on which two in its place would lie */
     eits_real axis[EITS_MAX_TOUCHES][2];    /* half of its long axis over its radius */
-    int changed;                            /* 1: discs were dropped or merged */
+    int drift;                              /* 1: of a sheet that has drifted */
+    int changed;                            /* 1: discs were dropped, merged or split */
     int fitted;                             /* 1: in Sigma's metric */
     int linear; /* 1: what the linearisation can do without is to be left out at once */
 } verdict;
@@ -107,6 +111,7 @@ static void shapes_of(const eits_context *ctx, const eits_scratch *scratch,
     const eits_real unit = excess(ctx, v->answer.misfit, v->answer.count);
     for (uint32_t k = 0; k < v->answer.count; ++k) {
         v->pair[k] = eits_pair_score(scratch, &v->answer, likelihood, k);
+        eits_pair_line(&v->answer, likelihood, k, v->line[k]);
         eits_long_axis(scratch, &v->answer, likelihood, k, unit, v->axis[k]);
     }
 }
@@ -302,11 +307,71 @@ static int is_clear(eits_context *ctx, const eits_scratch *scratch, verdict *v, 
 static int take_errors(eits_context *ctx, const eits_scratch *scratch, const eits_fit *f,
                        verdict *v, int drift, uint64_t *macs)
 {
+    v->drift = drift;
     if (!eits_factor_covariance(ctx, scratch, drift, &v->log_determinant, macs))
         return 0;
     eits_copy(ctx->evidence.data, f->data, EITS_STRIDE(ctx->model->rank));
     *macs += eits_whiten_errors(ctx, ctx->evidence.data);
     return 1;
+}
+
+/* The disc that is likeliest to be two; one past the last where none is likely enough. */
+static uint32_t likeliest_pair(const eits_context *ctx, const verdict *v)
+{
+    const uint32_t count = v->answer.count;
+    uint32_t likeliest = 0;
+    for (uint32_t k = 1; k < count; ++k)
+        likeliest = v->pair[k] > v->pair[likeliest] ? k : likeliest;
+    const int may_be = count > 0 && count < ctx->options.max_touches &&
+                       v->pair[likeliest] > EITS_SPLIT_ODDS &&
+                       ctx->evidence.columns_made <= EITS_TEST_COLUMNS;
+    return may_be ? likeliest : count;
+}
+
+/* Twice the usual steps: one disc and two are compared at their best. */
+static uint64_t refit_well(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
+                           eits_likelihood *likelihood)
+{
+    likelihood->at_hand = 0;
+    const uint64_t macs = eits_refit(ctx, scratch, answer, likelihood, 0);
+    return macs + eits_refit(ctx, scratch, answer, likelihood, 0);
+}
+
+/* Disc k as two, where F falls by the more the less its shape says so; 1 if they are taken. */
+static int take_split(eits_context *ctx, const eits_scratch *scratch, verdict *v, uint32_t k,
+                      uint64_t *macs)
+{
+    eits_likelihood now;
+    eits_answer one = v->answer, two;
+    if (!eits_split_disc(ctx, &v->answer, k, v->line[k], &two))
+        return 0;
+    if (!v->fitted)
+        *macs += refit_well(ctx, scratch, &one, &now);
+    *macs += refit_well(ctx, scratch, &two, &now);
+    const eits_real rise = eits_fma(-EITS_SPLIT_RISE_OF_ODDS, v->pair[k], EITS_SPLIT_RISE),
+                    least = rise > EITS_SPLIT_MIN_RISE ? rise : EITS_SPLIT_MIN_RISE;
+    if (!(one.misfit - two.misfit >
+          least * EITS_TOUCH_EVIDENCE * excess(ctx, two.misfit, two.count)))
+        return 0;
+    v->answer = two;
+    v->changed = v->fitted = 1;
+    if (!now.at_hand)
+        *macs += eits_linearise(ctx, scratch, &v->answer, &now);
+    (void)look(ctx, scratch, v, &now);
+    return 1;
+}
+
+/* Split what is likelier two, the likeliest first. The covariance is made once more: another
+ * hypothesis's may be at hand. */
+static void split(eits_context *ctx, const eits_scratch *scratch, const eits_fit *f, verdict *v,
+                  uint64_t *macs)
+{
+    uint32_t k = likeliest_pair(ctx, v);
+    if (k == v->answer.count)
+        return;
+    (void)take_errors(ctx, scratch, f, v, v->drift, macs); /* as before */
+    while (k < v->answer.count && take_split(ctx, scratch, v, k, macs))
+        k = likeliest_pair(ctx, v);
 }
 
 /* Which discs stay, in v, which has them all; 0 where they cannot be tested. */
@@ -345,6 +410,7 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
     }
     if (!judge(ctx, scratch, f, &v))
         return;
+    split(ctx, scratch, f, &v, &f->macs);
     const eits_real unit = excess(ctx, v.answer.misfit, v.answer.count);
     f->tested = 1;
     for (uint32_t k = 0; k < v.answer.count; ++k) {

@@ -16,6 +16,16 @@
 #include "base/vec.h"
 #include "evidence/constants.h"
 
+void eits_half_angle(eits_real x, eits_real y, eits_real size, eits_real axis[2])
+{
+    const eits_real cosine = x / size;
+    /* between -90 and 90 degrees */
+    axis[0] = eits_sqrt(cosine < -1 ? 0 : (1 + cosine) / 2);
+    axis[1] = eits_sqrt(cosine > 1 ? 0 : (1 - cosine) / 2);
+    if (y < 0)
+        axis[1] = -axis[1];
+}
+
 void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
                     const eits_likelihood *likelihood, uint32_t k, eits_real excess,
                     eits_real axis[2])
@@ -36,11 +46,8 @@ void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
     if (!(determinant > 0) || !(rise > EITS_ELLIPSE_EVIDENCE * excess * determinant))
         return;
     const eits_real e = EITS_ELLIPSE_MOST * d / (d + EITS_ELLIPSE_HALF),
-                    length = eits_sqrt((1 + e) / (1 - e)),
-                    cosine = answer->disc[k].polarity * u / d;
-    /* half the angle, between -90 and 90 degrees */
-    axis[0] = length * eits_sqrt(cosine < -1 ? 0 : (1 + cosine) / 2);
-    axis[1] = length * eits_sqrt(cosine > 1 ? 0 : (1 - cosine) / 2);
-    if (answer->disc[k].polarity * v < 0)
-        axis[1] = -axis[1];
+                    length = eits_sqrt((1 + e) / (1 - e)), polarity = answer->disc[k].polarity;
+    eits_half_angle(polarity * u, polarity * v, d, axis);
+    axis[0] *= length;
+    axis[1] *= length;
 }

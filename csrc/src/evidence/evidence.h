@@ -101,7 +101,20 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
 eits_real eits_pair_score(const eits_scratch *scratch, const eits_answer *answer,
                           const eits_likelihood *likelihood, uint32_t k);
 
+/* The unit vector along which disc k's edge bulges, by the linearisation: two in its place would
+ * lie on that line. 0, 0 where the disc has no shape. */
+void eits_pair_line(const eits_answer *answer, const eits_likelihood *likelihood, uint32_t k,
+                    eits_real line[2]);
+
+/* `two`: the answer with two discs on the line in the place of disc k, to be fitted; the second is
+ * its last. 0 where there is no room for them. */
+int eits_split_disc(const eits_context *ctx, const eits_answer *one, uint32_t k,
+                    const eits_real line[2], eits_answer *two);
+
 /* ellipse.c */
+
+/* The unit vector at half the angle of x, y, which is `size` long. */
+void eits_half_angle(eits_real x, eits_real y, eits_real size, eits_real axis[2]);
 
 /* Half of disc k's long axis over its radius, as a vector, by the shape that the linearisation
  * gives it; 0, 0 where it is a disc as far as the data tell. `excess`: how much worse than Sigma

@@ -8,7 +8,8 @@
  *
  *     log odds = OFFSET + BULGE a + DIPOLE b + BOTH |bulge| |dipole| + GROWTH g + GROWTH_2 g^2
  *
- * fitted on scenes of one and of two (docs/results/belief.md). */
+ * fitted on scenes of one and of two (docs/results/belief.md). What is likelier two than one is
+ * tried as two, side by side on the line along which the edge bulges (elimination.c). */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
@@ -43,4 +44,43 @@ eits_real eits_pair_score(const eits_scratch *scratch, const eits_answer *answer
     sum = eits_fma(EITS_PAIR_BOTH * bulge, dipole, sum);
     sum = eits_fma(EITS_PAIR_GROWTH, at[3], sum);
     return eits_fma(EITS_PAIR_GROWTH_2 * at[3], at[3], sum);
+}
+
+void eits_pair_line(const eits_answer *answer, const eits_likelihood *likelihood, uint32_t k,
+                    eits_real line[2])
+{
+    const eits_real *step = likelihood->step + (size_t)k * answer->parameters;
+    line[0] = line[1] = 0;
+    if (answer->parameters < EITS_SHAPE_PARAMETERS)
+        return;
+    const eits_real x = answer->shape[k][0] + step[EITS_PLACE_PARAMETERS],
+                    y = answer->shape[k][1] + step[EITS_PLACE_PARAMETERS + 1], bulge = length(x, y);
+    eits_half_angle(x, y, bulge > EITS_PAIR_MIN_BULGE ? bulge : EITS_PAIR_MIN_BULGE, line);
+}
+
+/* Both of the same strength, and together of the area and strength of the one: where the one was
+ * fitted to both, that is about what they have. */
+int eits_split_disc(const eits_context *ctx, const eits_answer *one, uint32_t k,
+                    const eits_real line[2], eits_answer *two)
+{
+    const uint32_t last = one->count;
+    const eits_disc disc = one->disc[k];
+    const eits_real least = ctx->options.touch_min_radius_mm, half = disc.radius_mm * R(0.70710678),
+                    radius = half > least ? half : least, apart = EITS_SPLIT_APART * disc.radius_mm;
+    *two = *one;
+    two->count = last + 1u;
+    two->parameters = eits_shape_parameters(ctx, two->count);
+    for (int side = 0; side < 2; ++side) {
+        const uint32_t at = side == 0 ? k : last;
+        const eits_real away = side == 0 ? apart : -apart;
+        two->disc[at] = disc;
+        two->disc[at].x_mm = eits_fma(away, line[0], disc.x_mm);
+        two->disc[at].y_mm = eits_fma(away, line[1], disc.y_mm);
+        two->disc[at].radius_mm = two->radius_mm[at] = radius;
+        two->disc[at].change =
+            disc.change * disc.radius_mm * disc.radius_mm / (2 * radius * radius);
+        memset(two->shape[at], 0, sizeof two->shape[at]);
+    }
+    return two->parameters > 0 && eits_disc_on_skin(ctx, &two->disc[k]) &&
+           eits_disc_on_skin(ctx, &two->disc[last]);
 }

@@ -29,12 +29,17 @@ from eitskin.core.constants_table import (
     SHAPE_COLUMNS,
     SHAPE_PRECISION,
     SHORTER,
+    SPLIT_APART,
+    SPLIT_MIN_RISE,
+    SPLIT_ODDS,
+    SPLIT_RISE,
+    SPLIT_RISE_OF_ODDS,
     TEST_COLUMNS,
     TOUCH_EVIDENCE,
 )
 from eitskin.reference.disc_fit import Disc, Fit
 from eitskin.reference.ellipse import long_axis
-from eitskin.reference.pair import pair_scores
+from eitskin.reference.pair import pair_lines, pair_scores
 from eitskin.reference.split_merge import merged
 
 FloatArray = npt.NDArray[np.float64]
@@ -204,7 +209,7 @@ class Hypothesis:
         self.columns_made = 0
         self.rise, self.place_mm2 = np.zeros(count), np.zeros((count, 3))
         self.best_mm, self.pair = np.zeros((count, 2)), np.zeros(count)
-        self.axis = np.zeros((count, 2))
+        self.axis, self.line = np.zeros((count, 2)), np.zeros((count, 2))
 
     @property
     def evidence(self) -> float:
@@ -352,6 +357,7 @@ class Hypothesis:
         answer, p = self.answer, self.answer.parameters
         unit = self.excess(answer.misfit, len(answer.discs))
         self.pair = pair_scores(answer.offsets(), now.step, np.diag(now.inverse))
+        self.line = pair_lines(answer.offsets(), now.step)
         self.axis = np.zeros((len(answer.discs), 2))
         for k, disc in enumerate(answer.discs if p == ALL else ()):
             own = slice(k * p + EDGE, (k + 1) * p)
@@ -401,6 +407,64 @@ class Hypothesis:
     def fits(self) -> bool:
         """Whether the data are explained about as well as Sigma says."""
         return self.excess(self.answer.misfit, len(self.answer.discs)) <= FITS
+
+    # ---- two in the place of one ----
+
+    def as_two(self, k: int) -> Answer | None:
+        """The answer with two discs in the place of disc k, on the line along which its edge
+        bulges, to be fitted; None where there is no room for them."""
+        one, disc, count = self.answer, self.answer.discs[k], len(self.answer.discs)
+        radius = max(disc.radius_mm * 0.70710678, self.fit.options.touch_min_radius_mm)
+        change = disc.change * disc.radius_mm**2 / (2 * radius**2)
+        x, y = (SPLIT_APART * disc.radius_mm * self.line[k]).tolist()
+        first, second = (
+            replace(
+                disc,
+                x_mm=disc.x_mm + side * x,
+                y_mm=disc.y_mm + side * y,
+                radius_mm=radius,
+                change=change,
+            )
+            for side in (1, -1)
+        )
+        parameters = parameters_of(self.fit, self.errors, count + 1)
+        if not (parameters and self.fit.on_skin(first) and self.fit.on_skin(second)):
+            return None
+        two = Answer(
+            [*one.discs, second],
+            np.append(one.radius_mm, radius),
+            np.vstack([one.shape, np.zeros(ALL - PLACE)]),
+            parameters,
+        )
+        two.discs[k], two.radius_mm[k], two.shape[k] = first, radius, 0.0
+        return two
+
+    def refit_well(self, answer: Answer) -> tuple[Answer, Likelihood | None]:
+        """Twice the usual steps: one disc and two are compared at their best."""
+        return self.refit(*self.refit(answer))
+
+    def take_split(self) -> bool:
+        """Take the likeliest pair as two where F falls by the more the less its shape says so."""
+        count = len(self.answer.discs)
+        k = int(np.argmax(self.pair[:count])) if count else 0
+        if not (
+            0 < count < self.fit.options.max_touches
+            and self.pair[k] > SPLIT_ODDS
+            and self.columns_made <= TEST_COLUMNS
+        ):
+            return False
+        two = self.as_two(k)
+        if two is None:
+            return False
+        one = self.answer if self.fitted else self.refit_well(self.answer)[0]
+        two, now = self.refit_well(two)
+        rise = max(SPLIT_RISE - SPLIT_RISE_OF_ODDS * self.pair[k], SPLIT_MIN_RISE)
+        allowed = rise * TOUCH_EVIDENCE * self.excess(two.misfit, count + 1)
+        if not one.misfit - two.misfit > allowed:
+            return False
+        self.answer, self.changed, self.fitted = two, True, True
+        self.look(now or self.linearise(two))
+        return True
 
     def eliminate(self, *, to_the_end: bool) -> bool:
         """From the discs as they are to those that stay; not ``to_the_end``: false as soon as the
@@ -474,7 +538,10 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
                 best.columns_made = drifted.columns_made
                 whole = best.eliminate(to_the_end=True)
             if not whole or drifted.evidence < best.evidence:
+                drifted.columns_made = max(best.columns_made, drifted.columns_made)
                 best = drifted
+    while best.take_split():
+        pass
     count = len(best.answer.discs)
     unit = best.excess(best.answer.misfit, count)
     if best.changed:

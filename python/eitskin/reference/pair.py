@@ -33,3 +33,14 @@ def pair_scores(offsets: FloatArray, step: FloatArray, variance: FloatArray) -> 
     score = PAIR_OFFSET + PAIR_BULGE * bulge / deviation[:, 1]
     score += PAIR_DIPOLE * along / deviation[:, 3] + PAIR_BOTH * bulge * dipole
     return np.asarray(score + PAIR_GROWTH * at[:, 0] + PAIR_GROWTH_2 * at[:, 0] ** 2)
+
+
+def pair_lines(offsets: FloatArray, step: FloatArray) -> FloatArray:
+    """The unit vector (k, 2) along which each disc's edge bulges: two in its place would lie on
+    that line; zeros where discs have no shape. Arguments as of ``pair_scores``."""
+    count, parameters = offsets.shape
+    if parameters < 8:
+        return np.zeros((count, 2))
+    bulge = (offsets + step.reshape(count, -1))[:, 4:6]
+    angle = np.arctan2(bulge[:, 1], bulge[:, 0]) / 2
+    return np.column_stack([np.cos(angle), np.sin(angle)])

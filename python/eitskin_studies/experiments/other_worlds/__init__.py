@@ -32,7 +32,7 @@ SHOWN = (
     "misplaced_3_mm",
     "ellipses",
     "two_fingers_12_to_16_mm",
-    "no_touch_converter_without_dither",
+    "two_fingers_16_to_24_mm",
 )
 
 
