@@ -12,6 +12,7 @@ from write_constants import python_constants
 FORMS = {
     "text": ("str", '""'),
     "version": ("tuple[int, int, int]", "(0, 0, 0)"),
+    "hash": ("bytes", "bytes(32)"),
     "pair": ("tuple[int, int]", "(0, 0)"),
     "words": ("tuple[int, int, int, int, int]", "(0, 0, 0, 0, 0)"),
     "electrodes": ("tuple[int, ...]", "()"),

@@ -1,5 +1,6 @@
 #include "app/commands.h"
 
+#include "app/drive.h"
 #include "app/models.h"
 #include "app/report.h"
 #include "app/scan_control.h"
@@ -17,7 +18,7 @@ enum {
 enum { MIN_EXCITATION_MILLIHZ = 1000, MAX_EXCITATION_MILLIHZ = 250000000 };
 /* IEC 60601-1, patient auxiliary current: 100 uA rms up to 1 kHz and in proportion above, so that a
  * microampere needs 10 Hz; at most 10 mA. */
-enum { SAFE_UA_RMS = 100, MILLIHZ_A_UA = 10000 };
+enum { SAFE_UA_RMS = 100, MILLIHZ_A_UA = 10000, MAX_UA_RMS = 10000 };
 
 static fw_answer ok(void)
 {
@@ -82,6 +83,8 @@ static fw_answer on_stream(fw_instrument *instrument, const void *payload, size_
         return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
     if ((c.what & ~EITS_STREAM_RAW) != 0 && !instrument->engine.tared)
         return fw_refuse(EITS_REPLY_NOT_TARED, 0, 0);
+    if (c.what != 0 && !fw_drive_on(instrument))
+        return fw_refuse(EITS_REPLY_TRIPPED, 0, 0);
     instrument->stream =
         (fw_stream){.what = c.what, .every = c.every, .left = c.frames, .counted = c.frames != 0};
     return ok();
@@ -99,6 +102,8 @@ static fw_answer on_tare(fw_instrument *instrument, const void *payload, size_t 
         return bad;
     if (!instrument->engine.open)
         return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
+    if (!fw_drive_on(instrument))
+        return fw_refuse(EITS_REPLY_TRIPPED, 0, 0);
     fw_tare_begin(&instrument->tare, &instrument->engine, c.request, c.frames,
                   fw_now_us(instrument));
     return (fw_answer){.later = true};
@@ -109,6 +114,21 @@ static uint32_t least_excitation_millihz(const fw_board *board)
 {
     const uint32_t ua = board->source_ua_rms;
     return ua <= SAFE_UA_RMS ? MIN_EXCITATION_MILLIHZ : ua * MILLIHZ_A_UA;
+}
+
+/* Whether what is asked for needs the owner, who does not hold the button. */
+static bool owner_away(const fw_instrument *instrument)
+{
+    const fw_board *board = instrument->board;
+    return (instrument->kept.settings & EITS_SETTING_LOCKED) != 0 &&
+           (board->system->button == NULL || !board->system->button(board->system_ctx));
+}
+
+static fw_answer refuse_locked(fw_instrument *instrument, eits_packet_type type)
+{
+    const fw_fault_detail detail = {.frame = instrument->last_frame, .index = (int32_t)type};
+    fw_fault_set(&instrument->faults, EITS_FAULT_LOCKED, true, detail);
+    return fw_refuse(EITS_REPLY_LOCKED, 0, 0);
 }
 
 /* What is wrong with scan settings by themselves; OK where nothing is. */
@@ -150,6 +170,9 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
         return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, sample_rate_hz), 0);
     if (checked.status != EITS_REPLY_OK)
         return checked;
+    /* the limit on current falls with the frequency */
+    if (c.excitation_millihz < instrument->settings.excitation_millihz && owner_away(instrument))
+        return refuse_locked(instrument, EITS_PACKET_SCAN);
     const fw_scan_settings settings = {c.excitation_millihz, c.sample_rate_hz, c.samples,
                                        c.settle_us,          c.check_every,    c.frame_period_us};
     const fw_scan_table table = fw_engine_table(&instrument->engine);
@@ -243,6 +266,8 @@ static fw_answer on_model_begin(fw_instrument *instrument, const void *payload, 
     if (c.bytes < MIN_MODEL)
         return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_model_begin, bytes),
                          MIN_MODEL);
+    if (owner_away(instrument))
+        return refuse_locked(instrument, EITS_PACKET_MODEL_BEGIN);
     return fw_upload_begin(instrument, c.bytes, c.crc);
 }
 
@@ -290,8 +315,54 @@ static fw_answer on_clear_faults(fw_instrument *instrument, const void *payload,
     (void)size;
     instrument->doubtful = instrument->agreeing = 0;
     fw_faults_clear(&instrument->faults, instrument->last_frame);
+    if (instrument->drive.state == EITS_DRIVE_TRIPPED) /* somebody has looked */
+        instrument->drive.state = EITS_DRIVE_OFF;
     fw_report_no_model(instrument);
     return ok();
+}
+
+static fw_answer on_keepalive(fw_instrument *instrument, const void *payload, size_t size)
+{
+    eits_command_keepalive c;
+    (void)size;
+    memcpy(&c, payload, sizeof c);
+    const bool stays = (instrument->kept.settings & EITS_SETTING_KEEP_DRIVE) != 0;
+    if (c.present == 0 && !stays && instrument->drive.state == EITS_DRIVE_ON)
+        fw_drive_off(instrument, EITS_DRIVE_OFF);
+    return (fw_answer){.later = true};
+}
+
+static fw_answer on_settings(fw_instrument *instrument, const void *payload, size_t size)
+{
+    eits_command_settings c;
+    fw_answer bad;
+    (void)size;
+    memcpy(&c, payload, sizeof c);
+    const uint32_t all = EITS_SETTING_KEEP_DRIVE | EITS_SETTING_LOCKED | EITS_SETTING_SENSE;
+    if (outside(&bad, offsetof(eits_command_settings, settings), c.settings, 0, all) ||
+        outside(&bad, offsetof(eits_command_settings, current_limit_ua_rms), c.current_limit_ua_rms,
+                0, MAX_UA_RMS))
+        return bad;
+    if (owner_away(instrument))
+        return refuse_locked(instrument, EITS_PACKET_SETTINGS);
+    if (instrument->drive.state != EITS_DRIVE_TRIPPED) /* the flash may have to be erased */
+        fw_drive_off(instrument, EITS_DRIVE_OFF);
+    const fw_store *store = &instrument->board->store;
+    if (fw_kept_save(store, c.settings, c.current_limit_ua_rms) != FW_OK)
+        return fw_refuse(EITS_REPLY_FLASH, 0, 0);
+    instrument->kept = fw_kept_load(store);
+    if ((c.settings & EITS_SETTING_KEEP_DRIVE) != 0)
+        (void)fw_drive_on(instrument);
+    return ok();
+}
+
+static fw_answer on_get_hashes(fw_instrument *instrument, const void *payload, size_t size)
+{
+    eits_command_plain c;
+    (void)size;
+    memcpy(&c, payload, sizeof c);
+    fw_send_hashes(instrument, c.request);
+    return (fw_answer){.later = true};
 }
 
 /* When a command has to wait: during a tare, or an upload. */
@@ -319,6 +390,10 @@ static const command COMMANDS[] = {
     {EITS_PACKET_RESET, sizeof(eits_command_plain), 0, on_reset},
     {EITS_PACKET_SELF_TEST, sizeof(eits_command_plain), NOT_IN_TARE | NOT_IN_UPLOAD, on_self_test},
     {EITS_PACKET_CLEAR_FAULTS, sizeof(eits_command_plain), 0, on_clear_faults},
+    {EITS_PACKET_KEEPALIVE, sizeof(eits_command_keepalive), 0, on_keepalive},
+    {EITS_PACKET_SETTINGS, sizeof(eits_command_settings), NOT_IN_TARE | NOT_IN_UPLOAD, on_settings},
+    {EITS_PACKET_GET_HASHES, sizeof(eits_command_plain), NOT_IN_TARE | NOT_IN_UPLOAD,
+     on_get_hashes},
 };
 
 static fw_answer dispatch(fw_instrument *instrument, const eits_link_packet *packet)

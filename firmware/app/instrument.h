@@ -6,6 +6,7 @@
 #include "app/diagnostics.h"
 #include "app/engine.h"
 #include "app/faults.h"
+#include "app/kept.h"
 #include "app/quality.h"
 #include "app/scan.h"
 #include "app/stats.h"
@@ -37,6 +38,13 @@ typedef struct fw_upload {
     uint32_t last_us; /* of the last command of it */
 } fw_upload;
 
+typedef struct fw_drive {
+    eits_drive state;
+    uint32_t heard_us; /* last packet from the host */
+    uint32_t settling; /* frames that are still dropped */
+    uint32_t sensed_us, current_ua;
+} fw_drive;
+
 typedef struct fw_instrument {
     const fw_board *board;
     fw_tx_queue tx_queue;
@@ -54,6 +62,8 @@ typedef struct fw_instrument {
     eits_event events[EITS_MAX_EVENTS];
     eits_packet_event events_sent[EITS_MAX_EVENTS];
     fw_upload upload;
+    fw_drive drive;
+    fw_kept kept;     /* the owner's settings */
     fw_record record; /* of the open model's bank */
     uint32_t bank;
     eits_status no_model_why;

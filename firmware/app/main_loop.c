@@ -1,6 +1,7 @@
 #include "app/main_loop.h"
 
 #include "app/commands.h"
+#include "app/drive.h"
 #include "app/models.h"
 #include "app/report.h"
 #include "app/scan_control.h"
@@ -30,8 +31,14 @@ void fw_instrument_init(fw_instrument *instrument, const fw_board *board)
     fw_fault_set(&instrument->faults, EITS_FAULT_WATCHDOG, last->watchdog != 0,
                  (fw_fault_detail){0});
     fw_engine_set_noise_floor(&instrument->engine, fw_noise_floor_v(instrument));
+    fw_fault_set(&instrument->faults, EITS_FAULT_CLOCK, last->clock != 0, (fw_fault_detail){0});
+    fw_fault_set(&instrument->faults, EITS_FAULT_SUPPLY, last->supply != 0, (fw_fault_detail){0});
+    instrument->kept = fw_kept_load(&board->store);
     fw_open_newest(instrument);
-    fw_start_scan(instrument);
+    if (board->frames_given || (instrument->kept.settings & EITS_SETTING_KEEP_DRIVE) != 0)
+        (void)fw_drive_on(instrument);
+    else
+        fw_start_scan(instrument); /* puts the generator into reset */
     fw_send_info(instrument, 0);
 }
 
@@ -43,8 +50,10 @@ static bool read_link(fw_instrument *instrument)
     for (size_t at = 0; at < size;) {
         eits_link_packet packet;
         at += eits_link_feed(&instrument->decoder, instrument->chunk + at, size - at, &packet);
-        if (packet.payload != NULL)
-            fw_command(instrument, &packet);
+        if (packet.payload == NULL)
+            continue;
+        fw_command(instrument, &packet);
+        fw_drive_heard(instrument); /* the host waits for what a long command does */
     }
     return size > 0;
 }
@@ -69,13 +78,13 @@ static void set_leds(const fw_instrument *instrument)
 static void watch_scan(fw_instrument *instrument)
 {
     const uint32_t now_us = fw_now_us(instrument);
-    const bool wanted = instrument->engine.open && !instrument->upload.active;
     if (fw_scan_stalled(&instrument->scan, now_us)) {
         fw_fault_set(&instrument->faults, EITS_FAULT_SCAN_STALLED, true,
                      (fw_fault_detail){.frame = instrument->last_frame});
         fw_fail_tare(instrument, EITS_E_REFERENCE_SHORT);
         fw_start_scan(instrument);
-    } else if (wanted && !instrument->scan.running && now_us - instrument->tried_us > FW_RETRY_US) {
+    } else if (fw_scan_wanted(instrument) && !instrument->scan.running &&
+               now_us - instrument->tried_us > FW_RETRY_US) {
         fw_start_scan(instrument);
     }
 }
@@ -88,10 +97,14 @@ bool fw_instrument_step(fw_instrument *instrument)
     bool worked = read_link(instrument);
     fw_frame *frame = fw_scan_take(&instrument->scan);
     if (frame != NULL) {
-        fw_process_frame(instrument, frame);
+        if (instrument->drive.settling > 0)
+            --instrument->drive.settling;
+        else
+            fw_process_frame(instrument, frame);
         fw_scan_release(&instrument->scan);
         worked = true;
     }
+    fw_drive_check(instrument);
     watch_scan(instrument);
     fw_upload_check(instrument);
     set_leds(instrument);

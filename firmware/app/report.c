@@ -1,5 +1,8 @@
 #include "app/report.h"
 
+#include "app/drive.h"
+#include "app/sha256.h"
+
 #include <string.h>
 
 static void copy_text(char *to, size_t room, const char *from)
@@ -43,7 +46,12 @@ void fw_send_info(fw_instrument *instrument, uint32_t request)
                              .streaming = instrument->stream.what,
                              .every = instrument->stream.every,
                              .frame_period_us = s->frame_period_us,
-                             .faults = instrument->faults.raised};
+                             .faults = instrument->faults.raised,
+                             .drive = (uint16_t)instrument->drive.state,
+                             .settings = (uint16_t)instrument->kept.settings,
+                             .source_ua_rms = board->source_ua_rms,
+                             .current_ua_rms = instrument->drive.current_ua,
+                             .current_limit_ua_rms = fw_current_limit_ua(instrument)};
     if (!board->frames_given) {
         info.excitation_millihz = (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning);
         info.sample_rate_hz = s->sample_rate_hz;
@@ -56,6 +64,19 @@ void fw_send_info(fw_instrument *instrument, uint32_t request)
     copy_text(info.serial, sizeof info.serial, board->serial);
     report_model(instrument, &info);
     (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_INFO, &info, sizeof info, NULL, 0);
+}
+
+void fw_send_hashes(fw_instrument *instrument, uint32_t request)
+{
+    const fw_board *board = instrument->board;
+    eits_packet_hashes hashes = {.request = request};
+    if (instrument->engine.open)
+        fw_sha256(board->store.ops->bank(board->store.ctx, instrument->bank),
+                  instrument->record.model_bytes, hashes.model);
+    if (board->image != NULL)
+        fw_sha256(board->image, board->image_bytes, hashes.firmware);
+    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_HASHES, &hashes, sizeof hashes, NULL,
+                           0);
 }
 
 static void collect(fw_instrument *instrument, eits_packet_stats *stats)

@@ -25,7 +25,20 @@ static fw_status start_generator(fw_instrument *instrument)
         fw_ad9833_tuning(instrument->board->mclk_hz, instrument->settings.excitation_millihz);
     if (generator->state == FW_AD9833_RUNNING && generator->tuning == tuning)
         return FW_OK;
+    instrument->engine.phase_known = false; /* it begins with the write that starts it */
     return fw_ad9833_start(generator, tuning, 0, FW_SINE);
+}
+
+static fw_status stop_generator(fw_instrument *instrument)
+{
+    fw_ad9833 *generator = &instrument->generator;
+    return generator->state == FW_AD9833_RESET ? FW_OK : fw_ad9833_stop(generator);
+}
+
+bool fw_scan_wanted(const fw_instrument *instrument)
+{
+    return instrument->drive.state == EITS_DRIVE_ON && instrument->engine.open &&
+           !instrument->upload.active;
 }
 
 void fw_start_scan(fw_instrument *instrument)
@@ -35,9 +48,10 @@ void fw_start_scan(fw_instrument *instrument)
     fw_stop_scan(instrument);
     instrument->tried_us = fw_now_us(instrument);
     const fw_fault_detail detail = {.frame = instrument->last_frame};
-    fw_status status = start_generator(instrument);
+    const bool wanted = fw_scan_wanted(instrument);
+    fw_status status = wanted ? start_generator(instrument) : stop_generator(instrument);
     bool bus = status != FW_OK;
-    if (status == FW_OK && instrument->engine.open && !instrument->upload.active) {
+    if (status == FW_OK && wanted) {
         const fw_scan_table table = fw_engine_table(&instrument->engine);
         status = fw_demodulate_setup(&instrument->demodulator, &board->capture, board->mclk_hz,
                                      instrument->generator.tuning, s->excitation_millihz,

@@ -4,10 +4,12 @@
 
 #include "app/instrument.h"
 
-/* Start generator and scan where a model is open and no upload is under way; what cannot be started
+/* Start generator and scan where they are wanted, else stop both; what cannot be started
  * is tried again. */
 void fw_start_scan(fw_instrument *instrument);
 void fw_stop_scan(fw_instrument *instrument);
+/* Whether there should be one: the drive is on, a model is open, no upload is under way. */
+bool fw_scan_wanted(const fw_instrument *instrument);
 
 /* What the converter's steps alone make of noise with the scan's settings; 0 where the frames are
  * another instrument's. */

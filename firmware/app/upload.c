@@ -16,9 +16,10 @@ static void pause_scan(fw_instrument *instrument)
 {
     fw_upload *upload = &instrument->upload;
     upload->last_us = fw_now_us(instrument);
-    if (!upload->active)
-        fw_stop_scan(instrument);
+    if (upload->active)
+        return;
     upload->active = true;
+    fw_start_scan(instrument); /* which stops it, and the generator */
 }
 
 /* The model in use goes on. */

@@ -91,8 +91,10 @@ typedef struct fw_link {
     void *ctx;
 } fw_link;
 
-/* ---- model storage: FW_BANKS regions that are erased whole and read in place ---- */
+/* ---- storage: regions that are erased whole and read in place. FW_BANKS of bank_bytes hold
+ * models, those behind them up to FW_PAGES, of page_bytes, the owner's settings ---- */
 #define FW_BANKS 2u
+#define FW_PAGES 4u
 typedef struct fw_store_ops {
     const uint8_t *(*bank)(void *ctx, uint32_t bank); /* 16-byte aligned, memory-mapped */
     /* to 0xFF; may take seconds; feeds the watchdog */
@@ -104,7 +106,14 @@ typedef struct fw_store {
     const fw_store_ops *ops;
     void *ctx;
     uint32_t bank_bytes;
+    uint32_t page_bytes; /* 0: no settings are kept */
 } fw_store;
+
+/* ---- the current through the skin, by a resistor in its way back ---- */
+typedef struct fw_sense {
+    uint32_t (*measure_ua_rms)(void *ctx); /* takes about 0.3 ms; NULL: it cannot be measured */
+    void *ctx;
+} fw_sense;
 
 /* ---- the rest of a board ---- */
 typedef struct fw_system_ops {
@@ -118,6 +127,7 @@ typedef struct fw_system_ops {
     void (*reset)(void *ctx);                   /* does not return */
     uint32_t (*stack_used)(void *ctx);          /* most bytes so far */
     void (*set_leds)(void *ctx, uint32_t leds); /* bit 0 alive, bit 1 touch, bit 2 fault */
+    bool (*button)(void *ctx);                  /* the owner holds it now; NULL: there is none */
 } fw_system_ops;
 
 /* What the start-up code found in memory that survives a reset. */
@@ -125,6 +135,8 @@ typedef struct fw_last_reset {
     uint32_t crash;    /* 1: a processor fault, words as in EITS_FAULT_CRASH */
     uint32_t watchdog; /* 1 */
     uint32_t words[5];
+    uint32_t clock;  /* 1: the generator's clock failed */
+    uint32_t supply; /* 1: the supply fell */
 } fw_last_reset;
 
 typedef struct fw_board {
@@ -137,6 +149,8 @@ typedef struct fw_board {
     /* What the current source drives, as built; 0: none flows. It bounds the excitation from below
      * (docs/guide/hardware.md, "Safety"). */
     uint32_t source_ua_rms;
+    /* dropped after the current was switched on, while capacitors in its way settle */
+    uint32_t settle_frames;
     fw_spi generator; /* AD9833 */
     /* lines 0-3 A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- */
     fw_lines multiplexers;
@@ -146,6 +160,9 @@ typedef struct fw_board {
     const fw_system_ops *system;
     void *system_ctx;
     fw_last_reset last_reset;
+    fw_sense sense;
+    const uint8_t *image; /* the program, for its hash; NULL: not known */
+    size_t image_bytes;
     bool frames_given; /* by another instrument, of whose scan nothing is known */
     void *workspace;   /* 16-byte aligned: the core's, and the frames' */
     size_t workspace_bytes;

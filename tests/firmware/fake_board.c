@@ -5,11 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-enum {
-    OFF_NS = 140 /* the data sheet's, not the driver's */,
-    MAX_WAIT_NS = 1000000,
-    ERASE_STEPS = 2
-};
+enum { MAX_WAIT_NS = 1000000, ERASE_STEPS = 2 };
 
 static void record(fake_board *f, fake_kind kind, uint32_t a, uint32_t b)
 {
@@ -34,6 +30,7 @@ static fw_status spi_write(void *ctx, const uint16_t *words, size_t count)
         record(f, FAKE_SPI, words[k], 0);
         if (ad9833_model_write(&f->generator, words[k]))
             f->released_ns = f->now_ns;
+        drive_monitor_word(&f->monitor, &f->generator, words[k], f->now_ns);
         f->now_ns += 2000;
     }
     return FW_OK;
@@ -74,7 +71,7 @@ static double amplitude_at(const fake_board *f, double at_ns)
 static void electrodes_of(const fake_board *f, uint8_t electrodes[4])
 {
     for (int k = 0; k < 4; ++k)
-        electrodes[k] = (uint8_t)(f->levels >> (4 * k) & 15u);
+        electrodes[k] = (uint8_t)(f->monitor.lines >> (4 * k) & 15u);
 }
 
 static fw_status lines_write(void *ctx, uint32_t mask, uint32_t levels)
@@ -83,14 +80,8 @@ static fw_status lines_write(void *ctx, uint32_t mask, uint32_t levels)
     if (fails(f->lines_calls++, f->lines_fail_from, f->lines_fails))
         return FW_E_BUS;
     record(f, FAKE_LINES, mask, levels);
-    const uint32_t before = f->levels, after = (before & ~mask) | (levels & mask);
-    if ((before & 0xFFFFu) != (after & 0xFFFFu) && (before & 0xF0000u) != 0)
-        ++f->address_while_enabled;
-    if ((before & 0xF0000u) != 0 && (after & 0xF0000u) == 0)
-        f->disabled_ns = f->now_ns;
-    if ((before & 0xF0000u) == 0 && (after & 0xF0000u) != 0 && f->now_ns - f->disabled_ns < OFF_NS)
-        ++f->enabled_too_soon;
-    f->levels = after;
+    drive_monitor_lines(&f->monitor, mask, levels, f->now_ns);
+    const uint32_t after = f->monitor.lines;
     uint8_t electrodes[4];
     electrodes_of(f, electrodes);
     const double amplitude = amplitude_at(f, (double)f->now_ns);
@@ -210,7 +201,13 @@ static void flash_step(fake_board *f)
 
 static const uint8_t *store_bank(void *ctx, uint32_t bank)
 {
-    return ((fake_board *)ctx)->bank[bank];
+    fake_board *f = ctx;
+    return bank < FW_BANKS ? f->bank[bank] : f->page[bank - FW_BANKS];
+}
+
+static uint32_t bytes_of(uint32_t bank)
+{
+    return bank < FW_BANKS ? FAKE_BANK : FAKE_PAGE;
 }
 
 static fw_status store_erase(void *ctx, uint32_t bank)
@@ -219,13 +216,15 @@ static fw_status store_erase(void *ctx, uint32_t bank)
     ++f->erases;
     /* a sector cut while erasing reads as anything */
     for (uint32_t part = 0; part < ERASE_STEPS; ++part) {
-        uint8_t *sector = f->bank[bank] + part * (FAKE_BANK / ERASE_STEPS);
-        for (uint32_t k = 0; k < FAKE_BANK / ERASE_STEPS; k += 7)
+        const uint32_t bytes = bytes_of(bank) / ERASE_STEPS;
+        uint8_t *sector = (uint8_t *)store_bank(ctx, bank) + part * bytes;
+        for (uint32_t k = 0; k < bytes; k += 7)
             sector[k] |= (uint8_t)(k * 37u);
         flash_step(f);
-        memset(sector, 0xFF, FAKE_BANK / ERASE_STEPS);
+        memset(sector, 0xFF, bytes);
     }
     f->now_ns += 2000000000u;
+    drive_monitor_heard(&f->monitor, f->now_ns); /* the host waits for the answer */
     return f->erase_status;
 }
 
@@ -233,19 +232,20 @@ static fw_status store_program(void *ctx, uint32_t bank, uint32_t offset, const 
                                size_t size)
 {
     fake_board *f = ctx;
-    if (offset % 4u != 0 || size % 4u != 0 || offset + size > FAKE_BANK)
+    if (offset % 4u != 0 || size % 4u != 0 || offset + size > bytes_of(bank))
         return FW_E_ARGUMENT;
     if (f->program_status != FW_OK)
         return f->program_status;
+    uint8_t *cells = (uint8_t *)store_bank(ctx, bank) + offset;
     for (size_t k = 0; k < size; ++k) {
-        uint8_t *cell = &f->bank[bank][offset + k];
+        uint8_t *cell = &cells[k];
         const uint8_t byte = ((const uint8_t *)bytes)[k];
         if (k % 4u == 2) /* power goes within a word */
             flash_step(f);
         f->rewrites += (uint32_t)((*cell & byte) != byte);
         *cell &= byte;
     }
-    return memcmp(&f->bank[bank][offset], bytes, size) == 0 ? FW_OK : FW_E_FLASH;
+    return memcmp(cells, bytes, size) == 0 ? FW_OK : FW_E_FLASH;
 }
 
 void fake_put_model(fake_board *f, uint32_t bank, uint32_t generation, const uint8_t *blob,
@@ -278,6 +278,8 @@ static size_t link_read(void *ctx, uint8_t *bytes, size_t room)
     fake_board *f = ctx;
     const size_t left = f->to_board_size - f->to_board_at, size = left < room ? left : room;
     memcpy(bytes, f->to_board + f->to_board_at, size);
+    if (size > 0)
+        drive_monitor_heard(&f->monitor, f->now_ns);
     f->to_board_at += size;
     if (f->to_board_at == f->to_board_size)
         f->to_board_at = f->to_board_size = 0;
@@ -337,19 +339,30 @@ static void system_set_leds(void *ctx, uint32_t leds)
     ((fake_board *)ctx)->leds = leds;
 }
 
+static bool button(void *ctx)
+{
+    return ((fake_board *)ctx)->button;
+}
+
+static uint32_t measure_ua_rms(void *ctx)
+{
+    return ((fake_board *)ctx)->current_ua;
+}
+
 static const fw_spi_ops SPI = {spi_write};
 static const fw_lines_ops LINES = {lines_write, lines_wait};
 static const fw_capture_ops CAPTURE = {capture_configure, capture_start, capture_stop};
 static const fw_link_ops LINK = {link_write, link_read, link_ended};
 static const fw_store_ops STORE = {store_bank, store_erase, store_program};
-static const fw_system_ops SYSTEM = {time_us,       system_wait,  system_lock, system_unlock,
-                                     feed_watchdog, system_reset, stack_used,  system_set_leds};
+static const fw_system_ops SYSTEM = {time_us,       system_wait,     system_lock,
+                                     system_unlock, feed_watchdog,   system_reset,
+                                     stack_used,    system_set_leds, button};
 
 void fake_restart(fake_board *f)
 {
     f->capturing = f->stalled = f->in_interrupt = false;
     f->generator = (ad9833_model){0};
-    f->levels = 0;
+    f->monitor = (drive_monitor){.violation = f->monitor.violation, .opened_ns = f->now_ns - 1000};
     f->events = f->bursts = 0;
     f->to_board_size = f->to_board_at = f->to_host_size = 0;
     f->host_room = SIZE_MAX;
@@ -367,6 +380,7 @@ void fake_init(fake_board *f, uint32_t start_us)
     f->random = 99;
     f->extra_turn = 0.137;
     memset(f->bank, 0xFF, sizeof f->bank);
+    memset(f->page, 0xFF, sizeof f->page);
     f->board = (fw_board){.name = "fake",
                           .serial = "00112233445566778899AABB",
                           .f_cpu_hz = 216000000,
@@ -377,9 +391,10 @@ void fake_init(fake_board *f, uint32_t start_us)
                           .multiplexers = {&LINES, f},
                           .capture = {&CAPTURE, f, 4095, 3300000, 1000000},
                           .link = {&LINK, f},
-                          .store = {&STORE, f, FAKE_BANK},
+                          .store = {&STORE, f, FAKE_BANK, FAKE_PAGE},
                           .system = &SYSTEM,
                           .system_ctx = f,
+                          .sense = {measure_ua_rms, f},
                           .workspace = f->workspace,
                           .workspace_bytes = sizeof f->workspace};
     fake_restart(f);

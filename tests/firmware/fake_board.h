@@ -8,7 +8,7 @@
 #define FW_FAKE_BOARD_H
 
 #include "app/instrument.h"
-#include "boards/parts/ad9833_model.h"
+#include "boards/parts/drive_monitor.h"
 
 #include <setjmp.h>
 
@@ -20,7 +20,7 @@
 #define FAKE_ROWS      4096
 #endif
 
-enum { FAKE_SPI_LOG = 64, FAKE_EVENTS = 256 };
+enum { FAKE_SPI_LOG = 64, FAKE_EVENTS = 256, FAKE_PAGE = 256 /* eight records */ };
 
 typedef enum fake_kind { FAKE_SPI, FAKE_LINES } fake_kind;
 
@@ -55,9 +55,7 @@ typedef struct fake_board {
     double extra_turn;    /* phase that the way through cables and skin adds */
 
     /* multiplexers and skin */
-    uint32_t levels;
-    uint64_t disabled_ns;
-    uint32_t address_while_enabled, enabled_too_soon; /* break-before-make violations */
+    drive_monitor monitor; /* has the levels of the lines */
     double (*volts)(void *user, const uint8_t electrodes[4], uint64_t at_ns);
     void *user;
     double tau_ns;
@@ -82,12 +80,15 @@ typedef struct fake_board {
 
     /* flash: NOR */
     _Alignas(16) uint8_t bank[FW_BANKS][FAKE_BANK];
+    uint8_t page[FW_PAGES - FW_BANKS][FAKE_PAGE];
     uint32_t flash_steps, cut_at; /* power goes at this step (counted from 1; 0: never) */
     jmp_buf cut;
     fw_status erase_status, program_status;
     uint32_t erases, rewrites; /* rewrites: a bit was to be programmed from 0 to 1 */
 
     uint32_t feeds, resets, leds;
+    bool button;         /* the owner holds it */
+    uint32_t current_ua; /* that flows */
     _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
 
     /* link; the bytes under way last, so that a copy may leave them out */

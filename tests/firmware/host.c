@@ -1,5 +1,6 @@
 #include "host.h"
 
+#include "app/drive.h"
 #include "app/main_loop.h"
 
 #include <stdio.h>
@@ -24,6 +25,10 @@ static void keep(host *h, const eits_link_packet *packet)
 
 static void collect(host *h)
 {
+    if (h->board->monitor.violation != NULL) {
+        fprintf(stderr, "the board did what it must not: %s\n", h->board->monitor.violation);
+        abort();
+    }
     for (size_t at = 0; at < h->board->to_host_size;) {
         eits_link_packet packet;
         at += eits_link_feed(&h->decoder, h->board->to_host + at, h->board->to_host_size - at,
@@ -32,6 +37,15 @@ static void collect(host *h)
             keep(h, &packet);
     }
     h->board->to_host_size = 0;
+}
+
+/* As if a keepalive came all the time; it would change the counters. */
+static void listen(host *h)
+{
+    if (h->quiet)
+        return;
+    drive_monitor_heard(&h->board->monitor, h->board->now_ns);
+    fw_drive_heard(&h->instrument);
 }
 
 void host_start(host *h, fake_board *board)
@@ -43,12 +57,17 @@ void host_start(host *h, fake_board *board)
     host_forget(h);
     if (eits_link_decoder_init(&h->decoder, h->decoding, sizeof h->decoding) != EITS_OK)
         abort();
+    board->monitor.needs_host = !h->kept_on;
     fw_instrument_init(&h->instrument, &board->board);
+    listen(h);
+    if (!h->quiet)
+        (void)fw_drive_on(&h->instrument);
     collect(h);
 }
 
 void host_step(host *h)
 {
+    listen(h);
     if (!fw_instrument_step(&h->instrument))
         fake_wait(h->board);
     collect(h);

@@ -18,9 +18,11 @@ typedef struct host {
     fake_board *board;
     fw_instrument instrument;
     uint32_t request, sequence;
+    bool kept_on;  /* the owner lets current flow without a host */
     uint32_t gaps; /* sequence numbers of the board that did not come */
     uint32_t expected;
     bool known;
+    bool quiet; /* does not ask for current, and is not heard but by what it sends */
     host_packet packet[HOST_PACKETS];
     uint32_t packets;
     size_t used;

@@ -18,9 +18,9 @@ static void test_sequence(void)
     const fw_adg1206 bank = fresh();
     const uint8_t first[4] = {1, 2, 12, 15}, second[4] = {0, 8, 4, 5};
     CHECK_EQUAL(fw_adg1206_select(&bank, first), FW_OK);
-    CHECK_EQUAL(board.levels, 0xFFC21); /* V-, V+, I-, I+ from the left, all enabled */
+    CHECK_EQUAL(board.monitor.lines, 0xFFC21); /* V-, V+, I-, I+ from the left, all enabled */
     CHECK_EQUAL(fw_adg1206_select(&bank, second), FW_OK);
-    CHECK_EQUAL(board.levels, 0xF5480);
+    CHECK_EQUAL(board.monitor.lines, 0xF5480);
     CHECK_EQUAL(board.writes, 6);
     CHECK_EQUAL(written[3].a, 0xF0000); /* off */
     CHECK_EQUAL(written[3].b & 0xF0000u, 0);
@@ -30,10 +30,9 @@ static void test_sequence(void)
     CHECK_EQUAL(written[5].b, 0xF0000);
     CHECK(written[4].at_ns - written[3].at_ns >= 140); /* tOFF(EN) of the data sheet */
     CHECK(written[4].at_ns - written[3].at_ns < 1000);
-    CHECK_EQUAL(board.address_while_enabled, 0);
-    CHECK_EQUAL(board.enabled_too_soon, 0);
+    CHECK(board.monitor.violation == NULL);
     CHECK_EQUAL(fw_adg1206_all_off(&bank), FW_OK);
-    CHECK_EQUAL(board.levels & 0xF0000u, 0);
+    CHECK_EQUAL(board.monitor.lines & 0xF0000u, 0);
 }
 
 static void test_every_electrode(void)
@@ -46,11 +45,10 @@ static void test_every_electrode(void)
             electrodes[place] = e;
             CHECK_EQUAL(fw_adg1206_select(&bank, electrodes), FW_OK);
             for (uint32_t k = 0; k < 4; ++k)
-                CHECK_EQUAL(board.levels >> (4 * k) & 15u, electrodes[k]);
+                CHECK_EQUAL(board.monitor.lines >> (4 * k) & 15u, electrodes[k]);
         }
     }
-    CHECK_EQUAL(board.address_while_enabled, 0);
-    CHECK_EQUAL(board.enabled_too_soon, 0);
+    CHECK(board.monitor.violation == NULL);
 }
 
 static void test_range(void)
@@ -61,7 +59,7 @@ static void test_range(void)
     CHECK_EQUAL(fw_adg1206_select(&bank, good), FW_OK);
     for (size_t k = 0; k < sizeof bad / sizeof bad[0]; ++k)
         CHECK_EQUAL(fw_adg1206_select(&bank, bad[k]), FW_E_ARGUMENT);
-    CHECK_EQUAL(board.levels, 0xF4321); /* as it was */
+    CHECK_EQUAL(board.monitor.lines, 0xF4321); /* as it was */
     CHECK_EQUAL(board.writes, 3);
 }
 
@@ -75,11 +73,11 @@ static void test_lines_fail(void)
         board.lines_fails = 1;
         CHECK_EQUAL(fw_adg1206_select(&bank, after), FW_E_BUS);
         if (at > 0)
-            CHECK_EQUAL(board.levels & 0xF0000u, 0); /* off again */
-        CHECK_EQUAL(board.address_while_enabled, 0);
+            CHECK_EQUAL(board.monitor.lines & 0xF0000u, 0); /* off again */
+        CHECK(board.monitor.violation == NULL);
         board.lines_fails = 0;
         CHECK_EQUAL(fw_adg1206_select(&bank, after), FW_OK);
-        CHECK_EQUAL(board.levels, 0xF8765);
+        CHECK_EQUAL(board.monitor.lines, 0xF8765);
     }
 }
 

@@ -55,7 +55,7 @@ static void test_lengths(void)
 static void test_unknown(void)
 {
     eits_command_plain c = {0};
-    REPLY(host_command(&b.host, (eits_packet_type)0x8D, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
+    REPLY(host_command(&b.host, (eits_packet_type)0x90, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
           0, 0);
     REPLY(host_command(&b.host, (eits_packet_type)0xFF, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
           0, 0);

@@ -114,7 +114,7 @@ static void test_multiplexer_bus(void)
     host_run(&b.host, 500);
     CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
     CHECK_EQUAL(told(EITS_FAULT_SOLVER, true), 1);
-    CHECK_EQUAL(b.board.address_while_enabled, 0);
+    CHECK(b.board.monitor.violation == NULL);
     b.board.lines_fails = 0;
     host_run(&b.host, 500);
     CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);

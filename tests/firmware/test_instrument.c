@@ -243,7 +243,7 @@ static void test_streaming(void)
     host_run(&b.host, 200);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_EVENTS), 4); /* whether any happened or not */
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 0);
-    CHECK_EQUAL(host_last(&b.host, EITS_PACKET_EVENTS)->size, sizeof(eits_packet_events));
+    CHECK_EQUAL(host_packet_of(&b.host, EITS_PACKET_EVENTS, 0)->size, sizeof(eits_packet_events));
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_IMAGE, 2, 0).status, EITS_REPLY_OK);
     const eits_packet_info info = host_info(&b.host);
     CHECK_EQUAL(info.streaming, EITS_STREAM_IMAGE);

@@ -26,8 +26,7 @@ static void test_order(const skin_spec *spec, uint32_t rows)
     for (uint32_t k = 0; k < b.board.bursts; ++k)
         wrong += memcmp(b.board.selected[k], b.open.protocol + 4 * (size_t)(k % rows), 4) != 0;
     CHECK_EQUAL(wrong, 0);
-    CHECK_EQUAL(b.board.address_while_enabled, 0);
-    CHECK_EQUAL(b.board.enabled_too_soon, 0);
+    CHECK(b.board.monitor.violation == NULL);
     CHECK_EQUAL(b.host.instrument.scan.slots_repeated, 0);
     CHECK_EQUAL(b.board.setup.slot_us, 100);
     bench_stop(&b);

@@ -24,8 +24,8 @@ static void test_no_model(void)
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_NO_MODEL);
     host_run(&b.host, 3000);
     CHECK_EQUAL(b.board.bursts, 0);
-    CHECK_EQUAL(b.board.levels & 0xF0000u, 0);
-    CHECK_NEAR(fake_generator_hz(&b.board), 50000, 0.02);
+    CHECK_EQUAL(b.board.monitor.lines & 0xF0000u, 0);
+    CHECK_NEAR(fake_generator_hz(&b.board), 0, 0);
     CHECK((b.board.leds & 4u) != 0);
     skin_model model = skin_model_make(&SKIN_ADJACENT);
     CHECK_EQUAL(host_upload(&b.host, model.blob, model.size, model.crc, 4096).status,
@@ -98,13 +98,14 @@ static void test_starts_and_ends(void)
     CHECK_EQUAL(info->volts_per_code_nv, 805664);
     CHECK_NEAR(eits_get_options(b.host.instrument.engine.ctx)->noise_floor_v, 73.547e-6, 1e-9);
     CHECK_EQUAL(info->slot_us, 100);
+    fake_restart(&b.board);
     b.board.ended = true;
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &b.board.board), 0);
     eits_command_plain reset = {77};
     host_send(&b.host, EITS_PACKET_RESET, &reset, sizeof reset);
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &b.board.board), 2);
     CHECK_EQUAL(b.board.resets, 1);
-    CHECK_EQUAL(b.board.levels & 0xF0000u, 0);
+    CHECK_EQUAL(b.board.monitor.lines & 0xF0000u, 0);
     CHECK_NEAR(fake_generator_hz(&b.board), 0, 0);
     fw_board wrong = b.board.board;
     wrong.workspace = b.board.workspace + 4;

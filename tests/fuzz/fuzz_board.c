@@ -106,7 +106,8 @@ static void check_packet(const eits_link_packet *packet)
         memcpy(&fault, payload, sizeof fault);
         MUST(fault.code > 0 && fault.code < EITS_FAULTS && fault.raised <= 1);
     } else {
-        MUST(packet->type == EITS_PACKET_INFO || packet->type == EITS_PACKET_STATS);
+        MUST(packet->type == EITS_PACKET_INFO || packet->type == EITS_PACKET_STATS ||
+             packet->type == EITS_PACKET_HASHES);
     }
 }
 
@@ -149,7 +150,8 @@ static void check_board(void)
     /* at 350 uA, 100 uA for each kilohertz */
     MUST(s->excitation_millihz >= 3500000 && s->excitation_millihz <= 250000000);
     MUST(fw_whole_periods(s->excitation_millihz, s->sample_rate_hz, s->samples));
-    MUST(fake.address_while_enabled == 0 && fake.enabled_too_soon == 0);
+    MUST(fake.monitor.violation == NULL);
+    fake.monitor.needs_host = (m.instrument.kept.settings & EITS_SETTING_KEEP_DRIVE) == 0;
     MUST(fake.rewrites == 0 || worn);
     MUST(!m.instrument.upload.begun || !m.instrument.engine.open ||
          m.instrument.upload.bank != m.instrument.bank);
@@ -159,6 +161,7 @@ static void power_up(void)
 {
     fake_restart(&fake);
     m.known = false;
+    fake.monitor.needs_host = false; /* until it is known what the owner wants */
     fw_instrument_init(&m.instrument, &fake.board);
     listen();
 }

@@ -16,7 +16,7 @@ extern "C" {
 #endif
 
 /* The first byte of every packet; a packet of another version is rejected. */
-#define EITS_LINK_VERSION     5u
+#define EITS_LINK_VERSION     6u
 #define EITS_LINK_MAX_PAYLOAD 16384u
 
 /* Below 0x80 from the board, from there on to it. */
@@ -37,6 +37,8 @@ typedef enum eits_packet_type {
     EITS_PACKET_STATS = 0x13,
     /* a fault that rose or went */
     EITS_PACKET_FAULT = 0x14,
+    /* SHA-256 of the model and of the firmware */
+    EITS_PACKET_HASHES = 0x16,
     /* never on a wire: the first packet of an .eits file */
     EITS_PACKET_RECORDING = 0x70,
     /* send an INFO */
@@ -64,7 +66,13 @@ typedef enum eits_packet_type {
     /* run the model's golden frame */
     EITS_PACKET_SELF_TEST = 0x8b,
     /* forget the faults */
-    EITS_PACKET_CLEAR_FAULTS = 0x8c
+    EITS_PACKET_CLEAR_FAULTS = 0x8c,
+    /* the host is there, or goes and the current stops; not answered */
+    EITS_PACKET_KEEPALIVE = 0x8d,
+    /* the owner's settings, kept in flash */
+    EITS_PACKET_SETTINGS = 0x8e,
+    /* send HASHES */
+    EITS_PACKET_GET_HASHES = 0x8f
 } eits_packet_type;
 
 /* How a command ended, and what `detail` of the reply adds. */
@@ -102,7 +110,11 @@ typedef enum eits_reply_status {
     /* [0] least frame period of this scan, us */
     EITS_REPLY_TOO_FAST = 15,
     /* [0] difference to the golden image in parts per 1e9 of its peak */
-    EITS_REPLY_SELF_TEST = 16
+    EITS_REPLY_SELF_TEST = 16,
+    /* the owner has locked the board: its blue button must be held */
+    EITS_REPLY_LOCKED = 17,
+    /* the current was above its limit: CLEAR_FAULTS first */
+    EITS_REPLY_TRIPPED = 18
 } eits_reply_status;
 
 /* Bits of a row's quality byte. */
@@ -154,9 +166,17 @@ typedef enum eits_fault {
     /* only solved frames raise it; a tare ends it */
     EITS_FAULT_STALE_REFERENCE = 14,
     /* likewise */
-    EITS_FAULT_UNLIKE_MODEL = 15
+    EITS_FAULT_UNLIKE_MODEL = 15,
+    /* the current was above its limit and was switched off; value: uA rms */
+    EITS_FAULT_CURRENT = 16,
+    /* the board restarted because the generator's clock failed */
+    EITS_FAULT_CLOCK = 17,
+    /* the board restarted because its supply fell below 2.9 V */
+    EITS_FAULT_SUPPLY = 18,
+    /* the locked board refused a command; index: its packet type */
+    EITS_FAULT_LOCKED = 19
 } eits_fault;
-#define EITS_FAULTS 16u
+#define EITS_FAULTS 20u
 
 /* ELECTRODE_OPEN, SATURATED and BRIDGED rise in the frame that shows them, MODEL_MISMATCH,
  * ELECTRODE_NOISY, STALE_REFERENCE and UNLIKE_MODEL with the third in a row, since a touch that
@@ -254,6 +274,16 @@ typedef struct eits_packet_info {
     uint32_t faults;
     /* between the electrodes, for one step of the converter */
     uint32_t volts_per_code_nv;
+    /* eits_drive */
+    uint16_t drive;
+    /* bits of eits_setting */
+    uint16_t settings;
+    /* what the current source gives as built; 0: not known */
+    uint32_t source_ua_rms;
+    /* as measured last; 0: there is no sense resistor, or no current */
+    uint32_t current_ua_rms;
+    /* above which the drive goes off; 0: none */
+    uint32_t current_limit_ua_rms;
 } eits_packet_info;
 
 /* How the command with this request number ended. */
@@ -588,6 +618,56 @@ typedef struct eits_command_mask_row {
     /* 1: leave it out; 0: use it again */
     uint16_t masked;
 } eits_command_mask_row;
+
+/* Whether current may flow through the skin, and why not. */
+typedef enum eits_drive {
+    /* no host has asked for frames */
+    EITS_DRIVE_OFF = 0,
+    /* a host has, and is heard */
+    EITS_DRIVE_ON = 1,
+    /* off: no packet came from the host for a second */
+    EITS_DRIVE_SILENT = 2,
+    /* off: the current was above its limit */
+    EITS_DRIVE_TRIPPED = 3
+} eits_drive;
+
+/* Bits of the owner's settings. */
+typedef enum eits_setting {
+    /* current flows on where no host listens */
+    EITS_SETTING_KEEP_DRIVE = 1,
+    /* models, settings and lower excitations need the blue button */
+    EITS_SETTING_LOCKED = 2,
+    /* a sense resistor is fitted: the current is measured */
+    EITS_SETTING_SENSE = 4
+} eits_setting;
+
+/* The host is there. Any command says so; this one asks for nothing, and is not answered. */
+typedef struct eits_command_keepalive {
+    /* not looked at */
+    uint32_t request;
+    /* 1: it is; 0: it goes, and the current stops now */
+    uint32_t present;
+} eits_command_keepalive;
+
+/* The owner's settings, all of them, kept over a loss of power. */
+typedef struct eits_command_settings {
+    /* never 0; the reply repeats it */
+    uint32_t request;
+    /* bits of eits_setting */
+    uint32_t settings;
+    /* at most 10,000; 0: 1.25 times what the source gives */
+    uint32_t current_limit_ua_rms;
+} eits_command_settings;
+
+/* SHA-256 of what the board's flash holds. */
+typedef struct eits_packet_hashes {
+    /* of the GET_HASHES that asked */
+    uint32_t request;
+    /* of the model in use; zero: none */
+    uint8_t model[32];
+    /* of the program; zero: not known */
+    uint8_t firmware[32];
+} eits_packet_hashes;
 
 #ifdef __cplusplus
 }

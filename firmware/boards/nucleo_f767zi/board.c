@@ -7,21 +7,25 @@ enum {
     FULL_SCALE_CODE = 4095,
     REFERENCE_UV = 3300000,
     FRONT_END_GAIN_PPM = 1500000,
-    SOURCE_UA_RMS = 350
+    SOURCE_UA_RMS = 350,
+    /* 40 ms at the fastest scan: the blocking capacitors of generator and source */
+    SETTLE_FRAMES = 2,
+    BLINKS = 16
 };
 
 /* No 8 MHz: nothing that follows would be right. The red light blinks, from the 16 MHz oscillator,
- * and that is all. */
+ * for a few seconds, with all pins to multiplexers and generator floating. */
 __attribute__((noreturn)) static void no_clock(void)
 {
     RCC_AHB1ENR |= RCC_AHB1ENR_GPIOBEN;
     (void)RCC_AHB1ENR;
     nucleo_pin(GPIOB_BASE, 14, PIN_OUTPUT, 0, 0, 0);
-    for (uint32_t on = 1;; on ^= 1u) {
-        GPIO_BSRR(GPIOB_BASE) = on != 0 ? 1u << 14 : 1u << 30;
+    for (uint32_t left = BLINKS; left > 0; --left) {
+        GPIO_BSRR(GPIOB_BASE) = left % 2u == 0 ? 1u << 14 : 1u << 30;
         for (volatile uint32_t k = 0; k < 500000; ++k)
             ;
     }
+    nucleo_restart(NULL); /* it may have come back */
 }
 
 int main(void)
@@ -33,6 +37,7 @@ int main(void)
     nucleo_multiplexers_start();
     nucleo_generator_start();
     nucleo_capture_start();
+    nucleo_sense_start();
     nucleo_link_start();
     const fw_board board = {
         .name = "nucleo_f767zi",
@@ -42,13 +47,17 @@ int main(void)
         .stack_bytes =
             (uint32_t)((uint8_t *)stack_top - (uint8_t *)stack_bottom) - NUCLEO_STACK_GUARD_BYTES,
         .source_ua_rms = SOURCE_UA_RMS,
+        .settle_frames = SETTLE_FRAMES,
         .generator = {&nucleo_generator_ops, NULL},
         .multiplexers = {&nucleo_multiplexers_ops, NULL},
         .capture = {&nucleo_capture_ops, NULL, FULL_SCALE_CODE, REFERENCE_UV, FRONT_END_GAIN_PPM},
         .link = {&nucleo_link_ops, NULL},
-        .store = {&nucleo_store_ops, NULL, NUCLEO_BANK_BYTES},
+        .store = {&nucleo_store_ops, NULL, NUCLEO_BANK_BYTES, NUCLEO_PAGE_BYTES},
         .system = &nucleo_system_ops,
         .last_reset = nucleo_last_reset(),
+        .sense = {nucleo_measure_ua_rms, NULL},
+        .image = image_start,
+        .image_bytes = (size_t)(image_end - image_start),
         .workspace = workspace_start,
         .workspace_bytes = (size_t)(workspace_end - workspace_start),
     };

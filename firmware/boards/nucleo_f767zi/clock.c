@@ -59,9 +59,10 @@ bool nucleo_clock_start(void)
     RCC_APB1ENR |=
         RCC_APB1ENR_TIM2EN | RCC_APB1ENR_TIM3EN | RCC_APB1ENR_TIM5EN | RCC_APB1ENR_USART3EN;
     RCC_APB1ENR |= RCC_APB1ENR_SPI3EN;
-    RCC_APB2ENR |= RCC_APB2ENR_ADC1EN;
+    RCC_APB2ENR |= RCC_APB2ENR_ADC1EN | RCC_APB2ENR_ADC2EN;
     (void)RCC_APB2ENR;
     nucleo_pin(GPIOA_BASE, 8, PIN_ALTERNATE, 0, 2, 0); /* MCO1 */
+    RCC_CR |= RCC_CR_CSSON;                            /* should the 8 MHz fail, NMI comes */
     return true;
 }
 

@@ -10,16 +10,27 @@ typedef struct crash_record {
      * as address */
     uint32_t words[5];
     uint32_t check; /* sum of the words: memory after power-up is random */
+    uint32_t cause; /* of reset_cause */
 } crash_record;
 
 NUCLEO_NOINIT static crash_record crash;
 
+enum reset_cause { CAUSE_CRASH, CAUSE_CLOCK, CAUSE_SUPPLY };
+
 static uint32_t sum_of_words(void)
 {
-    uint32_t sum = CRASH_MAGIC;
+    uint32_t sum = CRASH_MAGIC + crash.cause;
     for (int k = 0; k < 5; ++k)
         sum += crash.words[k];
     return sum;
+}
+
+__attribute__((noreturn)) static void restart_for(enum reset_cause cause)
+{
+    crash.cause = cause;
+    crash.check = sum_of_words();
+    crash.magic = CRASH_MAGIC;
+    nucleo_restart(NULL);
 }
 
 __attribute__((used, noreturn)) void nucleo_crash(const uint32_t *frame);
@@ -53,19 +64,38 @@ void nucleo_crash(const uint32_t *frame)
         crash.words[4] = SCB_BFAR;
     else
         crash.words[4] = cfsr == 0 ? SCB_ICSR & 0x1FFu : 0;
-    crash.check = sum_of_words();
-    crash.magic = CRASH_MAGIC;
-    DSB();
-    SCB_AIRCR = SCB_AIRCR_SYSRESETREQ;
-    for (;;)
-        ;
+    restart_for(CAUSE_CRASH);
+}
+
+/* The 8 MHz have failed: the generator stands still, and the processor runs from 16 MHz. After the
+ * restart the board waits for them. */
+void nucleo_clock_irq(void)
+{
+    nucleo_multiplexers_off();
+    RCC_CIR |= RCC_CIR_CSSC;
+    for (int k = 0; k < 5; ++k)
+        crash.words[k] = 0;
+    restart_for(CAUSE_CLOCK);
+}
+
+/* The supply falls below 2.9 V: off at once, and on again when it is back. */
+void nucleo_supply_irq(void)
+{
+    nucleo_multiplexers_off();
+    for (int k = 0; k < 5; ++k)
+        crash.words[k] = 0;
+    while ((PWR_CSR1 & PWR_CSR1_PVDO) != 0)
+        nucleo_feed_watchdog(NULL);
+    restart_for(CAUSE_SUPPLY);
 }
 
 fw_last_reset nucleo_last_reset(void)
 {
     fw_last_reset found = {0};
     if (crash.magic == CRASH_MAGIC && crash.check == sum_of_words()) {
-        found.crash = 1;
+        found.crash = crash.cause == CAUSE_CRASH;
+        found.clock = crash.cause == CAUSE_CLOCK;
+        found.supply = crash.cause == CAUSE_SUPPLY;
         for (int k = 0; k < 5; ++k)
             found.words[k] = crash.words[k];
     }

@@ -11,6 +11,15 @@ void nucleo_multiplexers_off(void)
     GPIO_BSRR(GPIOF_BASE) = (ENABLES >> ADDRESS_LINES << ENABLE_PIN) << 16;
 }
 
+static volatile bool is_barred;
+
+void nucleo_multiplexers_bar(bool barred)
+{
+    is_barred = barred; /* before they open: a burst's interrupt may come between */
+    if (barred)
+        nucleo_multiplexers_off();
+}
+
 void nucleo_multiplexers_start(void)
 {
     nucleo_multiplexers_off(); /* before they are outputs */
@@ -25,6 +34,8 @@ static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
     (void)ctx;
     if ((mask & ~(ADDRESSES | ENABLES)) != 0)
         return FW_E_ARGUMENT;
+    if (is_barred && (levels & mask & ENABLES) != 0)
+        return FW_E_BUS;
     /* One store a port: the upper half of BSRR clears, the lower sets (RM0410 6.4.7). */
     const uint32_t high = mask & levels, low = mask & ~levels;
     if ((mask & ADDRESSES) != 0)

@@ -28,6 +28,7 @@
 /* From the linker script. */
 extern uint32_t stack_bottom[], stack_top[];
 extern uint8_t workspace_start[], workspace_end[];
+extern const uint8_t image_start[], image_end[]; /* of the program, in flash */
 
 /* Urgency of interrupts: upper four bits; less is more urgent. */
 enum { NUCLEO_URGENCY_CAPTURE = 0x10, NUCLEO_URGENCY_LINK = 0x40, NUCLEO_URGENCY_TICK = 0xF0 };
@@ -60,6 +61,13 @@ fw_last_reset nucleo_last_reset(void);
 void nucleo_generator_start(void);
 void nucleo_multiplexers_start(void);
 void nucleo_multiplexers_off(void); /* no current reaches the skin; from any interrupt */
+/* The same, and nothing switches them on again until the main loop is alive. */
+void nucleo_multiplexers_bar(bool barred);
+void nucleo_sense_start(void);
+uint32_t nucleo_measure_ua_rms(void *ctx);
+/* While the processor may stand still for seconds; else it must live every half second. */
+void nucleo_watchdog_patient(bool patient);
+__attribute__((noreturn)) void nucleo_restart(void *ctx);
 void nucleo_capture_start(void);
 void nucleo_link_start(void);
 
@@ -70,9 +78,12 @@ extern const fw_capture_ops nucleo_capture_ops;
 extern const fw_link_ops nucleo_link_ops;
 extern const fw_store_ops nucleo_store_ops;
 #define NUCLEO_BANK_BYTES (512u * 1024u)
+#define NUCLEO_PAGE_BYTES (256u * 1024u) /* of settings */
 
 /* Interrupt handlers, for the vector table. */
 void nucleo_fault_irq(void);
+void nucleo_clock_irq(void);
+void nucleo_supply_irq(void);
 void nucleo_tick_irq(void);
 void nucleo_dma2_stream0_irq(void);
 void nucleo_adc_irq(void);

@@ -14,11 +14,14 @@ __attribute__((section(".vectors"),
                used)) static void (*const vectors[CORE_VECTORS + IRQ_COUNT])(void) = {
     (void (*)(void))stack_top,
     nucleo_reset,
-    [2 ... 6] = nucleo_fault_irq, /* NMI, hard, memory, bus and usage fault */
+    [2] = nucleo_clock_irq,       /* NMI: the clock security system */
+    [3 ... 6] = nucleo_fault_irq, /* hard, memory, bus and usage fault */
     [11 ... 12] = nucleo_fault_irq,
     [14] = nucleo_fault_irq,
     [15] = nucleo_tick_irq,
-    [CORE_VECTORS... CORE_VECTORS + IRQ_DMA1_STREAM1 - 1] = nucleo_fault_irq,
+    [CORE_VECTORS] = nucleo_fault_irq,
+    [CORE_VECTORS + IRQ_PVD] = nucleo_supply_irq,
+    [CORE_VECTORS + IRQ_PVD + 1 ... CORE_VECTORS + IRQ_DMA1_STREAM1 - 1] = nucleo_fault_irq,
     [CORE_VECTORS + IRQ_DMA1_STREAM1] = nucleo_dma1_stream1_irq,
     [CORE_VECTORS + IRQ_DMA1_STREAM1 + 1] = nucleo_fault_irq,
     [CORE_VECTORS + IRQ_DMA1_STREAM3] = nucleo_dma1_stream3_irq,

@@ -21,6 +21,7 @@
 #define RCC_AHB1ENR           REG32(RCC_BASE + 0x30u)
 #define RCC_APB1ENR           REG32(RCC_BASE + 0x40u)
 #define RCC_APB2ENR           REG32(RCC_BASE + 0x44u)
+#define RCC_CIR               REG32(RCC_BASE + 0x0Cu)
 #define RCC_CSR               REG32(RCC_BASE + 0x74u)
 #define RCC_CR_HSEON          (1u << 16)
 #define RCC_CR_HSERDY         (1u << 17)
@@ -54,7 +55,10 @@
 #define RCC_APB1ENR_SPI3EN    (1u << 15)
 #define RCC_APB1ENR_USART3EN  (1u << 18)
 #define RCC_APB1ENR_PWREN     (1u << 28)
+#define RCC_CR_CSSON          (1u << 19)
+#define RCC_CIR_CSSC          (1u << 23)
 #define RCC_APB2ENR_ADC1EN    (1u << 8)
+#define RCC_APB2ENR_ADC2EN    (1u << 9)
 #define RCC_CSR_RMVF          (1u << 24)
 #define RCC_CSR_WDGRSTF       (1u << 29) /* IWDGRSTF in RM0410 */
 
@@ -62,6 +66,9 @@
 #define PWR_BASE         0x40007000u
 #define PWR_CR1          REG32(PWR_BASE + 0x00u)
 #define PWR_CSR1         REG32(PWR_BASE + 0x04u)
+#define PWR_CR1_PVDE     (1u << 4)
+#define PWR_CR1_PLS_POS  5u
+#define PWR_CSR1_PVDO    (1u << 2)
 #define PWR_CR1_VOS_POS  14u
 #define PWR_CR1_ODEN     (1u << 16)
 #define PWR_CR1_ODSWEN   (1u << 17)
@@ -105,6 +112,7 @@
 #define GPIO_MODER(port)   REG32((port) + 0x00u)
 #define GPIO_OSPEEDR(port) REG32((port) + 0x08u)
 #define GPIO_PUPDR(port)   REG32((port) + 0x0Cu)
+#define GPIO_IDR(port)     REG32((port) + 0x10u)
 #define GPIO_BSRR(port)    REG32((port) + 0x18u)
 #define GPIO_AFRL(port)    REG32((port) + 0x20u)
 #define GPIO_AFRH(port)    REG32((port) + 0x24u)
@@ -146,12 +154,20 @@
 #define USART_ICR_ORECF  (1u << 3)
 #define USART_ICR_IDLECF (1u << 4)
 
+/* ---- EXTI, chapter 11 ---- */
+#define EXTI_BASE     0x40013C00u
+#define EXTI_IMR      REG32(EXTI_BASE + 0x00u)
+#define EXTI_RTSR     REG32(EXTI_BASE + 0x08u)
+#define EXTI_IMR_MR16 (1u << 16) /* the supply's detector */
+
 /* ---- ADC, chapter 15 ---- */
 #define ADC1_BASE          0x40012000u
+#define ADC2_BASE          0x40012100u
 #define ADC_COMMON_BASE    0x40012300u
 #define ADC_SR(adc)        REG32((adc) + 0x00u)
 #define ADC_CR1(adc)       REG32((adc) + 0x04u)
 #define ADC_CR2(adc)       REG32((adc) + 0x08u)
+#define ADC_SMPR1(adc)     REG32((adc) + 0x0Cu)
 #define ADC_SMPR2(adc)     REG32((adc) + 0x10u)
 #define ADC_SQR1(adc)      REG32((adc) + 0x2Cu)
 #define ADC_SQR3(adc)      REG32((adc) + 0x34u)
@@ -164,6 +180,8 @@
 #define ADC_CR2_DDS        (1u << 9)
 #define ADC_CR2_EXTSEL_POS 24u
 #define ADC_CR2_EXTEN_POS  28u
+#define ADC_CR2_SWSTART    (1u << 30)
+#define ADC_SR_EOC         (1u << 1)
 #define ADC_SMPR2_SMP3_POS 9u
 #define ADC_SQR3_SQ1_POS   0u
 #define ADC_CCR_ADCPRE_POS 16u
@@ -298,6 +316,7 @@
 #define DWT_CTRL_CYCCNTENA (1u << 0)
 
 /* ---- interrupts, table 46 ---- */
+#define IRQ_PVD          1u
 #define IRQ_DMA1_STREAM1 12u
 #define IRQ_DMA1_STREAM3 14u
 #define IRQ_ADC          18u

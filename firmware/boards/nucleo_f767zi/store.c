@@ -1,5 +1,5 @@
-/* Two banks for models in the program's own flash: 0x08040000 (sectors 5 and 6) and 0x080C0000 (7
- * and 8), 512 KB each.
+/* Two banks for models and two pages for settings in the program's own flash: 0x08040000 (sectors 5
+ * and 6) and 0x080C0000 (7 and 8), 512 KB each; 0x08140000 (9) and 0x08180000 (10), 256 KB each.
  *
  * The flash is one bank (nDBANK set, as delivered): while it erases or programs, whoever reads it
  * waits, the processor too (RM0410 3.3.6). A sector of 256 KB takes 1 s, at most 4 (data sheet,
@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-enum { SECTORS_A_BANK = 2, FIRST_SECTOR = 5, WORD_US = 1000, SECTOR_US = 6000000 };
+enum { FIRST_SECTOR = 5, WORD_US = 1000, SECTOR_US = 6000000 };
 #define BANKS_START  0x08040000u
 #define SECTOR_BYTES (256u * 1024u)
 #define ERRORS \
@@ -18,7 +18,14 @@ enum { SECTORS_A_BANK = 2, FIRST_SECTOR = 5, WORD_US = 1000, SECTOR_US = 6000000
 static const uint8_t *bank_start(void *ctx, uint32_t bank)
 {
     (void)ctx;
-    return (const uint8_t *)(BANKS_START + bank * NUCLEO_BANK_BYTES);
+    const uint32_t pages = bank < FW_BANKS ? 0 : bank - FW_BANKS;
+    return (const uint8_t *)(BANKS_START + (bank - pages) * NUCLEO_BANK_BYTES +
+                             pages * NUCLEO_PAGE_BYTES);
+}
+
+static uint32_t bytes_of(uint32_t bank)
+{
+    return bank < FW_BANKS ? NUCLEO_BANK_BYTES : NUCLEO_PAGE_BYTES;
 }
 
 static fw_status finished(uint32_t max_us)
@@ -60,28 +67,30 @@ static bool all_ones(const uint8_t *start, size_t size)
 
 static fw_status erase(void *ctx, uint32_t bank)
 {
-    if (bank >= FW_BANKS)
+    if (bank >= FW_PAGES)
         return FW_E_ARGUMENT;
+    const uint32_t first = ((uint32_t)bank_start(ctx, bank) - BANKS_START) / SECTOR_BYTES;
     fw_status status = open_flash();
-    for (uint32_t k = 0; k < SECTORS_A_BANK && status == FW_OK; ++k) {
+    nucleo_watchdog_patient(true);
+    for (uint32_t k = 0; k < bytes_of(bank) / SECTOR_BYTES && status == FW_OK; ++k) {
         nucleo_feed_watchdog(ctx);
-        FLASH_CR = WORDS_OF_32_BITS | FLASH_CR_SER |
-                   (FIRST_SECTOR + SECTORS_A_BANK * bank + k) << FLASH_CR_SNB_POS;
+        FLASH_CR = WORDS_OF_32_BITS | FLASH_CR_SER | (FIRST_SECTOR + first + k) << FLASH_CR_SNB_POS;
         FLASH_CR |= FLASH_CR_STRT;
         DSB();
         status = finished(SECTOR_US);
     }
     close_flash();
     nucleo_feed_watchdog(ctx);
-    nucleo_cache_forget(bank_start(ctx, bank), NUCLEO_BANK_BYTES);
-    return status == FW_OK && !all_ones(bank_start(ctx, bank), NUCLEO_BANK_BYTES) ? FW_E_FLASH
-                                                                                  : status;
+    nucleo_watchdog_patient(false);
+    nucleo_cache_forget(bank_start(ctx, bank), bytes_of(bank));
+    return status == FW_OK && !all_ones(bank_start(ctx, bank), bytes_of(bank)) ? FW_E_FLASH
+                                                                               : status;
 }
 
 static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
 {
-    if (bank >= FW_BANKS || offset % 4u != 0 || size % 4u != 0 || offset > NUCLEO_BANK_BYTES ||
-        size > NUCLEO_BANK_BYTES - offset)
+    if (bank >= FW_PAGES || offset % 4u != 0 || size % 4u != 0 || offset > bytes_of(bank) ||
+        size > bytes_of(bank) - offset)
         return FW_E_ARGUMENT;
     const uint8_t *const start = bank_start(ctx, bank) + offset;
     fw_status status = open_flash();

@@ -3,7 +3,14 @@
 
 enum { LED_GREEN = 0, LED_BLUE = 7, LED_RED = 14 }; /* of port B: LD1, LD2, LD3 (UM1974 6.5) */
 
+/* Of the main loop: without a turn for so long the multiplexers open, or the board restarts. */
+enum { STALLED_MS = 900, HUNG_MS = 8000, BUTTON = 13 };
+/* Reload values at 32 kHz (17 to 47 by the data sheet): 0.5 s (at most 0.94) by a divider of 4, 8 s
+ * by 64, more than the longest erase of a sector (4 s), during which the program stands still. */
+enum { WATCHDOG_RELOAD = 4000, DIVIDER_4 = 0, DIVIDER_64 = 4 };
+
 static volatile bool woken;
+static volatile uint32_t stalled_ms;
 static char serial[25];
 
 void nucleo_interrupt(uint32_t irq, uint32_t urgency)
@@ -39,15 +46,18 @@ void nucleo_system_start(void)
     nucleo_pin(GPIOB_BASE, LED_BLUE, PIN_OUTPUT, 0, 0, 0);
     nucleo_pin(GPIOB_BASE, LED_RED, PIN_OUTPUT, 0, 0, 0);
 
-    /* 32 kHz / 64 / 4000: about 8 s, more than the longest erase of a sector (4 s), during which
-     * the program stands still. */
+    nucleo_pin(GPIOC_BASE, BUTTON, PIN_INPUT, 0, 0, 0); /* B1 has its own resistor */
+
+    /* The supply's detector at 2.9 V. */
+    PWR_CR1 |= 7u << PWR_CR1_PLS_POS | PWR_CR1_PVDE;
+    EXTI_RTSR |= EXTI_IMR_MR16;
+    EXTI_IMR |= EXTI_IMR_MR16;
+    nucleo_interrupt(IRQ_PVD, 0);
+
     IWDG_KR = 0xCCCCu;
     IWDG_KR = 0x5555u;
-    IWDG_PR = 4u;
-    IWDG_RLR = 4000u - 1u;
-    while (IWDG_SR != 0)
-        ;
-    IWDG_KR = 0xAAAAu;
+    IWDG_RLR = WATCHDOG_RELOAD - 1u;
+    nucleo_watchdog_patient(false);
 
     for (uint32_t digit = 0; digit < 24; ++digit)
         serial[digit] = "0123456789ABCDEF"[UID(digit / 8u) >> (28u - 4u * (digit % 8u)) & 0xFu];
@@ -63,9 +73,27 @@ void nucleo_wake(void)
     woken = true;
 }
 
+/* It feeds the watchdog as long as the main loop lives, so that the watchdog itself can be quick:
+ * that one is for a processor that takes no interrupt any more. */
 void nucleo_tick_irq(void)
 {
     nucleo_wake();
+    const uint32_t ms = ++stalled_ms;
+    if (ms >= STALLED_MS)
+        nucleo_multiplexers_bar(true);
+    if (ms < HUNG_MS)
+        IWDG_KR = 0xAAAAu;
+}
+
+void nucleo_watchdog_patient(bool patient)
+{
+    while (IWDG_SR != 0)
+        ;
+    IWDG_KR = 0x5555u;
+    IWDG_PR = patient ? DIVIDER_64 : DIVIDER_4;
+    while (IWDG_SR != 0)
+        ;
+    IWDG_KR = 0xAAAAu;
 }
 
 uint32_t nucleo_time_us(void *ctx)
@@ -104,9 +132,18 @@ void nucleo_feed_watchdog(void *ctx)
 {
     (void)ctx;
     IWDG_KR = 0xAAAAu;
+    if (stalled_ms >= STALLED_MS)
+        nucleo_multiplexers_bar(false);
+    stalled_ms = 0;
 }
 
-static void restart(void *ctx)
+static bool button(void *ctx)
+{
+    (void)ctx;
+    return (GPIO_IDR(GPIOC_BASE) >> BUTTON & 1u) != 0;
+}
+
+void nucleo_restart(void *ctx)
 {
     (void)ctx;
     DSB();
@@ -134,7 +171,12 @@ static void set_leds(void *ctx, uint32_t leds)
     GPIO_BSRR(GPIOB_BASE) = on | (all & ~on) << 16;
 }
 
-const fw_system_ops nucleo_system_ops = {nucleo_time_us,       sleep_until_interrupt,
-                                         nucleo_lock,          nucleo_unlock,
-                                         nucleo_feed_watchdog, restart,
-                                         stack_used,           set_leds};
+const fw_system_ops nucleo_system_ops = {nucleo_time_us,
+                                         sleep_until_interrupt,
+                                         nucleo_lock,
+                                         nucleo_unlock,
+                                         nucleo_feed_watchdog,
+                                         nucleo_restart,
+                                         stack_used,
+                                         set_leds,
+                                         button};

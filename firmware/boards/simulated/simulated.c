@@ -1,5 +1,6 @@
 #include "simulated.h"
 
+#include "app/drive.h"
 #include "app/main_loop.h"
 #include "app/scan_control.h"
 #include "app/sincos.h"
@@ -22,6 +23,11 @@ size_t sim_board_bytes(void)
     return sizeof(sim_board);
 }
 
+static uint64_t now_ns(const sim_board *sim)
+{
+    return 1000u * sim->now_us + sim->waited_ns;
+}
+
 /* ---- generator ---- */
 
 static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
@@ -30,6 +36,7 @@ static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
     for (size_t k = 0; k < count; ++k) {
         if (ad9833_model_write(&sim->generator, words[k]))
             sim->released_us = (uint32_t)sim->now_us;
+        drive_monitor_word(&sim->monitor, &sim->generator, words[k], now_ns(sim));
     }
     return FW_OK;
 }
@@ -39,14 +46,13 @@ static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
 static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
 {
     sim_board *sim = ctx;
-    sim->lines = (sim->lines & ~mask) | (levels & mask);
+    drive_monitor_lines(&sim->monitor, mask, levels, now_ns(sim));
     return FW_OK;
 }
 
 static void wait_ns(void *ctx, uint32_t ns)
 {
-    (void)ctx;
-    (void)ns;
+    ((sim_board *)ctx)->waited_ns += ns;
 }
 
 /* ---- skin ---- */
@@ -116,10 +122,11 @@ static float volts_now(sim_board *sim)
 {
     const eits_model *model = &sim->instrument.engine.model;
     uint8_t joined[4];
-    if ((sim->lines & FW_MUX_ENABLES) != FW_MUX_ENABLES || !ad9833_model_runs(&sim->generator))
+    if ((sim->monitor.lines & FW_MUX_ENABLES) != FW_MUX_ENABLES ||
+        !ad9833_model_runs(&sim->generator))
         return 0;
     for (uint32_t k = 0; k < 4; ++k)
-        joined[k] = (uint8_t)(sim->lines >> 4 * k & 15u);
+        joined[k] = (uint8_t)(sim->monitor.lines >> 4 * k & 15u);
     for (uint32_t tried = 0; tried < model->n_rows; ++tried) {
         sim->row = sim->row + 1u < model->n_rows ? sim->row + 1u : 0;
         if (memcmp(model->protocol + 4 * (size_t)sim->row, joined, sizeof joined) == 0)
@@ -177,6 +184,13 @@ static void convert(sim_board *sim, float volts)
     }
 }
 
+/* Time passes only while the host reads: it is there, and would say so. */
+static void listen(sim_board *sim)
+{
+    drive_monitor_heard(&sim->monitor, now_ns(sim));
+    fw_drive_heard(&sim->instrument);
+}
+
 /* To the end of the next burst, which the application gets; false where its frame is missing. */
 static bool next_burst(sim_board *sim)
 {
@@ -193,6 +207,7 @@ static bool next_burst(sim_board *sim)
     converter->slot_us += setup->slot_us;
     sim->now_us = start_us + ((uint64_t)setup->samples * 1000000u + setup->sample_rate_hz - 1) /
                                  setup->sample_rate_hz;
+    listen(sim);
     const fw_burst burst = {.samples = converter->codes,
                             .start_us = (uint32_t)start_us,
                             .next_start_us = (uint32_t)converter->slot_us};
@@ -206,19 +221,24 @@ static bool next_burst(sim_board *sim)
 
 static const uint8_t *bank_start(void *ctx, uint32_t bank)
 {
-    return ((const sim_board *)ctx)->bank[bank];
+    const sim_board *sim = ctx;
+    return bank < FW_BANKS ? sim->bank[bank] : sim->page[bank - FW_BANKS];
+}
+
+static uint32_t bytes_of(const sim_board *sim, uint32_t bank)
+{
+    return bank < FW_BANKS ? sim->board.store.bank_bytes : SIM_PAGE_BYTES;
 }
 
 static fw_status erase(void *ctx, uint32_t bank)
 {
-    const sim_board *sim = ctx;
-    return nor_model_erase(sim->bank[bank], sim->board.store.bank_bytes);
+    return nor_model_erase((uint8_t *)bank_start(ctx, bank), bytes_of(ctx, bank));
 }
 
 static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
 {
-    const sim_board *sim = ctx;
-    return nor_model_program(sim->bank[bank], sim->board.store.bank_bytes, offset, bytes, size);
+    return nor_model_program((uint8_t *)bank_start(ctx, bank), bytes_of(ctx, bank), offset, bytes,
+                             size);
 }
 
 /* ---- link ---- */
@@ -294,13 +314,18 @@ static void show_leds(void *ctx, uint32_t leds)
     (void)leds;
 }
 
+static bool button(void *ctx)
+{
+    return ((const sim_board *)ctx)->button;
+}
+
 static const fw_spi_ops GENERATOR = {write_words};
 static const fw_lines_ops MULTIPLEXERS = {write_lines, wait_ns};
 static const fw_capture_ops CAPTURE = {configure, start, stop};
 static const fw_link_ops LINK = {.write = write_bytes, .read = read_bytes};
 static const fw_store_ops STORE = {bank_start, erase, program};
-static const fw_system_ops SYSTEM = {time_us, wait_idle, lock,     unlock,
-                                     nothing, nothing,   no_stack, show_leds};
+static const fw_system_ops SYSTEM = {time_us, wait_idle, lock,      unlock, nothing,
+                                     nothing, no_stack,  show_leds, button};
 
 void sim_init(sim_board *sim, const sim_setup *setup)
 {
@@ -315,12 +340,13 @@ void sim_init(sim_board *sim, const sim_setup *setup)
                             .multiplexers = {&MULTIPLEXERS, sim},
                             .capture = {&CAPTURE, sim, FULL_SCALE_CODE, 1, 1000000},
                             .link = {&LINK, sim},
-                            .store = {&STORE, sim, setup->bank_bytes},
+                            .store = {&STORE, sim, setup->bank_bytes, SIM_PAGE_BYTES},
                             .system = &SYSTEM,
                             .system_ctx = sim,
                             .frames_given = setup->frames_given,
                             .workspace = setup->workspace,
                             .workspace_bytes = setup->workspace_bytes};
+    memset(sim->page, 0xFF, sizeof sim->page);
     sim_start(sim);
 }
 
@@ -328,8 +354,13 @@ void sim_start(sim_board *sim)
 {
     sim->converter.running = false;
     sim->generator = (ad9833_model){0};
+    sim->monitor = (drive_monitor){.violation = sim->monitor.violation,
+                                   .opened_ns = now_ns(sim) - DRIVE_MONITOR_OPEN_NS,
+                                   .needs_host = false};
     sim->to_board_bytes = 0;
     fw_instrument_init(&sim->instrument, &sim->board);
+    sim->monitor.needs_host =
+        !sim->board.frames_given && sim->instrument.drive.state == EITS_DRIVE_OFF;
 }
 
 static void step(sim_board *sim)
@@ -341,6 +372,7 @@ static void step(sim_board *sim)
 
 void sim_write(sim_board *sim, const uint8_t *bytes, size_t size)
 {
+    drive_monitor_heard(&sim->monitor, now_ns(sim));
     sim->to_board = bytes;
     sim->to_board_bytes = size;
     while (sim->to_board_bytes > 0)
@@ -430,6 +462,16 @@ void sim_give_frame(sim_board *sim, const float *iq, uint32_t passed_us, uint32_
     ++scan->frames_scanned;
     ++scan->filled;
     step(sim);
+}
+
+const char *sim_violation(const sim_board *sim)
+{
+    return sim->monitor.violation;
+}
+
+void sim_press(sim_board *sim, bool held)
+{
+    sim->button = held;
 }
 
 void sim_let_pass(sim_board *sim, uint32_t passed_us)

@@ -14,7 +14,9 @@
 #define SIMULATED_H
 
 #include "app/instrument.h"
-#include "boards/parts/ad9833_model.h"
+#include "boards/parts/drive_monitor.h"
+
+#define SIM_PAGE_BYTES 1024u
 
 /* Frames of the untouched skin, then those of the scene; the host puts them before the board by
  * and by. */
@@ -45,13 +47,16 @@ typedef struct sim_board {
     fw_board board;
     uint64_t now_us;
     ad9833_model generator;
-    uint32_t released_us; /* when its phase began */
-    uint32_t lines;       /* of the multiplexers, as in fw_board */
-    uint32_t row;         /* that was measured last */
+    uint32_t released_us;  /* when its phase began */
+    drive_monitor monitor; /* has the lines of the multiplexers */
+    uint64_t waited_ns;    /* by the drivers, beside now_us */
+    uint32_t row;          /* that was measured last */
     sim_converter converter;
     sim_scene scene;
     uint8_t *bank[FW_BANKS];
-    const uint8_t *to_board; /* the caller's, in sim_write */
+    uint8_t page[FW_PAGES - FW_BANKS][SIM_PAGE_BYTES]; /* the owner's settings */
+    bool button;                                       /* the owner holds it */
+    const uint8_t *to_board;                           /* the caller's, in sim_write */
     size_t to_board_bytes;
     uint8_t to_host[1 << 18];
     size_t to_host_bytes;
@@ -84,6 +89,12 @@ void sim_write(sim_board *sim, const uint8_t *bytes, size_t size);
 
 /* Take what the board has sent, at most `room` bytes; returns how many. */
 size_t sim_read(sim_board *sim, uint8_t *bytes, size_t room);
+
+/* What the drivers did that they must never do, in words; NULL: nothing. */
+const char *sim_violation(const sim_board *sim);
+
+/* The owner holds the blue button, or lets go of it. */
+void sim_press(sim_board *sim, bool held);
 
 /* Whether the board scans for someone: a stream or a tare waits for frames. */
 bool sim_wants_frame(const sim_board *sim);

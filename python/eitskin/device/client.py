@@ -13,8 +13,8 @@ from eitskin.device.exchange import ANSWER_S, CommandExchange, Streamed
 from eitskin.device.streaming import stream
 from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
-from eitskin.device.wire.link_table import Stream
-from eitskin.device.wire.packets import BoardInfo, BoardStats
+from eitskin.device.wire.link_table import Setting, Stream
+from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats
 from eitskin.errors import DeviceError, UsageError
 
 TARE_FRAMES = 16
@@ -125,6 +125,23 @@ class Device(CommandExchange):
             DeviceError: the image has other bits than the model states.
         """
         self.command(commands.SelfTest(), 10.0)
+
+    def hashes(self) -> BoardHashes:
+        """SHA-256 of the model in use and of the program, as the board's flash has them."""
+        answer = self.ask(commands.GetHashes(), 2 * ANSWER_S)
+        assert isinstance(answer, BoardHashes)
+        return answer
+
+    def settings(self, settings: Setting, current_limit_ua_rms: int = 0) -> BoardInfo:
+        """Give the board all of its owner's settings, which it keeps in flash; the current stops.
+        The limit counts where a sense resistor is fitted; 0: 1.25 times what the source gives.
+
+        Raises:
+            UsageError: the limit does not fit.
+            DeviceError: the board is locked and nobody holds its button, or keeps no settings.
+        """
+        self.command(commands.Settings(int(settings), current_limit_ua_rms), 10.0)
+        return self.info()
 
     def clear_faults(self) -> None:
         """Forget the faults that the board has raised; those that persist rise again."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 import random
 import time
 from collections import deque
+from contextlib import suppress
 from dataclasses import replace
 from typing import TypeVar
 
@@ -15,8 +16,9 @@ from eitskin.device.transport import Transport
 from eitskin.device.wire.codec import LinkCounters, Packet
 from eitskin.device.wire.explain import command_name, reply_text
 from eitskin.device.wire.layout import Command
-from eitskin.device.wire.link_table import GetInfo, PacketType, ReplyStatus
+from eitskin.device.wire.link_table import GetInfo, Keepalive, PacketType, ReplyStatus
 from eitskin.device.wire.packets import (
+    BoardHashes,
     BoardInfo,
     BoardStats,
     Fault,
@@ -27,9 +29,14 @@ from eitskin.device.wire.packets import (
     SolvedTouches,
 )
 from eitskin.device.wire.payloads import MalformedPacket, parse
-from eitskin.errors import DeviceError, UsageError
+from eitskin.errors import DeviceError, EitskinError, UsageError
 
-Answer = Reply | BoardInfo | BoardStats
+Answer = Reply | BoardInfo | BoardStats | BoardHashes
+ANSWERED_BY: dict[int, type] = {
+    PacketType.GET_INFO: BoardInfo,
+    PacketType.GET_STATS: BoardStats,
+    PacketType.GET_HASHES: BoardHashes,
+}
 Streamed = RawFrame | SolvedImage | SolvedTouches | FrameEvents | Fault | BoardStats | LinkEvent
 
 Self = TypeVar("Self", bound="CommandExchange")
@@ -105,7 +112,12 @@ class CommandExchange:
         return self.link.counters
 
     def close(self) -> None:
-        """Let go of the port; may be called twice."""
+        """Let go of the port, after a word to the board, whose current stops; may be called
+        twice."""
+        if self._connected and not self.transport.replays and not self.link.away:
+            with suppress(EitskinError):
+                self.link.send(PacketType.KEEPALIVE, Keepalive(0).payload(0))
+        self._connected = False
         self.link.close()
 
     def record(self, tap: Tap | None) -> None:
@@ -174,7 +186,7 @@ class CommandExchange:
             if self._connected:
                 self._put(LinkEvent("restarted", text="the board restarted"))
             return None
-        if isinstance(content, Reply | BoardInfo | BoardStats):
+        if isinstance(content, Answer):
             return content
         if content is not None:
             self._put(content)
@@ -273,12 +285,9 @@ class CommandExchange:
             if answer is None or answer.request != self._request:
                 continue
             if isinstance(answer, Reply):
-                expects_more = (
-                    command.TYPE in (PacketType.GET_INFO, PacketType.GET_STATS)
-                    and answer.status == ReplyStatus.OK
-                )
+                expects_more = command.TYPE in ANSWERED_BY and answer.status == ReplyStatus.OK
                 if answer.command == command.TYPE and not expects_more:
                     return answer
-            elif isinstance(answer, BoardInfo) == (command.TYPE == PacketType.GET_INFO):
+            elif isinstance(answer, ANSWERED_BY.get(command.TYPE, ())):
                 return answer
         return None

@@ -12,11 +12,13 @@ from typing import Protocol, runtime_checkable
 
 from eitskin.device.transport import Transport
 from eitskin.device.wire.codec import Decoder, LinkCounters, Packet, encode
-from eitskin.device.wire.link_table import PacketType
+from eitskin.device.wire.link_table import Keepalive, PacketType
 from eitskin.errors import DeviceError, EitskinError
 
 FRAME_PACKETS = frozenset((PacketType.RAW, PacketType.IMAGE, PacketType.TOUCHES, PacketType.EVENTS))
 READ_S = 0.1
+KEEPALIVE_S = 0.25  # a board lets no current flow where it hears nothing for a second
+KEEPALIVE = Keepalive(1).payload(0)
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,15 @@ class Telling(Protocol):
 
     def take_events(self) -> list[LinkEvent]:
         """Those since the last call."""
+
+
+@runtime_checkable
+class Clocked(Protocol):
+    """A transport whose board's time passes only while it is read."""
+
+    @property
+    def board_s(self) -> float:
+        """The board's time."""
 
 
 Tap = Callable[[Packet], None]
@@ -95,6 +106,7 @@ class PumpedLink:
         self._ready: deque[Packet] = deque()
         self._events: deque[LinkEvent] = deque()
         self._sequence = 0
+        self._heard_s: float | None = None  # when something was sent last, on the board's clock
 
     def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
         begin(self._last)
@@ -113,7 +125,7 @@ class PumpedLink:
         if self._events:
             return self._events.popleft()
         while not self._ready:
-            data = self.transport.read(timeout_s)
+            data = self._read(timeout_s)
             if self._news():
                 return self._events.popleft()
             if not data:
@@ -126,9 +138,24 @@ class PumpedLink:
         self._last = packet.sequence
         return packet
 
+    def _read(self, timeout_s: float) -> bytes:
+        """Of a board with a clock of its own in steps, each with a word that we are there."""
+        if not isinstance(self.transport, Clocked):
+            return self.transport.read(timeout_s)
+        end_s = self.transport.board_s + timeout_s
+        while True:
+            now_s = self.transport.board_s
+            if self._heard_s is not None and now_s >= self._heard_s + KEEPALIVE_S:
+                self.send(PacketType.KEEPALIVE, KEEPALIVE)
+            data = self.transport.read(min(end_s - now_s, KEEPALIVE_S))
+            if data or self.transport.board_s >= end_s:
+                return data
+
     def send(self, packet_type: int, payload: bytes) -> None:
         self.transport.write(encode(packet_type, self._sequence, payload))
         self._sequence += 1
+        if isinstance(self.transport, Clocked):
+            self._heard_s = self.transport.board_s
 
     @property
     def ended(self) -> bool:
@@ -181,6 +208,8 @@ class ThreadedLink:
         self._away = False
         self._dropped = 0
         self._sequence = 0
+        self._sending = threading.Lock()
+        self._heard_s: float | None = None  # when something was sent last
         self._thread = threading.Thread(
             target=self._run, name=f"eitskin {transport.name}", daemon=True
         )
@@ -215,14 +244,23 @@ class ThreadedLink:
                 self._changed.wait(rest)
 
     def send(self, packet_type: int, payload: bytes) -> None:
-        try:
-            self.transport.write(encode(packet_type, self._sequence, payload))
-        except DeviceError:
-            if self._failed is not None:
-                raise
-            # else the reader is opening the port again, and whoever sent this sends it again when
-            # no answer comes
-        self._sequence += 1
+        with self._sending:
+            self._heard_s = time.monotonic()
+            try:
+                self.transport.write(encode(packet_type, self._sequence, payload))
+            except DeviceError:
+                if self._failed is not None:
+                    raise
+                # else the reader is opening the port again, and whoever sent this sends it again
+                # when no answer comes
+            self._sequence += 1
+
+    def _keep_alive(self) -> None:
+        """A word to the board that we are there, where nothing else has said so."""
+        if self._heard_s is None or time.monotonic() < self._heard_s + KEEPALIVE_S:
+            return
+        if not self._sending.locked():  # else a packet is on its way
+            self.send(PacketType.KEEPALIVE, KEEPALIVE)
 
     @property
     def ended(self) -> bool:
@@ -240,6 +278,7 @@ class ThreadedLink:
     def _run(self) -> None:
         while not self._stopping.is_set():
             try:
+                self._keep_alive()
                 data = self.transport.read(READ_S)
                 for event in _told(self.transport, self.counters):
                     self._event(event)

@@ -14,7 +14,7 @@ import numpy as np
 
 from eitskin.core.engine import aligned
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
-from eitskin.errors import UsageError
+from eitskin.errors import DeviceError, UsageError
 from eitskin.scene.board_frames import BoardFrames
 
 WORKSPACE_BYTES = 4 << 20  # enough for any model that fits a bank
@@ -91,10 +91,18 @@ class HostBoard:
 
     def take_output(self) -> bytes:
         """What the board has sent since the last call."""
+        violation = self._lib.sim_violation(self._sim)
+        if violation != self._ffi.NULL:
+            what = self._ffi.string(violation).decode()
+            raise DeviceError(f"the board's firmware did what it must never do: {what}; report it")
         pieces = []
         while size := self._lib.sim_read(self._sim, self._output, OUTPUT_BYTES):
             pieces.append(bytes(self._ffi.buffer(self._output, size)))
         return b"".join(pieces)
+
+    def hold_button(self, held: bool) -> None:
+        """The owner holds the blue button, or lets go of it."""
+        self._lib.sim_press(self._sim, held)
 
     @property
     def wanted(self) -> bool:

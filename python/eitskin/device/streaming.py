@@ -8,7 +8,7 @@ from contextlib import suppress
 from eitskin.device.exchange import CommandExchange, Streamed
 from eitskin.device.link import LinkEvent
 from eitskin.device.wire.explain import reply_text
-from eitskin.device.wire.link_table import Stream, StreamCommand
+from eitskin.device.wire.link_table import Drive, Stream, StreamCommand
 from eitskin.device.wire.packets import FrameEvents, RawFrame, SolvedImage, SolvedTouches
 from eitskin.errors import DeviceError, EitskinError
 
@@ -129,7 +129,7 @@ def _is_over(device: CommandExchange, progress: _Progress, every: int, silent: i
             and now.tared == before.tared
             and device.counters.restarts == progress.restarts
         )
-        if progress.wanted and same:
+        if progress.wanted and same and now.drive not in (Drive.SILENT, Drive.TRIPPED):
             return True  # it has sent all that was asked for, and some of it was lost
         _resume(device, progress, every)
     elif silent >= SILENCES:

@@ -11,9 +11,11 @@ on the host's clock: the same image, banks, scene and input give the same bytes.
 from __future__ import annotations
 
 from collections.abc import Callable
+from struct import unpack_from
 
 from eitskin.emulator.analog.ad9833 import Ad9833
 from eitskin.emulator.analog.adg1206 import Multiplexers
+from eitskin.emulator.analog.drive_monitor import DriveMonitor
 from eitskin.emulator.analog.front_end import FrontEnd
 from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.emulator.bus import Bus, Peripheral
@@ -25,11 +27,19 @@ from eitskin.emulator.peripherals import scb
 from eitskin.emulator.peripherals.adc import Adc
 from eitskin.emulator.peripherals.dma import Dma
 from eitskin.emulator.peripherals.dwt import Dwt
+from eitskin.emulator.peripherals.exti import Exti
 from eitskin.emulator.peripherals.flash import FlashInterface
 from eitskin.emulator.peripherals.gpio import ANALOG, GpioPort
 from eitskin.emulator.peripherals.iwdg import Iwdg
 from eitskin.emulator.peripherals.mpu import Mpu
-from eitskin.emulator.peripherals.nvic import BUS_FAULT, MEMORY_FAULT, SVCALL, USAGE_FAULT, Nvic
+from eitskin.emulator.peripherals.nvic import (
+    BUS_FAULT,
+    MEMORY_FAULT,
+    NMI,
+    SVCALL,
+    USAGE_FAULT,
+    Nvic,
+)
 from eitskin.emulator.peripherals.rcc import HSE_HZ, Pwr, Rcc
 from eitskin.emulator.peripherals.scb import SystemSpace
 from eitskin.emulator.peripherals.spi import Spi
@@ -42,9 +52,11 @@ from eitskin.emulator.schedule import Schedule
 from eitskin.emulator.serial_line import SerialLine
 from eitskin.errors import DeviceError
 
+# the owner's settings (firmware/app/kept.h, two sectors of 256 KB)
+PAGES, PAGES_BYTES, RECORD_BYTES, MAGIC = 0x08140000, 0x80000, 32, 0x54455345
 LONGEST_SLICE = 5_000_000
 EXACTLY_MASKED = 10_000
-FSYNC_PIN, ENABLE_PIN, MCO_PIN, ADC_PIN = 2, 12, 8, 3
+FSYNC_PIN, ENABLE_PIN, MCO_PIN, ADC_PIN, SENSE_PIN, BUTTON_PIN = 2, 12, 8, 3, 0, 13
 SCK_PIN, MOSI_PIN, TX_PIN, RX_PIN = 10, 12, 8, 9
 MCO_FUNCTION, SPI3_FUNCTION, USART3_FUNCTION = 0, 6, 7
 
@@ -89,6 +101,10 @@ class EmulatedBoard:
         self.multiplexers = Multiplexers()
         self.front_end = FrontEnd(self.generator, self.multiplexers, skin)
         self.line = SerialLine(self.clock)
+        self.drive = DriveMonitor(
+            self.generator, self.multiplexers, lambda: self.line.heard_at, self._keeps_drive
+        )
+        self.strict = True  # what the monitor finds is an error
         self._build(hse_hz)
         self._wire()
         self._reset_cause: str | None = "power"
@@ -124,10 +140,11 @@ class EmulatedBoard:
         }
         self.spi = Spi("SPI3", 0x40003C00, ("APB1ENR", 15), clock, schedule, self.rcc, record)
         self.adc = Adc(clock, schedule, self.nvic, self.rcc, self.dmas[2], self.timers[2], record)
+        self.exti = Exti(self.nvic, record)
         self.usart = Usart(clock, schedule, self.nvic, self.rcc, self.dmas[1], self.line, record)
         self.flash = FlashInterface(self.memories, record, self.cpu.stall, self._after_slice)
         self.iwdg = Iwdg(clock, schedule, record, lambda: self.reset("watchdog"))
-        own = (self.rcc, self.pwr, self.spi, self.adc, self.usart, self.flash, self.iwdg)
+        own = (self.rcc, self.pwr, self.spi, self.adc, self.usart, self.flash, self.iwdg, self.exti)
         peripherals: list[Peripheral] = [
             *own,
             *self.ports.values(),
@@ -170,13 +187,18 @@ class EmulatedBoard:
             at, levels >> ENABLE_PIN & 0xF
         )
         self.spi.sent = self.generator.shifted
+        self.generator.took = self.drive.word
         self.spi.connected = lambda: all(
             ports["C"].has_function(pin, SPI3_FUNCTION) for pin in (SCK_PIN, MOSI_PIN)
         )
         self.usart.tx_connected = lambda: ports["D"].has_function(TX_PIN, USART3_FUNCTION)
         self.usart.rx_connected = lambda: ports["D"].has_function(RX_PIN, USART3_FUNCTION)
         self.front_end.connected = lambda: ports["A"].mode(ADC_PIN) == ANALOG
+        self.front_end.drive_switched = self.drive.switched
         self.front_end.before_switch = self.adc.bring_up_to_date
+        self.front_end.sense_connected = lambda: ports["C"].mode(SENSE_PIN) == ANALOG
+        self.adc.second.divisor, self.adc.second.sample = 4, self.front_end.sense
+        rcc.failed = lambda: self.nvic.pend(NMI)
         self.adc.sample = self.front_end.sample
         for number, user in ((1, self.usart), (2, self.adc)):
             dma = self.dmas[number]
@@ -217,7 +239,7 @@ class EmulatedBoard:
             scans=self.skin.scans,
             samples=self.front_end.samples,
             switches=self.multiplexers.changes,
-            violations=tuple(self.multiplexers.violations),
+            violations=tuple(self.drive.violations),
             unknown_rows={str(row): count for row, count in self.skin.unknown_rows.items()},
             interrupts=dict(record.interrupts),
             unmodelled=dict(record.unmodelled),
@@ -237,6 +259,22 @@ class EmulatedBoard:
         """Power goes and comes back: RAM and what is on the wire are lost, flash is not."""
         self.line.clear()
         self.reset("power")
+
+    def lose_clock(self, hse_hz: int | None = None) -> None:
+        """The ST-LINK's 8 MHz fail, or come back as ``hse_hz``."""
+        self.rcc.set_hse(hse_hz)
+        self.cpu.end_slice()
+
+    def drop_supply(self, low: bool) -> None:
+        """The supply falls below 2.9 V, not so far that RAM is lost, or is back."""
+        self.pwr.low = low
+        if low and self.pwr.values[0] >> 4 & 1:
+            self.exti.supply_fell()
+        self.cpu.end_slice()
+
+    def hold_button(self, held: bool) -> None:
+        """The owner holds the blue button (B1 lifts PC13), or lets go of it."""
+        self.ports["C"].outside = 1 << BUTTON_PIN if held else 0
 
     def send(self, data: bytes) -> None:
         """The host sends ``data``: at 1 Mbaud from now on, or when what it sent before has left."""
@@ -266,6 +304,7 @@ class EmulatedBoard:
                 self._start_again(self._reset_cause)
             now = clock.now
             if now >= until or enough():
+                self._judge()
                 return
             due = min(schedule.next_at(), until)
             if self.locked_up:
@@ -276,10 +315,28 @@ class EmulatedBoard:
             elif not self._take_exception():
                 self._slice(due)
 
+    def _judge(self) -> None:
+        self.drive.look(self.clock.now)
+        if self.strict and (found := self.drive.violations):
+            raise DeviceError(
+                f"the firmware did what it must never do, first at {found[0]} ({len(found)} times);"
+                " no board should run this image"
+            )
+
+    def _keeps_drive(self) -> bool:
+        """Whether the latest of the owner's settings lets current flow without a host."""
+        latest, keeps = -1, False
+        for at in range(PAGES, PAGES + PAGES_BYTES, RECORD_BYTES):
+            magic, generation, settings = unpack_from("<III", self.memories.flash, at - FLASH)
+            if magic == MAGIC and generation > latest:
+                latest, keeps = generation, bool(settings & 1)
+        return keeps
+
     # ---- the loop's parts ----
 
     def _start_again(self, cause: str) -> None:
         self.record.resets.append(cause)
+        self.drive.start(self.clock.now)
         if cause == "power":
             self.memories.lose_power()
         self._reset_cause, self._asleep, self.locked_up = None, False, False
@@ -296,11 +353,13 @@ class EmulatedBoard:
             self.usart,
             self.flash,
             self.iwdg,
+            self.exti,
         ):
             one.reset()
         for timer in self.timers.values():
             timer.reset()
         self.adc.reset()
+        self.adc.second.reset()
         for dma in self.dmas.values():
             dma.reset()
         self.multiplexers.release(self.clock.now)

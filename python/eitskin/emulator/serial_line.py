@@ -46,6 +46,7 @@ class SerialLine:
         self._down: deque[ByteRun] = deque()
         self._up: deque[ByteRun] = deque()
         self._host_free_at = 0
+        self.heard_at: int | None = None  # when the host's last byte reaches the board
         self.host_sends: Callable[[], None] = lambda: None
 
     def agrees(self, frame_ticks: int) -> bool:
@@ -59,6 +60,7 @@ class SerialLine:
         if data:
             start = max(self._clock.now, self._host_free_at)
             self._host_free_at = start + len(data) * self.frame_ticks
+            self.heard_at = self._host_free_at
             self._down.append(ByteRun(data, start + self.frame_ticks, self.frame_ticks))
             self.host_sends()
 

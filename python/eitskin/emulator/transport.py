@@ -39,6 +39,11 @@ class EmulatedTransport:
         self._told = time.monotonic()
         self._closed = False
 
+    @property
+    def board_s(self) -> float:
+        """The board's time."""
+        return self.board.now_s
+
     def read(self, timeout_s: float) -> bytes:
         """Let the board run until bytes have come, or ``timeout_s`` of its time has passed.
 

@@ -58,6 +58,8 @@ def _wires() -> tuple[Wire, ...]:
         wires.append(Wire(f"PF{12 + number}", zio, morpho, "output", f"ADG1206 {name} EN"))
     wires += [
         Wire("PA3", "CN9-1", "CN12-37", "ADC1 input 3", "output of the receiver"),
+        Wire("PC0", "CN9-3", "CN11-38", "ADC2 input 10", "sense resistor, where fitted"),
+        Wire("PC13", "", "", "input", "B1, blue: the owner's button"),
         Wire("PD8", "", "", "USART3 TX, 1 Mbaud", "ST-LINK, on the board"),
         Wire("PD9", "", "", "USART3 RX, 1 Mbaud", "ST-LINK, on the board"),
         Wire("PB0", "", "", "output", "LD1, green: alive"),

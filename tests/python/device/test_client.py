@@ -197,7 +197,7 @@ def test_a_board_that_talks_for_ever_without_answering_is_given_up() -> None:
 
 
 @pytest.mark.parametrize(
-    ("version", "advice"), [(6, "upgrade eitskin, or flash"), (1, "flash this version's firmware")]
+    ("version", "advice"), [(7, "upgrade eitskin, or flash"), (1, "flash this version's firmware")]
 )
 def test_another_link_version_is_refused_with_what_to_do(version: int, advice: str) -> None:
     import zlib
@@ -213,7 +213,7 @@ def test_another_link_version_is_refused_with_what_to_do(version: int, advice: s
             block.clear()
     with pytest.raises(
         DeviceError,
-        match=f"speaks version {version} of the link protocol and this eitskin 5; {advice}",
+        match=f"speaks version {version} of the link protocol and this eitskin 6; {advice}",
     ):
         Device(Scripted(bytes(wire) + b"\0"))
 

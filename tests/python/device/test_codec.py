@@ -150,7 +150,7 @@ def test_another_version_is_told_apart_from_damage() -> None:
     plain = bytes([6, 1, 0, 0, 1, 1, 1, 1])
     plain += zlib.crc32(plain).to_bytes(4, "little")
     stuffed = bytes([3]) + plain[:2] + bytes([1, 9]) + plain[4:]
-    assert core.lib.EITS_LINK_VERSION == 5
+    assert core.lib.EITS_LINK_VERSION == 6
     decoder = Decoder()
     assert decoder.feed(b"\0" + stuffed + b"\0") == []
     assert decoder.counters.version_errors == 1

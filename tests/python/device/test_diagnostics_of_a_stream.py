@@ -173,7 +173,7 @@ def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path: Path) -> N
     path.write_bytes(b"\0" + stuffed + b"\0")
     with pytest.raises(
         DeviceError,
-        match=r"old\.eits: packets of link version 1, and this eitskin reads version 5; read",
+        match=r"old\.eits: packets of link version 1, and this eitskin reads version 6; read",
     ):
         open_device(f"file:{path}")
 

@@ -29,6 +29,7 @@ from eitskin.skin.protocol import Protocol
 from emulated import clean, power_up
 
 BOOT_S, ANSWER_S, SCAN_S = 0.1, 0.15, 0.075
+SETTLING_S = 0.045  # two frames that the board drops
 MAX_INTERRUPTS = 10_000  # of a session; a sound image takes about 3,000
 EXCITATION_HZ, SETTLE_US = 50_000.0, 16
 
@@ -90,6 +91,7 @@ class Impatient(EmulatedTransport):
 def run_session(image: bytes) -> Session:
     """Power up, stream raw frames, and watch when the converter samples."""
     board = power_up(image, noisy=False)
+    board.strict = False  # broken_first says what the monitor found
     session = Session(board, load_prebuilt()[0].protocol)
     board.skin.begin(0)
     sample = board.adc.sample
@@ -106,7 +108,7 @@ def run_session(image: bytes) -> Session:
         )
         session.ask(commands.GetInfo())
         session.ask(commands.StreamCommand(int(Stream.RAW)))
-        session.listen(SCAN_S)
+        session.listen(SCAN_S + SETTLING_S)
         session.ask(commands.StreamCommand(0))
     except DeviceError as error:
         session.stuck = str(error)
@@ -149,7 +151,7 @@ def _order(board: EmulatedBoard, protocol: Protocol) -> str | None:
 
 def broken_first(session: Session) -> str | None:
     """No multiplexer changes its address while it may still be closed."""
-    found = session.board.multiplexers.violations
+    found = session.board.drive.violations
     return f"{len(found)}, first {found[0]}" if found else None
 
 
@@ -228,5 +230,6 @@ def table_after_upload(image: bytes, model: bytes) -> str | None:
     if session.info is None or session.info.protocol_hash != session.protocol.hash:
         return "INFO reports another protocol"
     board.multiplexers.log.clear()
+    session.ask(commands.StreamCommand(int(Stream.RAW)))
     session.listen(2 * SCAN_S)
     return _order(board, session.protocol)

@@ -47,8 +47,8 @@ def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
     device = device_before(image, skin_of(scene(wobble), model.protocol))
     told: list[Fault] = []
     device.record(lambda packet: told.extend(_faults(packet)))
-    check, seen, _ = twin_check(device, blob, 16)
-    assert (check.same + check.alone, check.different) == (16, [])  # the line does not carry all
+    check, seen, _ = twin_check(device, blob, 20)
+    assert check.different == []  # the line does not carry all, and touches after a gap are skipped
     assert check.same > 10
     uses = (model.protocol.drive_measure == 5).any(axis=1)
     whole = [

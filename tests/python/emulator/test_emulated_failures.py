@@ -95,6 +95,7 @@ def test_a_program_that_hangs_is_restarted_and_says_so(image: bytes) -> None:
 def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image: bytes) -> None:
     board = power_up(image)
     device = connect(board)
+    device.send_command(commands.StreamCommand(int(Stream.RAW)), 1.0)
     joined = lambda: None not in board.multiplexers.joined  # noqa: E731
     board.run_until(board.clock.now + TICKS_PER_S, lambda: joined() and board._asleep)
     assert joined()

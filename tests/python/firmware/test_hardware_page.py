@@ -17,8 +17,10 @@ MODES = {
     "SPI3": ("PIN_ALTERNATE", 6),
     "USART3": ("PIN_ALTERNATE", 7),
     "ADC1": ("PIN_ANALOG", 0),
+    "ADC2": ("PIN_ANALOG", 0),
+    "input": ("PIN_INPUT", 0),
 }
-CONSTANTS = {"FSYNC": 2, "LED_GREEN": 0, "LED_BLUE": 7, "LED_RED": 14}
+CONSTANTS = {"BUTTON": 13, "FSYNC": 2, "LED_GREEN": 0, "LED_BLUE": 7, "LED_RED": 14}
 
 
 def firmware_pins() -> dict[str, tuple[str, int]]:

@@ -22,7 +22,7 @@ F4, L4 = "STM32F429x.svd", "STM32L4x2.svd"
 # Prefix in the header: file, peripheral there, and other instances whose bases the header names.
 PERIPHERALS = {
     "RCC": (F4, "RCC"), "PWR": (F4, "PWR"), "FLASH": (F4, "FLASH"), "GPIO": (F4, "GPIOA"),
-    "ADC": (F4, "ADC1"),
+    "ADC": (F4, "ADC1"), "EXTI": (F4, "EXTI"),
     "DMA": (F4, "DMA2"), "TIM": (F4, "TIM2"), "IWDG": (F4, "IWDG"), "SPI": (L4, "SPI3"),
     "USART": (L4, "USART3"),
     "STK": (L4, "STK"), "NVIC": (L4, "NVIC"), "SCB": (L4, "SCB"), "MPU": (L4, "MPU"),
@@ -61,7 +61,7 @@ ADDRESSES = {"DWT": 0xE0001000, "UID": 0x1FF0F420, "ADC_COMMON": 0x40012300}
 DWT_OFFSETS = {"DWT_CTRL": 0x00, "DWT_CYCCNT": 0x04, "DWT_LAR": 0xFB0}
 INTERRUPTS = {
     "DMA1_STREAM1": "DMA1_Stream1", "DMA1_STREAM3": "DMA1_Stream3", "DMA2_STREAM0": "DMA2_Stream0",
-    "ADC": "ADC",
+    "ADC": "ADC", "PVD": "PVD",
     "USART3": "USART3",
 }  # fmt: skip
 

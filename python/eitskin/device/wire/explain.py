@@ -75,6 +75,13 @@ def reply_text(reply: Reply) -> str:
         ReplyStatus.SELF_TEST: (
             f"the golden frame's image differs from the model's by {first} parts in 1e9 of its peak"
         ),
+        ReplyStatus.LOCKED: (
+            "its owner has locked the board: hold the blue button on it and run this again"
+        ),
+        ReplyStatus.TRIPPED: (
+            "the current was above its limit and is off; look for a short or a wrong part, then run"
+            "  eitskin board --clear-faults"
+        ),
     }
     known = reply.status in list(ReplyStatus)
     unknown = f"refused with the unknown status {reply.status}"
@@ -160,6 +167,20 @@ def _text(fault: Fault) -> str:
         ),
         FaultCode.WATCHDOG: "the board restarted because its program hung; please report it",
         FaultCode.BUS: "the generator or the multiplexers could not be written; check their wiring",
+        FaultCode.CURRENT: (
+            f"{fault.value} uA rms flowed, above the limit, and was switched off; look for a short"
+            " or a wrong part, then run  eitskin board --clear-faults"
+        ),
+        FaultCode.CLOCK: (
+            "the board restarted because the generator's 8 MHz failed; check the solder bridges"
+        ),
+        FaultCode.SUPPLY: (
+            "the board restarted because its supply fell below 2.9 V; use a better cable or port"
+        ),
+        FaultCode.LOCKED: (
+            f"the locked board refused {command_name(fault.index)}; its owner must hold the blue"
+            " button"
+        ),
     }
     return texts[FaultCode(fault.code)]
 

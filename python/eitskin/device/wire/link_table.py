@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from eitskin.device.wire.layout import Command, Layout, Payload
 
-LINK_VERSION = 5
+LINK_VERSION = 6
 LINK_MAX_PAYLOAD = 16384
 FAULT_RAISE_FRAMES = 3
 FAULT_CLEAR_FRAMES = 8
@@ -44,6 +44,8 @@ class PacketType(IntEnum):
     STATS = 0x13
     # a fault that rose or went
     FAULT = 0x14
+    # SHA-256 of the model and of the firmware
+    HASHES = 0x16
     # never on a wire: the first packet of an .eits file
     RECORDING = 0x70
     # send an INFO
@@ -72,6 +74,12 @@ class PacketType(IntEnum):
     SELF_TEST = 0x8B
     # forget the faults
     CLEAR_FAULTS = 0x8C
+    # the host is there, or goes and the current stops; not answered
+    KEEPALIVE = 0x8D
+    # the owner's settings, kept in flash
+    SETTINGS = 0x8E
+    # send HASHES
+    GET_HASHES = 0x8F
 
 
 class ReplyStatus(IntEnum):
@@ -111,6 +119,10 @@ class ReplyStatus(IntEnum):
     TOO_FAST = 15
     # [0] difference to the golden image in parts per 1e9 of its peak
     SELF_TEST = 16
+    # the owner has locked the board: its blue button must be held
+    LOCKED = 17
+    # the current was above its limit: CLEAR_FAULTS first
+    TRIPPED = 18
 
 
 class Quality(IntFlag):
@@ -165,6 +177,38 @@ class FaultCode(IntEnum):
     STALE_REFERENCE = 14
     # likewise
     UNLIKE_MODEL = 15
+    # the current was above its limit and was switched off; value: uA rms
+    CURRENT = 16
+    # the board restarted because the generator's clock failed
+    CLOCK = 17
+    # the board restarted because its supply fell below 2.9 V
+    SUPPLY = 18
+    # the locked board refused a command; index: its packet type
+    LOCKED = 19
+
+
+class Drive(IntEnum):
+    """eits_drive: Whether current may flow through the skin, and why not."""
+
+    # no host has asked for frames
+    OFF = 0
+    # a host has, and is heard
+    ON = 1
+    # off: no packet came from the host for a second
+    SILENT = 2
+    # off: the current was above its limit
+    TRIPPED = 3
+
+
+class Setting(IntFlag):
+    """eits_setting: Bits of the owner's settings."""
+
+    # current flows on where no host listens
+    KEEP_DRIVE = 1
+    # models, settings and lower excitations need the blue button
+    LOCKED = 2
+    # a sense resistor is fitted: the current is measured
+    SENSE = 4
 
 
 class RawFlags(IntFlag):
@@ -229,6 +273,11 @@ class InfoPacket(Payload):
         ("frame_period_us", "I", ""),
         ("faults", "I", ""),
         ("volts_per_code_nv", "I", ""),
+        ("drive", "H", ""),
+        ("settings", "H", ""),
+        ("source_ua_rms", "I", ""),
+        ("current_ua_rms", "I", ""),
+        ("current_limit_ua_rms", "I", ""),
     )
     # of the GET_INFO that asked; 0 after a restart
     request: int
@@ -294,6 +343,16 @@ class InfoPacket(Payload):
     faults: int
     # between the electrodes, for one step of the converter
     volts_per_code_nv: int
+    # eits_drive
+    drive: int
+    # bits of eits_setting
+    settings: int
+    # what the current source gives as built; 0: not known
+    source_ua_rms: int
+    # as measured last; 0: there is no sense resistor, or no current
+    current_ua_rms: int
+    # above which the drive goes off; 0: none
+    current_limit_ua_rms: int
 
 
 @dataclass(frozen=True)
@@ -640,6 +699,24 @@ class FaultPacket(Payload):
 
 
 @dataclass(frozen=True)
+class HashesPacket(Payload):
+    """eits_packet_hashes: SHA-256 of what the board's flash holds."""
+
+    LAYOUT: ClassVar[Layout] = Layout(
+        "eits_packet_hashes",
+        ("request", "I", ""),
+        ("model", "32s", "hash"),
+        ("firmware", "32s", "hash"),
+    )
+    # of the GET_HASHES that asked
+    request: int
+    # of the model in use; zero: none
+    model: bytes
+    # of the program; zero: not known
+    firmware: bytes
+
+
+@dataclass(frozen=True)
 class GetInfo(Command):
     """GET_INFO: send an INFO"""
 
@@ -865,6 +942,48 @@ class ClearFaults(Command):
     )
 
 
+@dataclass(frozen=True)
+class Keepalive(Command):
+    """KEEPALIVE: the host is there, or goes and the current stops; not answered"""
+
+    TYPE: ClassVar[PacketType] = PacketType.KEEPALIVE
+    LAYOUT: ClassVar[Layout] = Layout(
+        "eits_command_keepalive",
+        ("request", "I", ""),
+        ("present", "I", ""),
+    )
+    # 1: it is; 0: it goes, and the current stops now
+    present: int
+
+
+@dataclass(frozen=True)
+class Settings(Command):
+    """SETTINGS: the owner's settings, kept in flash"""
+
+    TYPE: ClassVar[PacketType] = PacketType.SETTINGS
+    LAYOUT: ClassVar[Layout] = Layout(
+        "eits_command_settings",
+        ("request", "I", ""),
+        ("settings", "I", ""),
+        ("current_limit_ua_rms", "I", ""),
+    )
+    # bits of eits_setting
+    settings: int
+    # at most 10,000; 0: 1.25 times what the source gives
+    current_limit_ua_rms: int
+
+
+@dataclass(frozen=True)
+class GetHashes(Command):
+    """GET_HASHES: send HASHES"""
+
+    TYPE: ClassVar[PacketType] = PacketType.GET_HASHES
+    LAYOUT: ClassVar[Layout] = Layout(
+        "eits_command_plain",
+        ("request", "I", ""),
+    )
+
+
 COMMANDS: dict[int, type[Command]] = {
     PacketType.GET_INFO: GetInfo,
     PacketType.STREAM: StreamCommand,
@@ -879,4 +998,7 @@ COMMANDS: dict[int, type[Command]] = {
     PacketType.RESET: Reset,
     PacketType.SELF_TEST: SelfTest,
     PacketType.CLEAR_FAULTS: ClearFaults,
+    PacketType.KEEPALIVE: Keepalive,
+    PacketType.SETTINGS: Settings,
+    PacketType.GET_HASHES: GetHashes,
 }

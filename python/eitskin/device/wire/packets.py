@@ -15,12 +15,15 @@ from eitskin.core.diagnostics import names, words
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import GestureEvent
 from eitskin.device.wire.link_table import (
+    Drive,
     FaultCode,
     FaultPacket,
+    HashesPacket,
     InfoPacket,
     RawFlags,
     ReplyPacket,
     ReplyStatus,
+    Setting,
     SolvedPacket,
     StatsPacket,
 )
@@ -87,6 +90,16 @@ class BoardInfo(InfoPacket):
     def fault_codes(self) -> tuple[FaultCode, ...]:
         return tuple(code for code in FaultCode if self.faults >> code & 1)
 
+    @property
+    def setting_names(self) -> list[str]:
+        """The owner's settings that are on: "keep-drive"."""
+        return [str(one.name).lower().replace("_", "-") for one in Setting if one & self.settings]
+
+    @property
+    def drive_name(self) -> str:
+        """Whether current may flow: "on", "off", "silent" or "tripped"."""
+        return Drive(self.drive).name.lower() if self.drive in list(Drive) else str(self.drive)
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         values = asdict(self) | {
@@ -95,8 +108,20 @@ class BoardInfo(InfoPacket):
         }
         return values | {
             "model_crc": f"{self.model_crc:08x}",
+            "drive": self.drive_name,
+            "settings": self.setting_names,
             "faults": [code.name.lower() for code in self.fault_codes],
         }
+
+
+@dataclass(frozen=True)
+class BoardHashes(HashesPacket):
+    """SHA-256 of the model in use and of the program, zero where there is none."""
+
+    def as_dict(self) -> dict[str, str | None]:
+        """For JSON: hexadecimal, None where there is none."""
+        both = {"model": self.model, "firmware": self.firmware}
+        return {name: one.hex() if any(one) else None for name, one in both.items()}
 
 
 @dataclass(frozen=True)
@@ -187,5 +212,13 @@ class Fault(FaultPacket):
 
 
 FromBoard = (
-    BoardInfo | Reply | RawFrame | SolvedImage | SolvedTouches | FrameEvents | BoardStats | Fault
+    BoardInfo
+    | BoardHashes
+    | Reply
+    | RawFrame
+    | SolvedImage
+    | SolvedTouches
+    | FrameEvents
+    | BoardStats
+    | Fault
 )

@@ -24,6 +24,7 @@ from eitskin.device.wire.link_table import (
     TouchPacket,
 )
 from eitskin.device.wire.packets import (
+    BoardHashes,
     BoardInfo,
     BoardStats,
     Fault,
@@ -74,6 +75,7 @@ FORMS = {
     "one": Form(lambda values: values[0], lambda value: (value,)),
     "text": Form(_read_text, lambda text: (text.encode("ascii"),)),
     "version": Form(lambda values: tuple(values[0][:3]), lambda three: (bytes([*three, 0]),)),
+    "hash": Form(lambda values: bytes(values[0]), lambda value: (value,)),
     "pair": Form(tuple, tuple),
     "words": Form(tuple, tuple),
     "electrodes": Form(_read_electrodes, lambda bits: (sum(1 << bit for bit in bits),)),
@@ -165,6 +167,7 @@ _PARSERS: dict[int, Callable[[bytes], FromBoard]] = {
     PacketType.TOUCHES: parse_touches,
     PacketType.EVENTS: parse_events,
     PacketType.STATS: lambda payload: unpack(BoardStats, payload, "STATS"),
+    PacketType.HASHES: lambda payload: unpack(BoardHashes, payload, "HASHES"),
     PacketType.FAULT: lambda payload: unpack(Fault, payload, "FAULT"),
 }
 

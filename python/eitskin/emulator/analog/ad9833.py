@@ -69,6 +69,7 @@ class Ad9833:
         self._low: list[int | None] = [None, None]
         self._phase = [0, 0]
         self.courses = [self._course(0, 0)]
+        self.took: Callable[[int, int], None] = lambda at, word: None
 
     # ---- the bus ----
 
@@ -118,6 +119,7 @@ class Ad9833:
         else:
             self._phase[word >> 13 & 1] = word & 0xFFF
         self._go_on(at)
+        self.took(at, word)
 
     def _frequency(self, register: int, value: int) -> None:
         if self._control & B28:
@@ -173,11 +175,11 @@ class Ad9833:
         cycles = (times - course.start) // (TICKS_PER_S // self.mclk_hz)
         return np.asarray((course.phase + course.step * cycles) % FULL_TURN)
 
-    def output(self, times: IntArray) -> FloatArray:
+    def output(self, times: IntArray, *, peek: bool = False) -> FloatArray:
         """From -1 to 1 (.,) at ascending ``times``, 0 at mid-scale; ``times`` go forward from call
-        to call."""
+        to call, but for a ``peek``."""
         courses = self.courses
-        while len(courses) > 1 and courses[1].start <= times[0]:
+        while not peek and len(courses) > 1 and courses[1].start <= times[0]:
             courses.pop(0)
         out = np.zeros(len(times))
         for k, course in enumerate(courses):

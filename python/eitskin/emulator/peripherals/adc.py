@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.emulator.clocktime import BoardClock, period_ticks
+from eitskin.emulator.peripherals.adc2 import SingleConverter
 from eitskin.emulator.peripherals.dma import TO_MEMORY, Dma
 from eitskin.emulator.peripherals.nvic import Nvic
 from eitskin.emulator.peripherals.rcc import Rcc
@@ -44,6 +45,7 @@ SAMPLING_CYCLES = (3, 15, 28, 56, 84, 112, 144, 480)
 CONVERSION_CYCLES = 12
 MAX_HZ = 36_000_000
 IRQ = 18
+SECOND = 0x100  # where ADC2 begins
 
 Codes = npt.NDArray[np.uint16]
 RESET_VALUES = {
@@ -94,6 +96,7 @@ class Adc(Registers):
         record: Record,
     ) -> None:
         super().__init__(record, RESET_VALUES)
+        self.second = SingleConverter(clock, rcc, record)
         self._clock, self._schedule, self._nvic, self._rcc, self._dma, self._timer = (
             clock,
             schedule,
@@ -254,6 +257,8 @@ class Adc(Registers):
     # ---- registers ----
 
     def read(self, offset: int, size: int) -> int:
+        if SECOND <= offset < 2 * SECOND:
+            return self.second.read(offset - SECOND, size)
         self.bring_up_to_date()
         if offset == DR:
             self.values[SR] &= ~EOC
@@ -261,6 +266,9 @@ class Adc(Registers):
         return super().read(offset, size)
 
     def write(self, offset: int, size: int, value: int) -> None:
+        if SECOND <= offset < 2 * SECOND:
+            self.second.write(offset - SECOND, size, value)
+            return
         self.bring_up_to_date()
         if offset == SR:
             self.values[SR] &= value

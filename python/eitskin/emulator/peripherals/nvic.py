@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from eitskin.emulator.cpu import RegisterSet
 
-HARD_FAULT, MEMORY_FAULT, BUS_FAULT, USAGE_FAULT, SVCALL, PENDSV, SYSTICK = 3, 4, 5, 6, 11, 14, 15
+NMI, HARD_FAULT, MEMORY_FAULT, BUS_FAULT, USAGE_FAULT = 2, 3, 4, 5, 6
+SVCALL, PENDSV, SYSTICK = 11, 14, 15
 FIRST_IRQ = 16
 INTERRUPTS = 110
 FIXED = {1: -3, 2: -2, HARD_FAULT: -1}

@@ -2,7 +2,8 @@
 are clocked or reset.
 
 HSE is the 8 MHz that the ST-LINK drives; it is ready after 4 us, a PLL after 100 us. A switch of
-SYSCLK takes effect at once. Not modelled: PLLSAI, PLLI2S, clock security, low-power modes.
+SYSCLK takes effect at once; with clock security on, a failure of HSE switches to HSI and raises
+NMI (5.2.7). Not modelled: PLLSAI, PLLI2S, low-power modes.
 Peripheral clocks come from the buses (DCKCFGR2 = 0).
 """
 
@@ -15,7 +16,9 @@ from eitskin.emulator.peripherals.registers import Registers
 from eitskin.emulator.record import Record
 
 HSI_HZ, HSE_HZ = 16_000_000, 8_000_000
-CR, PLLCFGR, CFGR, CSR, DCKCFGR1 = 0x00, 0x04, 0x08, 0x74, 0x8C
+CR, PLLCFGR, CFGR, CIR, CSR, DCKCFGR1 = 0x00, 0x04, 0x08, 0x0C, 0x74, 0x8C
+HSE_ON, CLOCK_SECURITY, PLL_ON = 1 << 16, 1 << 19, 1 << 24
+FAILED, FORGET_FAILURE = 1 << 7, 1 << 23  # CSSF and CSSC
 HSE_READY_TICKS, PLL_READY_TICKS = 4 * TICKS_PER_US, 100 * TICKS_PER_US
 ENABLES = {"AHB1ENR": 0x30, "AHB2ENR": 0x34, "AHB3ENR": 0x38, "APB1ENR": 0x40, "APB2ENR": 0x44}
 RESET_OFFSET = 0x20  # from an enable register back to its reset register
@@ -55,6 +58,7 @@ class Rcc(Registers):
         self.listeners: list[tuple[Callable[[], None], Callable[[], None]]] = []
         self.resetters: dict[tuple[int, int], Callable[[], None]] = {}
         self.mco_changed: Callable[[], None] = lambda: None
+        self.failed: Callable[[], None] = lambda: None  # raises NMI
 
     def reset(self, cause: str) -> None:
         """As after a reset for ``cause``; CSR keeps earlier causes until RMVF, and power forgets
@@ -109,6 +113,20 @@ class Rcc(Registers):
         source = (self._hse_hz or 0) if word >> 22 & 1 else HSI_HZ
         return source * (word >> 6 & 0x1FF) // max(word & 0x3F, 1) // (2 * (word >> 16 & 3) + 2)
 
+    def set_hse(self, hz: int | None) -> None:
+        """The ST-LINK's clock fails (None), or comes back."""
+        guarded = hz is None and self.values[CR] & CLOCK_SECURITY and self._ready(CR) >> 17 & 1
+        if not guarded:
+            self._hse_hz = hz
+            self.mco_changed()
+            return
+        self._switch(self.values[CFGR] & ~3, self.values[CFGR])
+        self._hse_hz = None
+        self.values[CR] &= ~(HSE_ON | PLL_ON)
+        self.values[CIR] |= FAILED
+        self.mco_changed()
+        self.failed()
+
     # ---- registers ----
 
     def read(self, offset: int, size: int) -> int:
@@ -137,6 +155,8 @@ class Rcc(Registers):
             self.hazard("PLLCFGR written while the PLL is on")
         elif offset == CFGR:
             self._switch(value, before)
+        elif offset == CIR:
+            self.values[CIR] &= ~FAILED if value & FORGET_FAILURE else ~0
         elif offset == CSR:
             self.values[CSR] = value & 1 | (0 if value >> 24 & 1 else before & 0xFE000000)
         else:
@@ -181,6 +201,7 @@ class Pwr(Registers):
         super().__init__(record, PWR_RESET_VALUES)
         self._clock = clock
         self._asked_at = {16: 0, 17: 0}
+        self.low = False  # the supply is below the detector's level
 
     def reset(self) -> None:
         """As after a reset."""
@@ -195,7 +216,8 @@ class Pwr(Registers):
 
     def read(self, offset: int, size: int) -> int:
         if offset == 0x04:
-            return 1 << 14 | int(self.ready(16)) << 16 | int(self.ready(17)) << 17
+            low = self.low and bool(self.values[0] >> 4 & 1)
+            return int(low) << 2 | 1 << 14 | int(self.ready(16)) << 16 | int(self.ready(17)) << 17
         return super().read(offset, size)
 
     def write(self, offset: int, size: int, value: int) -> None:

@@ -1,0 +1,82 @@
+/* Watches what the drivers write to multiplexers and generator, on boards without hardware: never
+ * current without a host that asked within the last second, never an address that changes before
+ * the part is open, never both ends of a pair on one electrode, never a generator that changes
+ * while it drives. The first violation stays, in words. */
+#ifndef DRIVE_MONITOR_H
+#define DRIVE_MONITOR_H
+
+#include "boards/parts/ad9833_model.h"
+
+#include <stddef.h>
+
+#define DRIVE_MONITOR_OPEN_NS   140u        /* the slowest ADG1206 (data sheet, table 1) */
+#define DRIVE_MONITOR_SILENT_NS 1000000000u /* what is promised */
+#define DRIVE_MONITOR_ENABLES   0xF0000u
+
+typedef struct drive_monitor {
+    uint32_t lines; /* as in fw_board */
+    uint64_t opened_ns, heard_ns;
+    bool needs_host; /* false: silence is allowed */
+    bool heard;      /* ever, since power came */
+    bool runs;       /* the generator does */
+    const char *violation;
+} drive_monitor;
+
+static inline void drive_monitor_note(drive_monitor *m, bool wrong, const char *what)
+{
+    if (wrong && m->violation == NULL)
+        m->violation = what;
+}
+
+/* At any time, and before each write. */
+static inline void drive_monitor_look(drive_monitor *m, uint64_t now_ns)
+{
+    const bool drives = m->runs && (m->lines & DRIVE_MONITOR_ENABLES) != 0;
+    drive_monitor_note(m, drives && m->needs_host && !m->heard,
+                       "current flows and no host has ever asked");
+    drive_monitor_note(m,
+                       drives && m->needs_host && now_ns > m->heard_ns &&
+                           now_ns - m->heard_ns > DRIVE_MONITOR_SILENT_NS,
+                       "current flows more than 1 s after the host's last packet");
+}
+
+static inline void drive_monitor_heard(drive_monitor *m, uint64_t now_ns)
+{
+    m->heard = true;
+    m->heard_ns = now_ns;
+}
+
+static inline void drive_monitor_lines(drive_monitor *m, uint32_t mask, uint32_t levels,
+                                       uint64_t now_ns)
+{
+    const uint32_t before = m->lines, after = (before & ~mask) | (levels & mask);
+    const uint32_t on = after & DRIVE_MONITOR_ENABLES;
+    drive_monitor_note(m,
+                       ((before ^ after) & 0xFFFFu) != 0 && (before & DRIVE_MONITOR_ENABLES) != 0,
+                       "a multiplexer's address changes while it is enabled");
+    drive_monitor_note(m,
+                       ((before ^ after) & 0xFFFFu) != 0 && on == 0 &&
+                           now_ns - m->opened_ns < DRIVE_MONITOR_OPEN_NS,
+                       "a multiplexer's address changes before it is open");
+    drive_monitor_note(m, on == DRIVE_MONITOR_ENABLES && ((after ^ after >> 4) & 15u) == 0,
+                       "I+ and I- are on the same electrode");
+    drive_monitor_note(m, on == DRIVE_MONITOR_ENABLES && ((after >> 8 ^ after >> 12) & 15u) == 0,
+                       "V+ and V- are on the same electrode");
+    if ((before & DRIVE_MONITOR_ENABLES) != 0 && on == 0)
+        m->opened_ns = now_ns;
+    m->lines = after;
+    drive_monitor_look(m, now_ns);
+}
+
+/* After a word to the generator, `part` as it is now. */
+static inline void drive_monitor_word(drive_monitor *m, const ad9833_model *part, uint16_t word,
+                                      uint64_t now_ns)
+{
+    const bool stops = (word >> 14) == 0 && (word & AD9833_MODEL_RESET) != 0;
+    drive_monitor_note(m, !stops && (m->lines & DRIVE_MONITOR_ENABLES) != 0,
+                       "the generator changes while multiplexers are enabled");
+    m->runs = ad9833_model_runs(part);
+    drive_monitor_look(m, now_ns);
+}
+
+#endif

@@ -1,0 +1,283 @@
+/* Current flows only while a host that asked for frames is heard; the owner's settings and lock;
+ * the limit on current; hashes. */
+#include "app/drive.h"
+#include "app/kept.h"
+#include "app/sha256.h"
+#include "bench.h"
+#include "check.h"
+
+#include <string.h>
+
+static bench b;
+
+static bool drives(void)
+{
+    return (b.board.monitor.lines & 0xF0000u) != 0 || fake_generator_hz(&b.board) > 0;
+}
+
+/* A host whose presence is known by its packets alone. */
+static void start_unheard(void)
+{
+    b.host.quiet = true;
+    bench_start(&b, &SKIN_ADJACENT);
+}
+
+static void keep_alive(uint32_t present)
+{
+    const eits_command_keepalive c = {0, present};
+    host_send(&b.host, EITS_PACKET_KEEPALIVE, &c, sizeof c);
+    host_step(&b.host);
+}
+
+static void run_alive(uint32_t ms)
+{
+    for (; ms > 0; ms -= ms < 250 ? ms : 250) {
+        keep_alive(1);
+        host_run(&b.host, ms < 250 ? ms : 250);
+    }
+}
+
+static eits_packet_reply set(uint32_t settings, uint32_t limit_ua)
+{
+    eits_command_settings c = {0, settings, limit_ua};
+    return host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c);
+}
+
+static void test_off_until_asked(void)
+{
+    start_unheard();
+    CHECK_EQUAL(b.board.generator.control & AD9833_MODEL_RESET, AD9833_MODEL_RESET);
+    host_run(&b.host, 5000);
+    CHECK(!drives());
+    run_alive(1000); /* to be there asks for nothing; nor do questions */
+    CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_OFF);
+    (void)host_stats(&b.host, 0);
+    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 0, 1, 0).status, EITS_REPLY_OK);
+    CHECK(!drives());
+    CHECK_EQUAL(b.board.bursts, 0);
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK(drives());
+    CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_ON);
+    keep_alive(0); /* the host goes */
+    CHECK(!drives());
+    CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_OFF);
+}
+
+/* Silence ends the drive and the stream within a second, not the reference; who asks again gets
+ * frames of the same tare. */
+static void test_silence(void)
+{
+    start_unheard();
+    b.board.board.settle_frames = 2;
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0).status,
+                EITS_REPLY_OK);
+    run_alive(3000);
+    CHECK(drives());
+    const host_packet *raw = host_last(&b.host, EITS_PACKET_RAW);
+    float before[208], after[208];
+    memcpy(before, raw->payload + sizeof(eits_packet_raw), sizeof before);
+    keep_alive(1);
+    host_run(&b.host, 850);
+    CHECK(drives());
+    host_run(&b.host, 150);
+    CHECK(!drives());
+    host_forget(&b.host);
+    host_run(&b.host, 2000);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_RAW), 0);
+    const eits_packet_info info = host_info(&b.host);
+    CHECK_EQUAL(info.drive, EITS_DRIVE_SILENT);
+    CHECK_EQUAL(info.streaming, 0);
+    CHECK_EQUAL(info.tared, 1);
+    host_run(&b.host, 20); /* heard, but it did not ask again */
+    CHECK(!drives());
+    const uint32_t scanned = host_stats(&b.host, 0).frames_scanned;
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0).status,
+                EITS_REPLY_OK);
+    host_run(&b.host, 200);
+    raw = host_packet_of(&b.host, EITS_PACKET_RAW, 0);
+    const eits_packet_raw *head = (const void *)raw->payload;
+    CHECK_EQUAL(head->frame, scanned + 2); /* two settled */
+    memcpy(after, raw->payload + sizeof(eits_packet_raw), sizeof after);
+    for (uint32_t i = 0; i < 208; ++i)
+        CHECK_NEAR(after[i], before[i], fake_lsb_v(&b.board));
+    CHECK(host_count(&b.host, EITS_PACKET_IMAGE) > 0);
+    /* a tare that is cut by silence fails, and the old reference stays */
+    eits_command_tare c = {77, 200};
+    host_send(&b.host, EITS_PACKET_TARE, &c, sizeof c);
+    host_run(&b.host, 1500);
+    const eits_packet_reply reply = host_reply(&b.host, 77);
+    CHECK_EQUAL(reply.status, EITS_REPLY_CORE);
+    CHECK_EQUAL(host_info(&b.host).tared, 1);
+}
+
+static void test_owner_keeps_it(void)
+{
+    start_unheard();
+    CHECK_EQUAL(set(EITS_SETTING_KEEP_DRIVE, 0).status, EITS_REPLY_OK);
+    CHECK(drives());
+    b.board.monitor.needs_host = false; /* it is what the owner wants */
+    b.host.kept_on = true;
+    host_run(&b.host, 5000);
+    keep_alive(0);
+    CHECK(drives());
+    bench_restart(&b);
+    CHECK(drives());
+    CHECK_EQUAL(host_info(&b.host).settings, EITS_SETTING_KEEP_DRIVE);
+    b.host.kept_on = false;
+}
+
+static void test_lock(void)
+{
+    start_unheard();
+    CHECK_EQUAL(set(8, 0).status, EITS_REPLY_RANGE);
+    CHECK_EQUAL(set(0, 10001).status, EITS_REPLY_RANGE);
+    CHECK_EQUAL(set(EITS_SETTING_LOCKED, 400).status, EITS_REPLY_OK);
+    bench_restart(&b);
+    CHECK_EQUAL(host_info(&b.host).settings, EITS_SETTING_LOCKED);
+    CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 400);
+    eits_command_model_begin begin = {0, 64, 0};
+    eits_command_scan scan = host_default_scan();
+    for (int held = 0; held < 2; ++held) {
+        b.board.button = held != 0;
+        const uint16_t wanted = held ? EITS_REPLY_OK : EITS_REPLY_LOCKED;
+        host_forget(&b.host);
+        scan.excitation_millihz = 25000000;
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, wanted);
+        const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_LOCKED, true, 0);
+        CHECK((fault != NULL) == !held);
+        CHECK(fault == NULL || fault->index == EITS_PACKET_SCAN);
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MODEL_BEGIN, &begin, sizeof begin).status,
+                    wanted);
+        host_run(&b.host, 11000); /* the upload is given up */
+        CHECK_EQUAL(set(EITS_SETTING_SENSE, 0).status, wanted);
+        CHECK_EQUAL(host_info(&b.host).settings, held ? EITS_SETTING_SENSE : EITS_SETTING_LOCKED);
+    }
+}
+
+/* Power goes at any write of a change of settings, pages that are full and erased among them: the
+ * old ones stay, or the new ones are there. */
+static void test_cuts(void)
+{
+    static fw_store store; /* not in registers that longjmp forgets */
+    static volatile uint32_t step, saved;
+    for (step = 1; step < 60; ++step) {
+        fake_init(&b.board, 0);
+        store = b.board.board.store;
+        uint32_t done = 0;
+        for (; done < 7; ++done)
+            CHECK_EQUAL(fw_kept_save(&store, done, 100 + done), FW_OK);
+        b.board.cut_at = b.board.flash_steps + step;
+        saved = done;
+        if (setjmp(b.board.cut) == 0) {
+            for (; saved < 14; ++saved)
+                (void)fw_kept_save(&store, saved, 100 + saved);
+        }
+        b.board.cut_at = 0;
+        const fw_kept kept = fw_kept_load(&store);
+        CHECK(kept.magic == FW_KEPT_MAGIC && kept.current_limit_ua_rms == 100 + kept.settings);
+        CHECK(kept.settings + 1 == saved || kept.settings == saved);
+        for (uint32_t more = 20; more < 40; ++more) { /* and it goes on */
+            CHECK_EQUAL(fw_kept_save(&store, more, 100 + more), FW_OK);
+            CHECK_EQUAL(fw_kept_load(&store).settings, more);
+        }
+        CHECK_EQUAL(b.board.rewrites, 0);
+    }
+    store.page_bytes = 0;
+    CHECK_EQUAL(fw_kept_save(&store, 1, 1), FW_E_RANGE);
+    CHECK_EQUAL(fw_kept_load(&store).magic, 0);
+}
+
+static void test_limit(void)
+{
+    start_unheard();
+    CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 437); /* 1.25 times 350 */
+    b.board.current_ua = 500;
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    run_alive(500);
+    CHECK(drives()); /* nobody said that there is a resistor */
+    CHECK_EQUAL(set(EITS_SETTING_SENSE, 400).status, EITS_REPLY_OK);
+    CHECK(!drives());
+    b.board.current_ua = 400;
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    run_alive(500);
+    CHECK(drives());
+    CHECK_EQUAL(host_info(&b.host).current_ua_rms, 400);
+    host_forget(&b.host);
+    b.board.current_ua = 401;
+    run_alive(60);
+    CHECK(!drives());
+    const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_CURRENT, true, 0);
+    CHECK(fault != NULL && fault->value == 401);
+    CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_TRIPPED);
+    CHECK_EQUAL(host_info(&b.host).current_ua_rms, 401);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_TRIPPED);
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_TRIPPED);
+    CHECK_EQUAL(set(EITS_SETTING_KEEP_DRIVE | EITS_SETTING_SENSE, 400).status, EITS_REPLY_OK);
+    CHECK(!drives());
+    CHECK_EQUAL(set(EITS_SETTING_SENSE, 400).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
+    b.board.current_ua = 350;
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+}
+
+static void test_resets_are_reported(void)
+{
+    start_unheard();
+    b.board.board.last_reset = (fw_last_reset){.clock = 1, .supply = 1};
+    host_start(&b.host, &b.board);
+    CHECK(host_fault(&b.host, EITS_FAULT_CLOCK, true, 0) != NULL);
+    CHECK(host_fault(&b.host, EITS_FAULT_SUPPLY, true, 0) != NULL);
+}
+
+/* Examples of FIPS 180-2, appendix B, and lengths about a block. */
+static void test_sha256(void)
+{
+    static const uint8_t EMPTY[4] = {0xe3, 0xb0, 0xc4, 0x42}, ABC[4] = {0xba, 0x78, 0x16, 0xbf},
+                         TWO[4] = {0x24, 0x8d, 0x6a, 0x61}, MANY[4] = {0xcd, 0xc7, 0x6e, 0x5c};
+    static const char text[] = "abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq";
+    static uint8_t a[1000000];
+    uint8_t digest[32];
+    fw_sha256(NULL, 0, digest);
+    CHECK(memcmp(digest, EMPTY, 4) == 0);
+    fw_sha256((const uint8_t *)"abc", 3, digest);
+    CHECK(memcmp(digest, ABC, 4) == 0);
+    fw_sha256((const uint8_t *)text, sizeof text - 1, digest);
+    CHECK(memcmp(digest, TWO, 4) == 0);
+    memset(a, 'a', sizeof a);
+    fw_sha256(a, sizeof a, digest);
+    CHECK(memcmp(digest, MANY, 4) == 0);
+}
+
+static void test_hashes(void)
+{
+    start_unheard();
+    b.board.board.image = (const uint8_t *)"abc";
+    b.board.board.image_bytes = 3;
+    const eits_command_plain c = {31};
+    host_send(&b.host, EITS_PACKET_GET_HASHES, &c, sizeof c);
+    host_run(&b.host, 10);
+    const eits_packet_hashes *hashes =
+        (const void *)host_last(&b.host, EITS_PACKET_HASHES)->payload;
+    uint8_t digest[32];
+    fw_sha256(b.model.blob, b.model.size, digest);
+    CHECK_EQUAL(hashes->request, 31);
+    CHECK(memcmp(hashes->model, digest, 32) == 0);
+    fw_sha256((const uint8_t *)"abc", 3, digest);
+    CHECK(memcmp(hashes->firmware, digest, 32) == 0);
+}
+
+int main(void)
+{
+    test_off_until_asked();
+    test_silence();
+    test_owner_keeps_it();
+    test_lock();
+    test_cuts();
+    test_limit();
+    test_resets_are_reported();
+    test_sha256();
+    test_hashes();
+    return checks_report("drive");
+}
