@@ -3,6 +3,7 @@
  * write to the flash. Before each input the board is one of some that were started beforehand.
  *
  * It must hold of every script: lines are switched break before make, and between two electrodes;
+ * no current flows where no host is heard; what is locked stays as it is, over a power cut too;
  * nothing is programmed over what was not erased, or into the bank in use; every number that is
  * sent is finite, every packet of its size and in order; where a model was open before the power
  * went, one is open after it; and once the faults are gone, the board scans, its model passes its
@@ -35,7 +36,8 @@ static struct {
 } start[STARTS];
 static skin_model model[MODELS];
 static uint32_t bursts_left;
-static bool worn; /* a cell of the bank that is not in use has gone to 0 */
+static bool stuck; /* lines have not taken what was written */
+static bool worn;  /* a cell of the bank that is not in use has gone to 0 */
 static eits_packet_reply last_reply;
 
 /* ---- what the board sends ---- */
@@ -150,7 +152,7 @@ static void check_board(void)
     /* at 350 uA, 100 uA for each kilohertz */
     MUST(s->excitation_millihz >= 3500000 && s->excitation_millihz <= 250000000);
     MUST(fw_whole_periods(s->excitation_millihz, s->sample_rate_hz, s->samples));
-    MUST(fake.monitor.violation == NULL);
+    MUST(fake.monitor.violation == NULL || stuck);
     fake.monitor.needs_host = (m.instrument.kept.settings & EITS_SETTING_KEEP_DRIVE) == 0;
     MUST(fake.rewrites == 0 || worn);
     MUST(!m.instrument.upload.begun || !m.instrument.engine.open ||
@@ -166,12 +168,29 @@ static void power_up(void)
     listen();
 }
 
+/* Nobody holds the button: the lock stays, no upload begins, no excitation gives more current. */
+static void check_lock(const fw_instrument *before)
+{
+    const fw_instrument *now = &m.instrument;
+    if ((before->kept.settings & EITS_SETTING_LOCKED) == 0 || fake.button)
+        return;
+    MUST(now->kept.settings == before->kept.settings);
+    MUST(now->kept.current_limit_ua_rms == before->kept.current_limit_ua_rms);
+    MUST(now->upload.begun <= before->upload.begun);
+    MUST(now->settings.excitation_millihz >= before->settings.excitation_millihz);
+}
+
 static void turn(void)
 {
+    static fw_instrument before;
+    before.kept = m.instrument.kept;
+    before.upload = m.instrument.upload;
+    before.settings = m.instrument.settings;
     if (!fw_instrument_step(&m.instrument))
         fake_wait(&fake);
     listen();
     check_board();
+    check_lock(&before);
     if (m.instrument.reset_wanted)
         power_up();
 }
@@ -227,6 +246,8 @@ static size_t usual(uint8_t type, uint8_t *payload)
         return 8 + 64;
     case EITS_PACKET_GET_STATS:
         USUAL(eits_command_get_stats, .reset = 1);
+    case EITS_PACKET_SETTINGS:
+        USUAL(eits_command_settings, .settings = EITS_SETTING_LOCKED | EITS_SETTING_SENSE);
     case EITS_PACKET_MASK_ROW:
         USUAL(eits_command_mask_row, .row = 2, .masked = 1);
     default:
@@ -264,7 +285,8 @@ static void command(fuzz_bytes *in)
     last_reply.status = UINT16_MAX;
     send(type, payload, size);
     /* these are answered by packets of their own, or later */
-    if (type == EITS_PACKET_GET_INFO || type == EITS_PACKET_GET_STATS || type == EITS_PACKET_TARE)
+    if (type == EITS_PACKET_GET_INFO || type == EITS_PACKET_GET_STATS || type == EITS_PACKET_TARE ||
+        type == EITS_PACKET_GET_HASHES)
         return;
     MUST(!heard || size < 4 || (last_reply.status != UINT16_MAX && last_reply.request == request));
 }
@@ -358,11 +380,12 @@ static void heal(void)
 static void break_something(fuzz_bytes *in)
 {
     const uint8_t what = fuzz_u8(in), count = fuzz_u8(in);
-    switch (what % 12) {
+    switch (what % 14) {
     case 0:
         fake.spi_fail_from = fake.spi_calls + (what >> 4), fake.spi_fails = count;
         break;
     case 1:
+        stuck = true;
         fake.lines_fail_from = fake.lines_calls + (what >> 4), fake.lines_fails = count;
         break;
     case 2:
@@ -393,6 +416,12 @@ static void break_something(fuzz_bytes *in)
         break;
     case 10:
         fake.noise_codes = count * 4;
+        break;
+    case 11:
+        fake.button = count & 1;
+        break;
+    case 12:
+        fake.current_ua = count * 4u;
         break;
     default:
         fake.cut_at = fake.flash_steps + 1u + count * (what >> 4);
@@ -508,21 +537,31 @@ static void prepare(void)
     }
 }
 
+static void pass_ms(uint32_t ms)
+{
+    fake.now_ns += ms * 1000000ull;
+    fake.slot_ns += ms * 1000000ull; /* no bursts meanwhile */
+    turn();
+}
+
 /* All that was broken is mended: the board must work again. */
 static void check_end(void)
 {
     heal();
     m.volts = 1;
     const bool open = m.instrument.engine.open;
-    /* an upload that nobody ends, a tare that waits for frames */
-    for (uint64_t seconds = 11; seconds > 0; seconds /= 4) {
-        fake.now_ns += seconds * 1000000000u;
-        fake.slot_ns += seconds * 1000000000u; /* no bursts meanwhile */
-        for (int k = 0; k < 3; ++k)
-            turn();
-    }
+    fake.current_ua = 0;
+    /* the host falls silent; an upload that nobody ends */
+    for (uint32_t k = 0; k < 14; ++k)
+        pass_ms(k < 12 ? 90 : 11000);
     MUST(m.instrument.engine.open == open);
     MUST(!m.instrument.upload.active);
+    const bool kept = (m.instrument.kept.settings & EITS_SETTING_KEEP_DRIVE) != 0;
+    MUST(kept || !m.instrument.scan.running);
+    tell(EITS_PACKET_CLEAR_FAULTS); /* a limit of the current that tripped */
+    tell(EITS_PACKET_STREAM);
+    tell(EITS_PACKET_TARE);
+    pass_ms(1);
     MUST(m.instrument.scan.running == open);
     const bool tare = m.instrument.tare.active; /* may end in the turn that answers */
     tell(EITS_PACKET_SELF_TEST);
@@ -547,11 +586,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fake.to_board_size = fake.to_board_at = fake.to_host_size = 0;
     m = start[which].m;
     bursts_left = MAX_BURSTS;
-    worn = false;
+    worn = stuck = false;
     /* where the power goes, the rest of the input goes on after it */
     if (setjmp(fake.cut) != 0) {
         const bool was_open = m.instrument.engine.open;
+        const bool locked = (m.instrument.kept.settings & EITS_SETTING_LOCKED) != 0 && !fake.button;
         power_up();
+        MUST(!locked || (m.instrument.kept.settings & EITS_SETTING_LOCKED) != 0);
         MUST(m.instrument.engine.open || !was_open);
     }
     script(&in);

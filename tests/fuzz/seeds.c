@@ -121,6 +121,10 @@ static void boards(void)
                                  0, 1, 3,    20, 0,  type, 1, at, 0,  8, 3,    20};
         keep("field", k, field, sizeof field);
     }
+    /* locked by its owner, who lets go of the button; then an upload, and too much current */
+    const uint8_t locked[] = {3, 6, 11, 1, 0, 14, 0, 6, 11, 0, 5, 1, 1, 0,  14,  1, 4,
+                              0, 0, 9,  1, 0, 3,  0, 3, 60, 0, 2, 0, 6, 12, 200, 3, 90};
+    keep("locked", 0, locked, sizeof locked);
     /* 1 kHz in 1000 samples: more current than is safe */
     const uint8_t slow[] = {2, 0,  3, 2,   4,    1, 200, 0x40, 0x42, 0x0F,
                             0, 12, 0, 200, 0xE8, 3, 0,   0,    3,    9};
