@@ -39,6 +39,8 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, print, run."""
+    from hashlib import sha256
+
     from eitskin.device.flash import plan_flash, run_flash
     from eitskin.model.eitm import load_model
     from eitskin.model.prebuilt import load_prebuilt
@@ -55,6 +57,9 @@ def run(options: argparse.Namespace) -> int:
         image = options.image if options.image is not None else _prebuilt_image(folder)
         tool, serial, dry = options.tool, options.serial, options.dry_run
         plan = plan_flash(image, model, folder, tool=tool, serial=serial, installed=not dry)
+        for name, content in (("image", Path(image).read_bytes()), ("model", model)):
+            if content is not None:
+                print(f"{name} SHA-256 {sha256(content).hexdigest()}", file=sys.stderr)
         if not options.dry_run:
             run_flash(plan, lambda line: print(line, file=sys.stderr, flush=True))
     except BaseException:

@@ -32,12 +32,20 @@ def run(options: argparse.Namespace) -> int:
     """Ask and print."""
     with open_named(options) as device:
         info, url = device.board, device.transport.url
-        stats = None if device.transport.replays else device.stats(reset=options.reset_statistics)
+        replays = device.transport.replays
+        stats = None if replays else device.stats(reset=options.reset_statistics)
+        hashes = {} if replays else device.hashes().as_dict()
     if options.json:
         counted = None if stats is None else stats.as_dict()
-        print(json.dumps({"device": url, "board": info.as_dict(), "statistics": counted}, indent=2))
+        print(
+            json.dumps(
+                {"device": url, "board": info.as_dict(), "sha256": hashes, "statistics": counted},
+                indent=2,
+            )
+        )
         return 0
-    print_table(_facts(info, url) | ({} if stats is None else _counted(stats)))
+    sums = {f"{name} SHA": one for name, one in hashes.items() if one}
+    print_table(_facts(info, url) | sums | ({} if stats is None else _counted(stats)))
     if stats is not None:
         print("stage         count   last us    p99 us  worst us")
         for name, one in stats.stages.items():
@@ -75,6 +83,9 @@ def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
         if step_uv
         else ("another instrument's" if info.frames_given else "none (simulated)")
     )
+    kept = ", ".join(info.setting_names) or "none"
+    always = " (it flows although no program listens)" if info.settings & 1 else ""
+    facts["current"] = f"{info.drive_name}{always}; the owner's settings: {kept}"
     facts["faults"] = (
         ", ".join(code.name.lower().replace("_", " ") for code in info.fault_codes) or "none"
     )

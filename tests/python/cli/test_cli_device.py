@@ -399,7 +399,7 @@ def test_flash_prints_what_it_runs_and_runs_it(
     folders = re.compile(r"/eitskin-flash-\w+/")  # of each run its own
     assert not any(Path(folder).exists() for folder in re.findall(r"\S+/eitskin-flash-\w+/", err))
     planned = [folders.sub("/", line) for line in planned]
-    assert [folders.sub("/", line) for line in err.splitlines()] == planned
+    assert [folders.sub("/", line) for line in err.splitlines() if "SHA-256" not in line] == planned
     assert "eitskin info" in out
     run = [folders.sub("/", f"st-flash {line}") for line in log.read_text().splitlines()]
     assert run == planned

@@ -1,0 +1,66 @@
+"""``eitskin board``: what the board's owner may set: lock, current, limit."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from eitskin.cli.arguments import option
+from eitskin.cli.device_options import add_device, open_named, print_table
+from eitskin.errors import UsageError
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``board``."""
+    parser = subparsers.add_parser(
+        "board",
+        help="the owner's settings of a board: lock, current, limit",
+        description=(
+            "Show or change what a board's owner has set; the board keeps it over a loss of power."
+            " A locked board takes changes only while its blue button is held."
+        ),
+    )
+    add_device(parser)
+    option(parser, "--lock", "uploads, settings and lower excitations need the blue button")
+    option(parser, "--unlock", "nothing needs the button")
+    option(parser, "--keep-drive", "current flows on where no program listens")
+    option(parser, "--no-keep-drive", "it stops within a second (as delivered)")
+    option(parser, "--sense", "a sense resistor is fitted: measure the current")
+    option(parser, "--no-sense", "none is fitted (as delivered)")
+    option(parser, "--limit-ua UA", "rms, above which it is switched off; 0: as the board is", int)
+    option(parser, "--clear-faults", "forget faults, a current above its limit among them")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Change what is named, and show all."""
+    from eitskin.device.wire.link_table import Setting
+
+    pairs = (
+        (Setting.LOCKED, options.lock, options.unlock, "lock"),
+        (Setting.KEEP_DRIVE, options.keep_drive, options.no_keep_drive, "keep-drive"),
+        (Setting.SENSE, options.sense, options.no_sense, "sense"),
+    )
+    for _, on, off, name in pairs:
+        if on and off:
+            raise UsageError(f"board: --{name} and its contrary contradict each other; give one")
+    with open_named(options) as device:
+        if options.clear_faults:
+            device.clear_faults()
+        info = device.info()
+        wanted = Setting(info.settings)
+        for bit, on, off, _ in pairs:
+            wanted = (wanted | bit) if on else (wanted & ~bit) if off else wanted
+        if wanted != info.settings or options.limit_ua is not None:
+            limit_ua = info.current_limit_ua_rms if options.limit_ua is None else options.limit_ua
+            info = device.settings(wanted, limit_ua)
+        url = device.transport.url
+    facts = {"settings": info.setting_names, "current_limit_ua_rms": info.current_limit_ua_rms}
+    if options.json:
+        print(json.dumps({"device": url, **facts}, indent=2))
+    else:
+        limit = f"{info.current_limit_ua_rms} uA rms"
+        print_table({"device": url, "settings": ", ".join(info.setting_names) or "none",
+                     "limit": limit})  # fmt: skip
+    return 0
