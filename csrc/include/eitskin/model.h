@@ -199,6 +199,10 @@ typedef struct eits_model {
     eits_force force;
     eits_row_form row_form;
     eits_uncertainty uncertainty;
+    /* n_folded (n_folded + 1) / 2, the lower triangle of R by rows: the inverse of the covariance
+     * of the rows' noise that P whitens, P R^-1 P' = I (section PREC of taught models); NULL: none
+     */
+    const float *precision;
     const char *meta; /* JSON, not terminated by 0; NULL if absent */
     uint32_t meta_size;
 } eits_model;

@@ -162,7 +162,10 @@ static uint64_t drift_direction(eits_context *ctx, const eits_scratch *scratch, 
     /* Kept unreduced as well: the test for data off the model's range leaves the drift out, too. */
     ctx->kernels->mul(&model->reduction, scratch->index, ctx->projection.gain_drift,
                       model->n_folded, out);
-    return (uint64_t)model->n_folded * model->rank;
+    for (uint32_t k = 0; k < model->n_folded; ++k)
+        scratch->value[k] = ctx->projection.gain_drift[k];
+    return (uint64_t)model->n_folded * model->rank +
+           eits_fill_rows(ctx, scratch, model->n_folded, out);
 }
 
 /* Folds first, then the drift: where directions run out, what was not measured must be ignored,
@@ -200,14 +203,15 @@ uint32_t eits_reduce_frame(eits_context *ctx, const eits_scratch *scratch, uint6
         count += ctx->frame.sides[k] != EITS_SIDE_NONE;
     }
     ctx->kernels->mul(&ctx->model->reduction, scratch->index, scratch->value, count, ctx->frame.y);
-    *macs += (uint64_t)count * ctx->model->rank;
+    *macs += (uint64_t)count * ctx->model->rank + eits_fill_rows(ctx, scratch, count, ctx->frame.y);
     return count;
 }
 
 uint64_t eits_reduce(eits_context *ctx, const eits_scratch *scratch, uint32_t count, eits_real *out)
 {
     ctx->kernels->mul(&ctx->model->reduction, scratch->index, scratch->value, count, out);
-    const uint64_t macs = ctx->whitening.form ? eits_whiten_data(ctx, out) : 0;
+    const uint64_t filled = eits_fill_rows(ctx, scratch, count, out),
+                   macs = filled + (ctx->whitening.form ? eits_whiten_data(ctx, out) : 0);
     return macs + (uint64_t)count * ctx->model->rank + eits_project(ctx, out);
 }
 

@@ -75,7 +75,7 @@ static uint64_t sum_products(eits_context *ctx, const eits_scratch *scratch, uin
  *
  * Cholesky by rows, each row taken from all below it at once: the inner loop is axpy over a
  * padded row, which every processor here does well, and needs no gathering. */
-static uint64_t factor_products(const eits_context *ctx, eits_real lost, eits_real *n)
+uint64_t eits_factor_products(const eits_context *ctx, eits_real lost, eits_real *n)
 {
     const uint32_t rank = ctx->model->rank;
     uint64_t macs = 0;
@@ -244,7 +244,7 @@ static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
         EITS_STEP_MARGIN * ctx->whitening.s1_square * (1 + regularisation) / (1 + lost);
     eits_real *f = ctx->whitening.map, *g = ctx->whitening.metric;
     uint64_t macs = sum_products(ctx, scratch, missing, lost, f);
-    macs += factor_products(ctx, lost, f);
+    macs += eits_factor_products(ctx, lost, f);
     macs += factor_metric(ctx, scratch, regularisation, f, g);
     macs += finish_whitening(ctx, eits_sqrt(ctx->whitening.square), g, f);
     ctx->whitening.form = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank))
@@ -270,8 +270,14 @@ uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch)
         missing += !in_use(ctx, k);
     ctx->whitening.form = EITS_WHITENING_STORED;
     ctx->whitening.noise_ratio = 1;
-    if (!ctx->whitening.possible)
-        return 0;
+    if (!ctx->whitening.possible) {
+        const uint32_t rank = ctx->model->rank, spare = folded > rank ? folded - rank : 0;
+        /* with fewer rows left than directions, projecting loses nothing */
+        return missing > 0 && missing <= (rank < spare ? rank : spare) &&
+                       ctx->model->precision != NULL
+                   ? eits_fill_build(ctx, scratch)
+                   : 0;
+    }
     ctx->whitening.mu_in_force = ctx->whitening.mu;
     ctx->whitening.energy = ctx->whitening.energy_stored;
     if (missing > 0)
@@ -288,6 +294,10 @@ uint64_t eits_whiten_data(eits_context *ctx, eits_real *v)
 {
     if (ctx->whitening.form == EITS_WHITENING_DIAGONAL)
         return eits_whiten(ctx, v);
+    if (!ctx->whitening.possible) { /* a taught model: the rows left out are filled in by now */
+        solve_transposed(ctx, ctx->whitening.map, v);
+        return triangle_macs(ctx);
+    }
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         v[i] *= ctx->whitening.square * ctx->whitening.row_scale[i] * ctx->whitening.row_scale[i];
     solve_transposed(ctx, ctx->whitening.map, v);

@@ -20,6 +20,20 @@ void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch);
  * Returns the multiply-accumulates. */
 uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch);
 
+/* N = R'R in N's place, an upper triangle; pivots at least EITS_LOST_PIVOT * lost. */
+uint64_t eits_factor_products(const eits_context *ctx, eits_real lost, eits_real *n);
+
+/* ---- rows_out.c: taught models ---- */
+
+/* F for a taught model that lacks rows, at most `rank` of them. Uses scratch->index, row[3] and
+ * square; sets whitening.form. Returns the multiply-accumulates. */
+uint64_t eits_fill_build(eits_context *ctx, const eits_scratch *scratch);
+
+/* While such an F is in force: add to y = P d what the rows left out are expected to be by the
+ * `given` others, scratch->index and value; else nothing. Uses scratch->square. */
+uint64_t eits_fill_rows(eits_context *ctx, const eits_scratch *scratch, uint32_t given,
+                        eits_real *y);
+
 /* lambda_noise for the rows in use. */
 eits_real eits_lambda_noise(const eits_context *ctx);
 

@@ -19,6 +19,21 @@ static int is_second_moment(const float *triangle, uint32_t rank)
     return 1;
 }
 
+/* Section PREC: one such triangle, of the rows' precision. */
+eits_status eits_read_precision(eits_model *model, const eits_section *section)
+{
+    const size_t folded = model->n_folded, numbers = folded * (folded + 1u) / 2u;
+    const float *triangle = (const float *)(const void *)section->data;
+    if (triangle == NULL)
+        return EITS_OK;
+    if (section->size != 4u * numbers)
+        return EITS_E_MODEL_SECTION;
+    if (model->row_form.scale != NULL || !is_second_moment(triangle, model->n_folded))
+        return EITS_E_MODEL_VALUE;
+    model->precision = triangle;
+    return EITS_OK;
+}
+
 eits_status eits_read_uncertainty(eits_model *model, const eits_section *section)
 {
     const size_t numbers = (size_t)model->rank * (model->rank + 1u) / 2u;

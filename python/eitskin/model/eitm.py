@@ -85,6 +85,8 @@ def encode_model(model: Model) -> bytes:
         sections["LOAD"] = encode_load(model.load)
     if model.row_form is not None:
         sections["WHIT"] = model.row_form.encode()
+    if model.precision is not None:
+        sections["PREC"] = model.precision.astype("<f4").tobytes()
     if model.model_errors is not None:
         sections["UNCE"] = model.model_errors.encode()
     if stored.scale is not None:
@@ -214,7 +216,7 @@ def _split(blob: bytes, where: str) -> Sections:
             raise ModelError(
                 f"{where}: section {name!r} is misplaced or repeated; build the model again"
             )
-        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE"):
+        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE", "PREC"):
             if flags & REQUIRED_FLAG:
                 raise ModelError(
                     f"{where}: needs section {name!r}, which this eitskin does not know; upgrade"
@@ -378,6 +380,19 @@ def _read_fields(content: bytes, d: _Dims, where: str) -> Fields:
     return Fields(columns[:, : 2 * d.n_electrodes + MIRROR_ROWS], volts, per_sheet)
 
 
+def _read_precision(sections: Sections, d: _Dims, where: str) -> npt.NDArray[np.float32] | None:
+    if "PREC" not in sections:
+        return None
+    count = d.n_folded * (d.n_folded + 1) // 2
+    if len(sections["PREC"]) != 4 * count:
+        _refuse(where, "section 'PREC' of a size that its rows do not ask for")
+    values = _floats(sections, "PREC", (count,), where)
+    diagonal = np.cumsum(np.arange(1, d.n_folded + 1)) - 1
+    if "WHIT" in sections or not (values[diagonal] >= 0).all() or np.abs(values).max() > HUGE:
+        _refuse(where, "a number in section 'PREC' that is out of range")
+    return values
+
+
 def _read_meta(content: bytes, where: str) -> dict[str, Any]:
     try:
         meta = parse_json(content.decode("utf-8"))
@@ -426,6 +441,7 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
         row_form=(
             decode_row_form(sections["WHIT"], projection, where) if "WHIT" in sections else None
         ),
+        precision=_read_precision(sections, d, where),
         model_errors=(
             decode_model_errors(sections["UNCE"], d.rank, where) if "UNCE" in sections else None
         ),

@@ -76,7 +76,9 @@ class Model:
     """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P
     (r, k) float32; ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how
     it was made; ``fields`` where it has them; ``load`` tells loads from strengths, where the skin
-    was calibrated; ``model_errors`` how far a real skin may be from it, where that was drawn.
+    was calibrated; ``model_errors`` how far a real skin may be from it, where that was drawn;
+    ``precision`` (k (k + 1) / 2,) of a taught model, the lower triangle of the inverse covariance
+    of the rows' noise.
     """
 
     protocol: Protocol
@@ -97,6 +99,7 @@ class Model:
     load: LoadLaw | None = None
     row_form: RowForm | None = None
     model_errors: ModelErrors | None = None
+    precision: npt.NDArray[np.float32] | None = None
 
     def __repr__(self) -> str:
         name = self.meta.get("skin", {}).get("skin", {}).get("name", "of a skin without a name")

@@ -59,7 +59,7 @@ from eitskin.reference.reference_outliers import clean
 from eitskin.reference.row_gains import row_gains
 from eitskin.reference.touches import brought_onto_skin, find_touches
 from eitskin.reference.tracker import Tracker
-from eitskin.reference.whitening import Whitening, form_of, whiten
+from eitskin.reference.whitening import Whitening, filled, form_of, whiten
 from eitskin.solve.options import default_options
 
 BoolArray = npt.NDArray[np.bool_]
@@ -393,12 +393,17 @@ class ReferenceEngine:
             self.options.regularisation_noise_factor * self._noise_v / self._v0_rms,
             FAR_REGULARISATION if self._far else 0.0,
         )
-        self._whitening = None if self._form is None else whiten(self._form, known, asked)
+        self._whitening = (
+            filled(self.model, known) if self._form is None else whiten(self._form, known, asked)
+        )
         self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
 
     def _reduce(self, d: FloatArray) -> FloatArray:
         """Folded data (k,) to reduced data (r,)."""
-        return self._p @ d if self._whitening is None else self._whitening.data @ (self._p @ d)
+        if self._whitening is None:
+            return self._p @ d
+        whole = d if self._whitening.fill is None else self._whitening.fill @ d
+        return self._whitening.data @ (self._p @ whole)
 
     def _directions(self, folded: Folded) -> list[FloatArray]:
         """What the model_mismatch ignores: P's columns of folds left out, unless that is whitened

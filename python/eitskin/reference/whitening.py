@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from eitskin.core.constants_table import (
     LOST,
+    LOST_PIVOT,
     MAX_REGULARISATION,
     MIN_REGULARISATION,
     MIN_REGULARISATION_FRACTION,
@@ -47,7 +48,8 @@ class Whitening:
     of S x is to meet what ``data`` (r, r) makes of P d.
 
     ``noise_ratio``: how much more noise max(S'y) has than with all rows and the model's
-    regularisation; ``energy_ratio``: |y|^2 likewise.
+    regularisation; ``energy_ratio``: |y|^2 likewise. ``fill`` (k, k): of taught models,
+    folded data with those left out filled in from the others.
     """
 
     see: FloatArray
@@ -55,6 +57,7 @@ class Whitening:
     noise_ratio: float
     regularisation: float
     energy_ratio: float = 1.0
+    fill: FloatArray | None = None
 
 
 def form_of(model: Model) -> WhitenedForm | None:
@@ -70,6 +73,36 @@ def form_of(model: Model) -> WhitenedForm | None:
         rows.mu,
         rows.s1_square,
     )
+
+
+def _upper_factor(n: FloatArray, least: float) -> FloatArray:
+    """R of n = R'R, pivots held at ``least``, as eits_factor_products."""
+    rest, r = n.copy(), np.zeros_like(n)
+    for i in range(len(n)):
+        r[i, i:] = rest[i, i:] / np.sqrt(max(rest[i, i], least))
+        r[i, i] = np.sqrt(max(rest[i, i], least))
+        rest -= np.outer(r[i], r[i])
+    return r
+
+
+def filled(model: Model, known: BoolArray) -> Whitening | None:
+    """Of a taught model that lacks some folded rows, at most as many as it has directions: they are
+    filled in by what the noise of the others makes them expect (csrc/src/frame/rows_out.c)."""
+    out = ~known
+    if model.precision is None or not 0 < out.sum() <= min(model.rank, len(known) - model.rank):
+        return None
+    count = len(known)
+    precision = np.zeros((count, count))
+    precision[np.tril_indices(count)] = model.precision
+    precision += np.tril(precision, -1).T
+    p = model.projection[:, out].astype(np.float64)
+    fill = np.diag(known.astype(np.float64))
+    fill[np.ix_(out, known)] = -np.linalg.solve(
+        precision[np.ix_(out, out)], precision[np.ix_(out, known)]
+    )
+    left = np.eye(model.rank) - p @ np.linalg.solve(precision[np.ix_(out, out)], p.T)
+    see = _upper_factor(left, LOST_PIVOT * LOST**2)
+    return Whitening(see, np.asarray(np.linalg.inv(see.T)), 1.0, 0.0, fill=fill)
 
 
 def whiten(form: WhitenedForm, known: BoolArray, asked: float) -> Whitening | None:

@@ -4,6 +4,7 @@ whether it fits them."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,18 +47,8 @@ def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
     scores = np.zeros((count, grid.n_pixels), dtype=np.float32)
     for i in range(count):
         answer = (mean - (h[:, i : i + 1] + v[i] * w) * residual[i]) @ whitening.T
-        energy = np.maximum(np.sum(answer**2, axis=1), 1e-300)
-        along = np.maximum(answer @ seen[i], 0)
-        score = seen[i] @ seen[i] - along**2 / energy
-        # the scale of the noise is the press's own: what is left at the best place
-        scale = max(float(score.min()) / (process.data.shape[1] - 3), 1.0)
-        score = (score - score.min()) / scale
-        scores[i] = score
-        chance = np.exp(-0.5 * np.minimum(score, 1400))
-        chance /= chance.sum()
-        found[i] = chance @ at
-        away = at - found[i]
-        covariance = (chance[:, None] * away).T @ away + np.eye(2) * grid.pixel_mm**2 / 12
+        scores[i] = _scores(answer, seen[i])
+        found[i], covariance = _moments(scores[i], at, grid.pixel_mm)
         error = found[i] - process.place_mm[i]
         mahalanobis2[i] = error @ np.linalg.solve(covariance, error)
     explained = 1 - np.sum(residual**2, axis=0) / np.maximum(
@@ -67,6 +58,36 @@ def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
         found, np.linalg.norm(found - process.place_mm, axis=1), mahalanobis2, scores,
         misfit / np.median(misfit), explained,
     )  # fmt: skip
+
+
+def _scores(answer: FloatArray, seen: FloatArray) -> FloatArray:
+    """chi^2 (k,) less its least of whitened data (m,) as a press at each of k places with whitened
+    answers (k, m). The noise's scale is the press's own: what is left at its best place."""
+    energy = np.maximum(np.sum(answer**2, axis=1), 1e-300)
+    score = seen @ seen - np.maximum(answer @ seen, 0) ** 2 / energy
+    scale = max(float(score.min()) / max(len(seen) - 3, 1), 1.0)
+    return np.asarray((score - score.min()) / scale)
+
+
+def _moments(
+    score: npt.NDArray[Any], at: FloatArray, pixel_mm: float
+) -> tuple[FloatArray, FloatArray]:
+    """Mean (2,) and covariance (2, 2) of a press's place by its scores on the grid."""
+    chance = np.exp(-0.5 * np.minimum(score.astype(np.float64), 1400))
+    chance /= chance.sum()
+    mean = chance @ at
+    away = at - mean
+    return mean, (chance[:, None] * away).T @ away + np.eye(2) * pixel_mm**2 / 12
+
+
+def placed(learned: Learned, grid: Grid, difference: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (n, 2) mm and covariance (n, 2, 2) of the places of new presses, differences (n, m)."""
+    at = grid.centres_mm()
+    answer = learned.process.mean(at) @ learned.noise.whitening.T
+    found = [
+        _moments(_scores(answer, seen), at, grid.pixel_mm) for seen in learned.whitened(difference)
+    ]
+    return np.array([one[0] for one in found]), np.array([one[1] for one in found])
 
 
 def refined_places(

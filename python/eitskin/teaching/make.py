@@ -43,6 +43,12 @@ def taught_defaults(grid: Grid, lambda_rel: float) -> Defaults:
     )
 
 
+def _precision(learned: Learned, s1: float) -> npt.NDArray[np.float32]:
+    """The lower triangle of R = W'W over s_1^2, by rows."""
+    white = learned.noise.whitening / learned.unit / s1
+    return np.asarray((white.T @ white)[np.tril_indices(white.shape[0])], dtype=np.float32)
+
+
 def taught_model(
     learned: Learned,
     protocol: Protocol,
@@ -51,6 +57,7 @@ def taught_model(
     lambda_rel: float,
     meta: dict[str, Any] | None = None,
     storage: str = "f32",
+    rank: int = RANK,
 ) -> Model:
     """The model of ``learned`` on ``grid``: P = U'W / s_1, S = diag(s / s_1) V' of S_w D = U s V',
     S_w = W s(grid), D = 1 / |column|. ``untouched`` (n, m) V gives the reference."""
@@ -59,7 +66,7 @@ def taught_model(
     norm = np.linalg.norm(answer, axis=0)
     weight = 1 / np.maximum(norm, 1e-3 * norm.max())
     u, s, vt = np.linalg.svd(answer * weight, full_matrices=False)
-    rank = min(RANK, rows, grid.n_pixels)
+    rank = min(rank, rows, grid.n_pixels)
     projection = (u[:, :rank].T @ learned.noise.whitening / learned.unit / s[0]).astype(np.float32)
     stored = store((s[:rank] / s[0])[:, None] * vt[:rank], storage)
     decoded = stored.decode(rank)
@@ -76,6 +83,7 @@ def taught_model(
         projection=projection,
         stored=stored,
         column_weight=weight.astype(np.float32),
+        precision=_precision(learned, float(s[0])),
         lipschitz=float(np.float32(spectral_norm_squared(decoded) * (1 + LIPSCHITZ_MARGIN))),
         noise_gain=float(np.float32(noise_gain(projection, decoded))),
         defaults=taught_defaults(grid, lambda_rel),

@@ -34,6 +34,10 @@ EXPERIMENTS = {
         "how sure the core is of each touch and of its place, and when it says that the count is"
         " uncertain: how often that is true"
     ),
+    "teaching": (
+        "a model taught from presses at known places on a measured skin, with every baseline on the"
+        " same splits"
+    ),
     "levers": (
         "what was tried to do better, each for itself: what helps for its MACs, and what does not"
     ),

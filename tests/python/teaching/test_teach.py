@@ -14,6 +14,7 @@ from eitskin.model.eitm import decode_model, encode_model
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.kernel import Placement
 from eitskin.teaching.left_out import leave_one_out
+from eitskin.teaching.make import taught_model
 from eitskin.teaching.teach import Taught, check_presses, solve_presses, teach
 
 
@@ -53,6 +54,33 @@ def test_the_file_brings_its_own_options_and_every_engine_agrees(taught: Taught)
         found.append(core.reconstruct(one.pressed[0]))
     assert found[1].image == pytest.approx(found[2].image, abs=1e-9 * found[2].image.max())
     assert found[0].touches[0].x_mm == pytest.approx(found[2].touches[0].x_mm, abs=0.01)
+
+
+def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught: Taught) -> None:
+    judged = presses(25, seed=5)
+    out = np.arange(judged.protocol.n_rows) < 9
+    errors = []
+    whole = taught_model(
+        taught.learned, judged.protocol, taught.model.grid, judged.untouched, 0.2, rank=14
+    )
+    for precision in (whole.precision, None):
+        model = replace(whole, precision=precision)
+        cores = [Reconstructor(model, engine=one) for one in ("c", "c64", "numpy")]
+        for core in cores:
+            core.mask_rows(out)
+        for i in range(25):
+            found = []
+            for core in cores[:1] if i else cores:
+                core.forget()
+                core.tare(judged.untouched[i])
+                found.append(core.reconstruct(judged.pressed[i]))
+            if not i:
+                assert found[1].image == pytest.approx(
+                    found[2].image, abs=1e-8 * found[2].image.max()
+                )
+            at = [(one.x_mm, one.y_mm) for one in found[0].touches[:1]] or [(2 * RADIUS_MM, 0.0)]
+            errors.append(float(np.linalg.norm(at[0] - judged.place_mm[i])))
+    assert np.median(errors[:25]) < np.median(errors[25:])
 
 
 def test_mirrored_places_are_told_and_taught() -> None:

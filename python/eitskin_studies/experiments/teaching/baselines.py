@@ -1,0 +1,90 @@
+"""Baseline methods that learn places from the same presses; each chooses its parameters by
+five-fold cross-validation on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import missing_extra
+
+FloatArray = npt.NDArray[np.float64]
+# data and places (n, m), (n, 2) taught, data (k, m) judged: places (k, 2)
+Baseline = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+def _searched(estimator: Any, grid: dict[str, list[Any]]) -> Baseline:
+    def predict(data: FloatArray, place: FloatArray, new: FloatArray) -> FloatArray:
+        try:
+            from sklearn.model_selection import GridSearchCV
+            from sklearn.pipeline import make_pipeline
+            from sklearn.preprocessing import StandardScaler
+        except ModuleNotFoundError:
+            raise missing_extra("peers", "scikit-learn") from None
+        pipeline = make_pipeline(StandardScaler(), estimator())
+        step = pipeline.steps[-1][0]
+        search = GridSearchCV(
+            pipeline, {f"{step}__{name}": values for name, values in grid.items()},
+            cv=min(5, len(data)), scoring="neg_mean_absolute_error",
+        )  # fmt: skip
+        scale = np.abs(place).max()
+        return np.asarray(search.fit(data, place / scale).predict(new) * scale)
+
+    return predict
+
+
+def _ridge() -> Any:
+    from sklearn.linear_model import Ridge
+
+    return Ridge()
+
+
+def _kernel_ridge() -> Any:
+    from sklearn.kernel_ridge import KernelRidge
+
+    return KernelRidge(kernel="rbf")
+
+
+def _nearest() -> Any:
+    from sklearn.neighbors import KNeighborsRegressor
+
+    return KNeighborsRegressor(weights="distance")
+
+
+def _mlp() -> Any:
+    from sklearn.neural_network import MLPRegressor
+
+    return MLPRegressor(hidden_layer_sizes=(128, 64), solver="lbfgs", max_iter=150, random_state=0)
+
+
+def activation_maps(data: FloatArray, place: FloatArray, new: FloatArray) -> FloatArray:
+    """Weighted activation maps: each row's mean |change| about every place, summed with the new
+    press's |changes| as weights; the place of the greatest 2 % of the sum."""
+    rows = np.abs(data) / np.abs(data).mean(axis=0)
+    reach = np.abs(place).max()
+    axis = np.linspace(-reach, reach, 41)
+    at = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    at = at[np.linalg.norm(at, axis=1) <= 1.03 * np.linalg.norm(place, axis=1).max()]
+    width = max(0.1, 0.5 / np.sqrt(len(place))) * reach
+    near = np.exp(-0.5 * np.sum((at[:, None] - place[None]) ** 2, axis=2) / width**2) + 1e-12
+    maps = near @ rows / near.sum(axis=1, keepdims=True)
+    maps = (maps - maps.mean(axis=0)) / maps.std(axis=0)
+    weight = np.abs(new) / np.abs(data).mean(axis=0)
+    total = weight @ maps.T
+    best = np.argsort(-total, axis=1)[:, : max(1, len(at) // 50)]
+    return np.asarray(at[best].mean(axis=1))
+
+
+POWERS = [10.0**k for k in range(-4, 5)]
+BASELINES: dict[str, Baseline] = {
+    "kernel ridge": _searched(
+        _kernel_ridge, {"alpha": [1e-4, 1e-3, 1e-2, 0.1], "gamma": [3e-5, 3e-4, 3e-3, 3e-2]}
+    ),
+    "MLP": _searched(_mlp, {"alpha": [0.1, 10.0]}),
+    "k-nearest": _searched(_nearest, {"n_neighbors": [1, 2, 3, 4]}),
+    "ridge": _searched(_ridge, {"alpha": POWERS}),
+    "activation maps": activation_maps,
+}

@@ -1,0 +1,103 @@
+/* Rows left out of a taught model: filled in by the rows' precision (section PREC), F beside it;
+ * and everything that a reader refuses. */
+#include "base/vec.h"
+#include "check.h"
+#include "frame/whitening.h"
+#include "small_model.h"
+
+#include <math.h>
+
+enum { RANK = 4, PACKED = SMALL_FOLDED * (SMALL_FOLDED + 1) / 2, SIZE = 4 * PACKED, OTHER = 10 };
+
+static const small_spec TAUGHT = {.rank = RANK, .side = 5, .shape = SMALL_IDENTITY};
+static const small_spec WHITENED = {.rank = RANK, .side = 5, .shape = SMALL_WHITENED};
+
+static uint8_t *entry(uint8_t *bytes, uint32_t i, uint32_t j)
+{
+    return bytes + 4 * (i * (i + 1) / 2 + j);
+}
+
+/* The identity, but fold 0 has a precision of 2 and leans on fold OTHER. */
+static void section_of(uint8_t *bytes, float leaning)
+{
+    memset(bytes, 0, SIZE + 4);
+    for (uint32_t i = 0; i < SMALL_FOLDED; ++i)
+        small_put_f32(entry(bytes, i, i), i == 0 ? 2.0f : 1.0f);
+    small_put_f32(entry(bytes, OTHER, 0), leaning);
+}
+
+/* A model with the section PREC; without WHIT, which the small identity has, where `taught`. */
+static small_model with_precision(small_spec spec, int taught, const uint8_t *bytes, uint32_t size)
+{
+    small_model bare = small_model_make(spec);
+    if (taught)
+        memcpy(small_model_entry(&bare, "WHIT"), "XTRW", 4);
+    const small_model made = small_model_with_section(&bare, "PREC", bytes, size);
+    small_model_free(&bare);
+    return made;
+}
+
+static eits_status opened(int taught, const uint8_t *bytes, uint32_t size)
+{
+    small_model made = with_precision(taught ? TAUGHT : WHITENED, taught, bytes, size);
+    eits_model model;
+    const eits_status status = eits_model_open(&model, made.blob, made.size);
+    small_model_free(&made);
+    return status;
+}
+
+static void what_is_no_precision_is_refused(void)
+{
+    uint8_t bytes[SIZE + 4];
+    section_of(bytes, 0.5f);
+    CHECK_EQUAL(opened(1, bytes, SIZE), EITS_OK);
+    CHECK_EQUAL(opened(1, bytes, SIZE - 4), EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(opened(1, bytes, SIZE + 4), EITS_E_MODEL_SECTION);
+    /* a model that says how it was whitened needs none */
+    CHECK_EQUAL(opened(0, bytes, SIZE), EITS_E_MODEL_VALUE);
+    small_put_f32(entry(bytes, 3, 3), -1);
+    CHECK_EQUAL(opened(1, bytes, SIZE), EITS_E_MODEL_VALUE);
+    section_of(bytes, (float)NAN);
+    CHECK_EQUAL(opened(1, bytes, SIZE), EITS_E_MODEL_VALUE);
+}
+
+/* A frame without fold 0, `pivot` the precision of that fold. */
+static void solved(float leaning, float pivot, eits_real wanted_scale, eits_whitening_form form)
+{
+    uint8_t bytes[SIZE + 4];
+    eits_real frame[SMALL_ROWS];
+    uint32_t masked;
+    uint64_t macs;
+    section_of(bytes, leaning);
+    small_put_f32(entry(bytes, 0, 0), pivot);
+    small_model made = with_precision(TAUGHT, 1, bytes, SIZE);
+    small_context c;
+    small_context_open(&c, &made, 0);
+    eits_options o = *eits_get_options(c.ctx);
+    o.project_reference = 0;
+    o.diagnostics = 0;
+    CHECK_EQUAL(eits_set_options(c.ctx, &o), EITS_OK);
+    small_reference(&c.model, 1, frame);
+    CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        frame[i] *= (eits_real)1.25;
+    frame[c.model.fold[0].first] = (eits_real)NAN;
+    if (c.model.fold[0].second != EITS_FOLD_NONE)
+        frame[c.model.fold[0].second] = (eits_real)NAN;
+    CHECK_EQUAL(eits_frame_stage(c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_EQUAL(c.ctx->whitening.form, form);
+    const eits_real p = (eits_real)((const float *)c.model.reduction.data)[0];
+    CHECK_NEAR(c.ctx->frame.y[0], wanted_scale * p * c.ctx->frame.d[OTHER], 1e-5);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+int main(void)
+{
+    what_is_no_precision_is_refused();
+    /* d_0 = -.5 / 2 d_OTHER, F_00 = sqrt(1 - 1 / 2), y = d_0 / F_00 */
+    solved(0.5f, 2.0f, (eits_real)(-0.25 / sqrt(0.5)), EITS_WHITENING_TRIANGLE);
+    /* a precision of nothing cannot be divided by: the row is projected out, as without PREC */
+    solved(0.5f, 0.0f, 0, EITS_WHITENING_STORED);
+    return checks_report("rows out");
+}
