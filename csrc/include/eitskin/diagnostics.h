@@ -34,7 +34,7 @@ typedef enum eits_diagnostic {
     EITS_DIAGNOSTIC_MODEL_MISMATCH = 32,
     /* images the frame, which changes the way touches cannot */
     EITS_DIAGNOSTIC_STALE_REFERENCE = 64,
-    /* eits_find_touches reports more touches than can be told apart */
+    /* eits_find_touches reports more touches than can be separated */
     EITS_DIAGNOSTIC_CROWDED = 128,
     /* images the frame with the strongest regularisation: its reference is further from the
      * model's, or from its own reciprocals, than an uneven skin's is */

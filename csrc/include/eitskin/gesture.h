@@ -29,13 +29,14 @@ typedef struct eits_contact {
     uint32_t state;    /* 0: none; 1 new, not told, 2 down, 3 lifted */
     uint32_t id;       /* that events name */
     uint32_t touch_id; /* that the tracker gave it last */
-    uint32_t flags;
+    uint32_t flags;    /* csrc/src/gesture/gesture.h names them */
     uint32_t born_us, seen_us;
     uint32_t trail_count; /* the newest at (trail_count - 1) % EITS_TRAIL */
     uint32_t trail_us[EITS_TRAIL];
     eits_real trail_x_mm[EITS_TRAIL], trail_y_mm[EITS_TRAIL];
     eits_real x_mm, y_mm;           /* where it is */
     eits_real seen_x_mm, seen_y_mm; /* where it was last found, letting go or not */
+    /* S/m mm2, smoothed, without its sign; and what part of the data the touch explains */
     eits_real strength, explained;
     eits_real start_x_mm, start_y_mm; /* where it landed */
     eits_real told_x_mm, told_y_mm;   /* where it was last told to be */
@@ -47,12 +48,15 @@ typedef struct eits_finger_pair {
     uint32_t on, first, second; /* places among the contacts */
     uint32_t first_id, second_id;
     uint32_t kind; /* eits_event_kind; 0: nothing yet */
+    /* their distance when both were down, and how far they have turned since, counterclockwise */
     eits_real base_mm, turned_deg;
-    eits_real dx_mm, dy_mm; /* from the first to the second, when both were last seen */
-    eits_real extreme_mm;   /* least distance of a pinch, greatest of a spread */
-    eits_real told_mm, told_deg;
+    eits_real dx_mm, dy_mm;      /* from the first to the second, when both were last seen */
+    eits_real extreme_mm;        /* least distance of a pinch, greatest of a spread */
+    eits_real told_mm, told_deg; /* as last reported */
 } eits_finger_pair;
 
+/* The whole state, 5,540 bytes in float32; a copy of it goes on by itself. Read it, leave changing
+ * it to the functions below. */
 typedef struct eits_gestures {
     eits_gesture_options options;
     eits_contact contact[EITS_MAX_CONTACTS];

@@ -18,7 +18,7 @@ extern "C" {
 typedef enum eits_event_kind {
     /* a finger landed */
     EITS_EVENT_DOWN = 1,
-    /* it moved by move_mm or more since it was last told where it is */
+    /* it moved by move_mm or more since it was last reported */
     EITS_EVENT_MOVE = 2,
     /* it lifted */
     EITS_EVENT_UP = 3,
@@ -85,9 +85,9 @@ typedef struct eits_gesture_options {
     uint32_t lost_us;
     /* one that is found again within so long, and near, is the same */
     uint32_t rejoin_us;
-    /* a touch is told once it has lasted so long: where it is then is where it landed */
+    /* a touch is reported once it has lasted so long: where it is then is where it landed */
     uint32_t settle_us;
-    /* a doubtful touch is told once it has lasted so long */
+    /* a doubtful touch is reported once it has lasted so long */
     uint32_t doubt_us;
     /* a shorter tap must be clear */
     uint32_t short_us;
@@ -95,7 +95,7 @@ typedef struct eits_gesture_options {
     uint32_t tap_us;
     /* from a tap's end to the next one's beginning, at most */
     uint32_t double_us;
-    /* a hold is told after so long */
+    /* a hold is reported after so long */
     uint32_t hold_us;
     /* a swipe lasts at most so long */
     uint32_t swipe_us;

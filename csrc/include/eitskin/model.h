@@ -71,7 +71,9 @@ typedef struct eits_fields {
     float per_sheet; /* 1 / (2 pi sigma): m/S */
 } eits_fields;
 
-/* One folded row: the mean of row `first` and, with `sign`, of its reciprocal `second`. */
+/* One folded row: the mean of row `first` and, with `sign`, of its reciprocal `second`. What drives
+ * and what measures may be exchanged (reciprocity), so the mean halves the noise's power; their
+ * difference is an error of the instrument, a diagnostic. */
 typedef struct eits_fold {
     uint16_t first;
     uint16_t second; /* EITS_FOLD_NONE where the table has no reciprocal */
@@ -80,7 +82,8 @@ typedef struct eits_fold {
 } eits_fold;
 #define EITS_FOLD_NONE 0xFFFFu
 
-/* Column and row of a kept pixel in the nx x ny image; row 0 is the lowest y. */
+/* Column and row of a kept pixel in the nx x ny image; row 0 is the lowest y. Pixels outside the
+ * outline are not kept: images hold n_pixels numbers, not nx x ny. */
 typedef struct eits_pixel {
     uint16_t ix;
     uint16_t iy;
@@ -111,7 +114,8 @@ typedef struct eits_defaults {
  * what drifts. From format 1.5. */
 #define EITS_GAIN_DRIFT_KEPT 8u
 
-/* The self-test inside a model: frames, and what a float32 solve with the defaults must give. */
+/* The self-test inside a model: frames, and what a float32 solve with the defaults must give. A
+ * board runs it before it believes an uploaded model. */
 typedef struct eits_golden {
     const float *reference; /* n_rows, V */
     const float *frame;     /* n_rows, V */

@@ -13,6 +13,7 @@
 extern "C" {
 #endif
 
+/* Keys of a small keyboard; each costs 4 bytes of state. */
 #define EITS_MAX_ZONES       64u
 /* Two of each event: out of one zone and into another. */
 #define EITS_MAX_ZONE_EVENTS (2u * EITS_MAX_EVENTS)
@@ -25,7 +26,7 @@ typedef struct eits_zone {
     eits_real x_mm, y_mm, inner_mm, outer_mm; /* of a disc or ring */
 } eits_zone;
 
-/* State; the zones stay the caller's. */
+/* State; the zones stay the caller's, and must stay where they are as long as it is used. */
 typedef struct eits_zones {
     const eits_zone *zone;
     uint32_t count, dropped; /* events that found no room, fingers that no place was left for */
@@ -35,8 +36,9 @@ typedef struct eits_zones {
     uint32_t presser[EITS_MAX_ZONES]; /* the finger that pressed it; 0: not pressed */
 } eits_zones;
 
-/* Begin, nothing pressed. Errors: EITS_E_ARGUMENT (too many zones, fewer than 3 corners, a number
- * that is none, radii that do not ascend from 0). */
+/* Begin, nothing pressed. Places are those of touches, in mm; corners on the edge count as inside
+ * for one of two zones that share it. Errors: EITS_E_ARGUMENT (too many zones, fewer than 3
+ * corners, a number that is none, radii that do not ascend from 0). */
 eits_status eits_zones_init(eits_zones *zones, const eits_zone *zone, uint32_t count);
 
 /* What a frame's `events` press and release, in their order. `told` are written to `out`, which has

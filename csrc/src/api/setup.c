@@ -25,6 +25,7 @@ typedef struct arena {
     uint8_t *next;
 } arena;
 
+/* Cleared, so that no result depends on what was in the caller's memory before. */
 static void *take(arena *a, size_t bytes)
 {
     uint8_t *taken = a->next;
@@ -38,6 +39,7 @@ static eits_real *take_reals(arena *a, size_t count)
     return take(a, count * sizeof(eits_real));
 }
 
+/* What a stage uses and leaves: handed down from stage to stage, never kept. */
 static void lay_out_scratch(eits_context *ctx, arena *a)
 {
     const size_t pixels = ctx->model->n_pixels, stride = EITS_STRIDE(ctx->model->rank);
@@ -83,6 +85,8 @@ static void lay_out_frame(eits_context *ctx, arena *a)
     ctx->range.shrink = take_reals(a, stride);
 }
 
+/* The image outlives the frame, for a warm start; all else of the solvers is lent by the scratch.
+ */
 static void lay_out_solver(eits_context *ctx, arena *a)
 {
     const size_t pixels = ctx->model->n_pixels;
@@ -116,6 +120,7 @@ static void lay_out_touches(eits_context *ctx, arena *a)
     ctx->evidence.gain_drift = take_reals(a, stride);
 }
 
+/* Columns of a stored Jacobian decoded to reals: the few that a frame uses are decoded once. */
 static void lay_out_columns(eits_context *ctx, arena *a)
 {
     const size_t pixels = ctx->model->n_pixels, room = EITS_CACHED(pixels);

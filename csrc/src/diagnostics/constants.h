@@ -162,13 +162,13 @@
  * scaled by it, which was not measured */
 #define EITS_CROWD_ELECTRODES R(16.0)
 
-/* at most this [sums of radii]. larger: the far ones are told apart */
+/* at most this [sums of radii]. larger: the far ones are separated */
 #define EITS_CROWD_FAR R(2.0)
 
-/* at most this [noise]. larger: strong touches are told apart */
+/* at most this [noise]. larger: strong touches are separated */
 #define EITS_CROWD_STRONG R(10.0)
 
-/* at most this. larger: clear touches are told apart */
+/* at most this. larger: clear touches are separated */
 #define EITS_CROWD_CLEAR R(3.0)
 
 /* max(S'y) below it may be noise, and no crowd [lambda_noise]. larger: crowds of faint touches

@@ -1,4 +1,4 @@
-/* More touches than can be told apart: reported, not guessed.
+/* More touches than can be separated: reported, not guessed.
  *
  * Touches that overlap, or are many for so few electrodes, may be counted wrongly, and the fit
  * cannot know. A diagnostic says how likely that is instead of hiding it: a logistic model of

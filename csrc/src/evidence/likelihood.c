@@ -31,7 +31,8 @@ static eits_real offset(const eits_answer *answer, uint32_t k, uint32_t paramete
     return answer->shape[k][parameter - EITS_PLACE_PARAMETERS];
 }
 
-/* The priors' part of F. */
+/* The priors' part of F, summed touch by touch in the order of parameters: the same bits anywhere.
+ */
 static eits_real prior_of(const eits_answer *answer)
 {
     eits_real sum = 0;
@@ -44,6 +45,7 @@ static eits_real prior_of(const eits_answer *answer)
     return sum;
 }
 
+/* Rows begin at a vector's boundary, as the kernels want them. */
 static eits_real *row_of_square(const eits_scratch *scratch, uint32_t count, uint32_t i)
 {
     return scratch->square + EITS_STRIDE(count) * i;

@@ -10,8 +10,8 @@
 /* ---- Chosen: on random sessions of role tuning, seeds 101 and 102, at 60 and 40 dB; judged on
  * others (docs/results/gestures.md). Check: eitskin bench gestures */
 
-/* a finger that is not found for so long has lifted [us]. larger: lifts, taps and swipes are told a
- * frame later; smaller: a lost frame at 96 frames a second ends a touch */
+/* a finger that is not found for so long has lifted [us]. larger: lifts, taps and swipes are
+ * reported a frame later; smaller: a lost frame at 96 frames a second ends a touch */
 #define EITS_LOST_US 20000
 
 /* one that is found again within so long, and near, is the same [us]. larger: a fast double tap is
@@ -21,12 +21,12 @@
 /* so near [mm]. larger: other fingers join; smaller: fast ones are cut */
 #define EITS_REJOIN_MM R(25.0)
 
-/* a touch is told once it has lasted so long: a frame at 48 a second, two at 96 [us]. larger: down
- * is told late; smaller: the scan in which a finger lands shows it at another place, or shows
- * two */
+/* a touch is reported once it has lasted so long: a frame at 48 a second, two at 96 [us]. larger:
+ * down is reported late; smaller: the scan in which a finger lands shows it at another place, or
+ * shows two */
 #define EITS_SETTLE_US 20000
 
-/* a doubtful touch is told once it has lasted so long [us]. larger: second fingers come late;
+/* a doubtful touch is reported once it has lasted so long [us]. larger: second fingers come late;
  * smaller: halves of a touch become fingers */
 #define EITS_DOUBT_US 60000
 
@@ -43,7 +43,7 @@
 #define EITS_FIRM R(0.8)
 
 /* one that explains less is letting go: if the tracker then holds it, it has lifted [of what it
- * last explained]. larger: faint touches flicker; smaller: their lifts are told late */
+ * last explained]. larger: faint touches flicker; smaller: their lifts are reported late */
 #define EITS_GOING R(0.8)
 
 /* a shorter tap must be clear [us]. larger: quick taps are missed; smaller: ghosts of landing
@@ -66,7 +66,8 @@
  * careless double taps are missed */
 #define EITS_DOUBLE_MM R(15.0)
 
-/* a hold is told after so long [us]. larger: told late; smaller: long presses become holds */
+/* a hold is reported after so long [us]. larger: reported late; smaller: long presses become
+ * holds */
 #define EITS_HOLD_US 500000
 
 /* a tap or hold stays within so far of where it landed [mm]. larger: short swipes become taps;
@@ -97,7 +98,7 @@
 
 /* ---- Chosen: by hand; not measured. Check: ctest --preset host -R gesture */
 
-/* least step that a MOVE or a CHANGE tells [mm]. larger: coarse; smaller: noise is told */
+/* least step that a MOVE or a CHANGE tells [mm]. larger: coarse; smaller: noise is reported */
 #define EITS_MOVE_MM R(1.0)
 
 /* a touch further away is no touch [mm]. larger: squares overflow; smaller: large skins */
@@ -107,7 +108,7 @@
  * meet; smaller: ratios without limit */
 #define EITS_MIN_APART_MM R(0.1)
 
-/* a finger stays in its zone until it is so far outside [mm]. larger: slides are told late;
+/* a finger stays in its zone until it is so far outside [mm]. larger: slides are reported late;
  * smaller: a finger on a border presses again and again */
 #define EITS_ZONE_STAY_MM R(2.0)
 

@@ -67,6 +67,7 @@ static int waits(const eits_gestures *g, const eits_contact *c, const eits_touch
            (touch->explained > 0 && g->time_us - c->seen_us <= g->options.rejoin_us);
 }
 
+/* The tracker's own word comes first: the contact that had this id, or NOBODY. */
 static uint32_t of_same_id(const eits_gestures *g, const eits_touch *touch)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
@@ -76,6 +77,7 @@ static uint32_t of_same_id(const eits_gestures *g, const eits_touch *touch)
     return NOBODY;
 }
 
+/* The nearest contact that waits, for a touch that the tracker has given a new id. */
 static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
 {
     eits_real nearest = g->options.rejoin_mm;
@@ -146,6 +148,7 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
     c->farthest_mm = far > c->farthest_mm ? far : c->farthest_mm;
 }
 
+/* An event at where the contact is now; what moves from here on is measured from there. */
 static void tell_place(const eits_gestures *g, eits_contact *c, uint32_t kind, event_list *out)
 {
     c->told_x_mm = c->x_mm;
@@ -157,6 +160,7 @@ static void tell_place(const eits_gestures *g, eits_contact *c, uint32_t kind, e
                                 .y_mm = c->y_mm});
 }
 
+/* From now on others know of it. */
 static void land(const eits_gestures *g, eits_contact *c, event_list *out)
 {
     c->state = CONTACT_DOWN;
@@ -191,6 +195,7 @@ static int is_doubtful(const eits_gestures *g, const eits_touch *touch)
     return 0;
 }
 
+/* A touch that is no known finger's: new, and not reported before it has lasted. */
 static void begin_contact(eits_gestures *g, const eits_touch *touch)
 {
     const uint32_t place = free_place(g);
@@ -212,6 +217,8 @@ static int is_touch(const eits_touch *touch)
     return eits_is_place(touch->x_mm, touch->y_mm) && eits_is_finite(touch->strength_s_per_m_mm2);
 }
 
+/* Who is who in three rounds over all touches: first by id, then by place, what is left is new. In
+ * rounds, so that a touch that keeps its id is never taken by another that came near. */
 static void match(eits_gestures *g, const eits_touch *touches, uint32_t count, event_list *out)
 {
     uint8_t passed[EITS_MAX_TOUCHES] = {0};
@@ -251,6 +258,7 @@ static void note_company(eits_gestures *g)
     }
 }
 
+/* The pair ends first: its last event needs both fingers. */
 static void lift(eits_gestures *g, uint32_t place, event_list *out)
 {
     eits_contact *c = &g->contact[place];
@@ -287,6 +295,7 @@ static int is_renamed(eits_gestures *g, eits_contact *c)
     return 0;
 }
 
+/* Those that no touch was found for: renamed, lifted after lost_us, forgotten after rejoin_us. */
 static void end_lost(eits_gestures *g, event_list *out)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {

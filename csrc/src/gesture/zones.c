@@ -2,7 +2,8 @@
 #include "eitskin/zone.h"
 #include "gesture/gesture.h"
 
-/* Outside, if only just. */
+/* Outside, if only just: a place on the border that is not inside may not have the distance 0,
+ * which means inside. */
 static eits_real some(eits_real distance)
 {
     return distance > R(1e-6) ? distance : R(1e-6);
@@ -36,6 +37,7 @@ eits_status eits_zones_init(eits_zones *zones, const eits_zone *zone, uint32_t c
 
 /* ---- where a place lies ---- */
 
+/* From (x, y) to the nearest point of the segment. */
 static eits_real distance_to_edge(const eits_real *from, const eits_real *to, eits_real x,
                                   eits_real y)
 {
@@ -102,6 +104,8 @@ static uint32_t finger_of(eits_zones *zones, uint32_t id)
     return empty;
 }
 
+/* An event of a zone is the finger's own event with the zone's name. On a ring it says where as
+ * well, as part of a turn counterclockwise from x, for dials. */
 static void tell_zone(const eits_zones *zones, const eits_event *cause, uint32_t kind,
                       uint32_t phase, uint32_t zone, event_list *out)
 {
@@ -134,6 +138,7 @@ static void leave(eits_zones *zones, uint32_t place, const eits_event *cause, ev
         tell_zone(zones, cause, EITS_EVENT_RELEASE, EITS_PHASE_ONCE, zone, out);
 }
 
+/* A second finger in a pressed zone presses nothing: whoever presses keys wants one event. */
 static void enter(eits_zones *zones, uint32_t place, uint32_t zone, const eits_event *cause,
                   event_list *out)
 {
@@ -144,6 +149,7 @@ static void enter(eits_zones *zones, uint32_t place, uint32_t zone, const eits_e
     tell_zone(zones, cause, EITS_EVENT_PRESS, EITS_PHASE_BEGIN, zone, out);
 }
 
+/* Leave before enter, so that a finger that slides never holds two zones. */
 static void move(eits_zones *zones, const eits_event *event, event_list *out)
 {
     const uint32_t place = finger_of(zones, event->first_id);

@@ -24,6 +24,9 @@ static void open_block(stuffer *s)
     s->code = 1;
 }
 
+/* Consistent overhead byte stuffing (Cheshire and Baker, IEEE/ACM Trans. Networking 7, 1999): each
+ * zero becomes the distance to the next, so that zeros alone part packets and whoever comes late
+ * finds the next one. At most one byte in 254 is added. */
 static void stuff(stuffer *s, const uint8_t *bytes, size_t size)
 {
     for (size_t i = 0; i < size; ++i) {
@@ -41,6 +44,7 @@ static void stuff(stuffer *s, const uint8_t *bytes, size_t size)
     }
 }
 
+/* Bytes by shifts, low ones first: the same on every processor, aligned or not. */
 static void put_u16(uint8_t *out, uint32_t value)
 {
     out[0] = (uint8_t)value;
@@ -105,6 +109,7 @@ eits_status eits_link_decoder_init(eits_link_decoder *decoder, uint8_t *buffer, 
     return EITS_OK;
 }
 
+/* A packet that is longer than the buffer is counted once and passed over to its end. */
 static void keep(eits_link_decoder *d, uint8_t byte)
 {
     if (d->used < d->room) {
@@ -115,6 +120,8 @@ static void keep(eits_link_decoder *d, uint8_t byte)
     }
 }
 
+/* A byte that is not zero. A block's code stands for the zero before it, but for the first of a
+ * packet and after a full block. */
 static void unstuff(eits_link_decoder *d, uint8_t byte)
 {
     if (d->left > 0) {

@@ -127,7 +127,7 @@
 /* least pivot of that factor [of the unit diagonal]. met only where rounding is as large */
 #define EITS_GAIN_PIVOT R(1e-06)
 
-/* least determinant of two atoms that can be told apart [of the squares]. larger: near discs cannot
+/* least determinant of two atoms that can be separated [of the squares]. larger: near discs cannot
  * split; smaller: strengths of rounding */
 #define EITS_PARALLEL R(1e-05)
 

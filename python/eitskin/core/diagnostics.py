@@ -60,7 +60,7 @@ def words(found: DiagnosticFields) -> tuple[str, ...]:
         if found.model_mismatch > 0
         else "model mismatch",
         "stale reference": "stale reference: tare again",
-        "crowded": "crowded: more touches than can be told apart",
+        "crowded": "crowded: more touches than can be separated",
         "unlike the model": "unlike the model: see  eitskin doctor",
     }
     return tuple(details[name] for name in names(found.diagnostics))

@@ -10,7 +10,7 @@ class EventKind(IntEnum):
 
     # a finger landed
     DOWN = 1
-    # it moved by move_mm or more since it was last told where it is
+    # it moved by move_mm or more since it was last reported
     MOVE = 2
     # it lifted
     UP = 3

@@ -417,7 +417,7 @@ class Examiner:
         *,
         doubtful: bool = False,
     ) -> None:
-        """Whether there are more touches than can be told apart, by the score of
+        """Whether there are more touches than can be separated, by the score of
         csrc/src/diagnostics/crowded.c; ``found.unexplained`` is known. ``clearness``: max(S'y) over
         that of noise; ``doubtful``: the test of touches says so."""
         count, left = len(touches), self.found.unexplained

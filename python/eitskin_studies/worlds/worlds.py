@@ -112,9 +112,9 @@ WORLDS: dict[str, World] = {
         "5 discs, radius 6.5 to 11 mm, contrast 3 to 10, at least 2.5 mean radii apart",
         FIVE_UNLIKE,
     ),
-    "uneven_20_percent": World("1 to 3 discs; the sheet is uneven", errors=Errors(uneven=0.2)),
+    "uneven_20_percent": World("1 to 3 discs; the skin is uneven", errors=Errors(uneven=0.2)),
     "drift_2_percent_strong": World(
-        "1 to 3 discs; the sheet has changed by a smooth 2 % since the tare",
+        "1 to 3 discs; the skin has changed by a smooth 2 % since the tare",
         errors=Errors(drift=0.02),
     ),
     "drift_2_percent_light": World(
