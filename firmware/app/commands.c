@@ -180,7 +180,7 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
     if (instrument->engine.open && settings.frame_period_us != 0 &&
         settings.frame_period_us < min_us)
         return fw_refuse(EITS_REPLY_TOO_FAST, min_us > INT32_MAX ? INT32_MAX : (int32_t)min_us, 0);
-    fw_stop_scan(instrument);
+    (void)fw_stop_scan(instrument);
     if (fw_scan_configure(&instrument->scan, &settings) == FW_OK) {
         instrument->settings = settings;
         fw_engine_set_noise_floor(&instrument->engine, fw_noise_floor_v(instrument));

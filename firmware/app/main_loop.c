@@ -116,7 +116,7 @@ static void restart(fw_instrument *instrument)
 {
     const fw_board *board = instrument->board;
     const uint32_t began_us = fw_now_us(instrument);
-    fw_stop_scan(instrument);
+    (void)fw_stop_scan(instrument);
     (void)fw_ad9833_stop(&instrument->generator);
     while (fw_now_us(instrument) - began_us < DRAIN_US) {
         board->system->feed_watchdog(board->system_ctx);

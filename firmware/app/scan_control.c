@@ -2,9 +2,9 @@
 
 #include "app/report.h"
 
-void fw_stop_scan(fw_instrument *instrument)
+fw_status fw_stop_scan(fw_instrument *instrument)
 {
-    (void)fw_scan_stop(&instrument->scan);
+    return fw_scan_stop(&instrument->scan);
 }
 
 float fw_noise_floor_v(const fw_instrument *instrument)
@@ -45,11 +45,15 @@ void fw_start_scan(fw_instrument *instrument)
 {
     const fw_board *board = instrument->board;
     const fw_scan_settings *s = &instrument->settings;
-    fw_stop_scan(instrument);
+    /* Where the multiplexers do not open, nothing may drive: the generator goes into reset, and
+     * what is wanted is tried again. */
+    const fw_status stopped = fw_stop_scan(instrument);
     instrument->tried_us = fw_now_us(instrument);
     const fw_fault_detail detail = {.frame = instrument->last_frame};
-    const bool wanted = fw_scan_wanted(instrument);
+    const bool wanted = stopped == FW_OK && fw_scan_wanted(instrument);
     fw_status status = wanted ? start_generator(instrument) : stop_generator(instrument);
+    if (stopped != FW_OK)
+        status = stopped;
     bool bus = status != FW_OK;
     if (status == FW_OK && wanted) {
         const fw_scan_table table = fw_engine_table(&instrument->engine);

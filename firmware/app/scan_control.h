@@ -7,7 +7,8 @@
 /* Start generator and scan where they are wanted, else stop both; what cannot be started
  * is tried again. */
 void fw_start_scan(fw_instrument *instrument);
-void fw_stop_scan(fw_instrument *instrument);
+/* Open the multiplexers and let go of the converter; what the lines say where they do not open. */
+fw_status fw_stop_scan(fw_instrument *instrument);
 /* Whether there should be one: the drive is on, a model is open, no upload is under way. */
 bool fw_scan_wanted(const fw_instrument *instrument);
 

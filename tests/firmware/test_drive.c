@@ -222,6 +222,25 @@ static void test_limit(void)
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
 }
 
+/* Multiplexers that do not open when the drive is asked for: nothing drives until they do. */
+static void test_lines_that_do_not_open(void)
+{
+    start_unheard();
+    b.board.lines_fail_from = b.board.lines_calls;
+    b.board.lines_fails = 1000000;
+    eits_command_tare c = {5, 4};
+    host_send(&b.host, EITS_PACKET_TARE, &c, sizeof c);
+    run_alive(300);
+    CHECK_EQUAL(b.board.generator.control & AD9833_MODEL_RESET, AD9833_MODEL_RESET);
+    CHECK(!drives());
+    CHECK((host_info(&b.host).faults & 1u << EITS_FAULT_BUS) != 0);
+    b.board.lines_fails = 0;
+    run_alive(500);
+    CHECK(drives());
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_BUS, 0);
+}
+
 static void test_resets_are_reported(void)
 {
     start_unheard();
@@ -276,6 +295,7 @@ int main(void)
     test_lock();
     test_cuts();
     test_limit();
+    test_lines_that_do_not_open();
     test_resets_are_reported();
     test_sha256();
     test_hashes();

@@ -64,7 +64,8 @@ typedef enum eits_status {
     EITS_E_ARITHMETIC = -16
 } eits_status;
 
-/* One line of English for a status; never NULL. */
+/* One line of English for a status; never NULL. For people: programs compare the number, which no
+ * later version changes. */
 const char *eits_status_text(eits_status status);
 
 /* "MAJOR.MINOR.PATCH" of the library that is linked. */

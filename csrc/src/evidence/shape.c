@@ -16,6 +16,8 @@
 #include "kernels/kernels.h"
 #include "touch/interaction.h"
 
+/* As many for each disc as the workspace has columns for: with its shape, else its place and radius
+ * alone, else none, and the test is left out. */
 uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count)
 {
     const uint32_t room =

@@ -71,9 +71,8 @@ def chosen_kernel(
         from scipy.optimize import minimize
     except ImportError:
         raise missing_extra("model", "scipy") from None
-    few = slice(None)
-    if len(place_mm) > MAX_FOR_LIKELIHOOD:
-        few = np.linspace(0, len(place_mm) - 1, MAX_FOR_LIKELIHOOD).astype(int)  # type: ignore[assignment]
+    count = min(len(place_mm), MAX_FOR_LIKELIHOOD)
+    few = np.linspace(0, len(place_mm) - 1, count).astype(int)
     place, size, rows = place_mm[few], amplitude[few], data[few]
     stationary = kernel.sensitivity is None
 
