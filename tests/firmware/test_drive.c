@@ -239,6 +239,7 @@ static void test_lines_that_do_not_open(void)
     CHECK(drives());
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_BUS, 0);
+    bench_stop(&b);
 }
 
 static void test_resets_are_reported(void)
