@@ -2,13 +2,6 @@
 
 #include "app/scan_control.h"
 
-uint32_t fw_current_limit_ua(const fw_instrument *instrument)
-{
-    const uint32_t source_ua = instrument->board->source_ua_rms;
-    const uint32_t limit_ua = instrument->kept.current_limit_ua_rms;
-    return limit_ua != 0 ? limit_ua : source_ua + source_ua / 4;
-}
-
 bool fw_drive_on(fw_instrument *instrument)
 {
     fw_drive *drive = &instrument->drive;
@@ -47,7 +40,8 @@ static void check_current(fw_instrument *instrument, uint32_t now_us)
         return;
     drive->sensed_us = now_us;
     const uint32_t ua = sense->measure_ua_rms(sense->ctx);
-    const uint32_t limit_ua = fw_current_limit_ua(instrument);
+    const uint32_t limit_ua =
+        fw_current_limit_ua(&instrument->kept, instrument->board->source_ua_rms);
     if (limit_ua != 0 && ua > limit_ua) {
         fw_drive_off(instrument, EITS_DRIVE_TRIPPED);
         fw_fault_set(&instrument->faults, EITS_FAULT_CURRENT, true,

@@ -21,7 +21,4 @@ void fw_drive_heard(fw_instrument *instrument);
 /* Once a turn of the main loop: is the host heard, is the current within its limit? */
 void fw_drive_check(fw_instrument *instrument);
 
-/* The limit in use; 0: none. */
-uint32_t fw_current_limit_ua(const fw_instrument *instrument);
-
 #endif

@@ -77,3 +77,9 @@ fw_status fw_kept_save(const fw_store *store, uint32_t settings, uint32_t curren
     return store->ops->program(store->ctx, FW_BANKS + next.page, next.slot * FW_KEPT_BYTES, &one,
                                sizeof one);
 }
+
+uint32_t fw_current_limit_ua(const fw_kept *kept, uint32_t source_ua_rms)
+{
+    const uint32_t limit_ua = kept->current_limit_ua_rms;
+    return limit_ua != 0 ? limit_ua : source_ua_rms + source_ua_rms / 4;
+}

@@ -25,4 +25,7 @@ fw_kept fw_kept_load(const fw_store *store);
  * old settings stay then. */
 fw_status fw_kept_save(const fw_store *store, uint32_t settings, uint32_t current_limit_ua_rms);
 
+/* The limit in use: the owner's, else 1.25 times what the board's source gives; 0: none. */
+uint32_t fw_current_limit_ua(const fw_kept *kept, uint32_t source_ua_rms);
+
 #endif

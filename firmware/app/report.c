@@ -1,6 +1,5 @@
 #include "app/report.h"
 
-#include "app/drive.h"
 #include "app/sha256.h"
 
 #include <string.h>
@@ -51,7 +50,8 @@ void fw_send_info(fw_instrument *instrument, uint32_t request)
                              .settings = (uint16_t)instrument->kept.settings,
                              .source_ua_rms = board->source_ua_rms,
                              .current_ua_rms = instrument->drive.current_ua,
-                             .current_limit_ua_rms = fw_current_limit_ua(instrument)};
+                             .current_limit_ua_rms =
+                                 fw_current_limit_ua(&instrument->kept, board->source_ua_rms)};
     if (!board->frames_given) {
         info.excitation_millihz = (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning);
         info.sample_rate_hz = s->sample_rate_hz;

@@ -15,9 +15,9 @@
 
 #include "base/log.h"
 #include "base/vec.h"
+#include "context/triangle.h"
 #include "diagnostics/diagnostics.h"
 #include "evidence/constants.h"
-#include "frame/triangle.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 

@@ -13,8 +13,8 @@
 #include "frame/whitening.h"
 
 #include "base/vec.h"
+#include "context/triangle.h"
 #include "frame/constants.h"
-#include "frame/triangle.h"
 #include "kernels/column.h"
 
 /* R is symmetric, its lower triangle is stored. */

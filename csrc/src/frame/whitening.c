@@ -1,10 +1,10 @@
 #include "frame/whitening.h"
 
 #include "base/vec.h"
+#include "context/triangle.h"
 #include "frame/constants.h"
 #include "frame/projection.h"
 #include "frame/reference.h"
-#include "frame/triangle.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"
 

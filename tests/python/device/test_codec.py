@@ -147,14 +147,14 @@ def test_a_port_opened_in_the_middle_of_a_packet() -> None:
 def test_another_version_is_told_apart_from_damage() -> None:
     from eitskin.core import _core_f32 as core
 
-    plain = bytes([6, 1, 0, 0, 1, 1, 1, 1])
+    plain = bytes([5, 1, 0, 0, 1, 1, 1, 1])
     plain += zlib.crc32(plain).to_bytes(4, "little")
     stuffed = bytes([3]) + plain[:2] + bytes([1, 9]) + plain[4:]
     assert core.lib.EITS_LINK_VERSION == 6
     decoder = Decoder()
     assert decoder.feed(b"\0" + stuffed + b"\0") == []
     assert decoder.counters.version_errors == 1
-    assert decoder.other_version == 6
+    assert decoder.other_version == 5
 
 
 def test_what_was_half_received_before_a_cut_is_no_error() -> None:

@@ -37,7 +37,8 @@ def info(**changes: object) -> BoardInfo:
         "sample_rate_hz": 1_000_000, "samples": 80,
         "settle_us": 16, "slot_us": 100, "check_every": 1, "streaming": 0, "every": 1, "tared": 0,
         "frame_period_us": 0,
-        "faults": 0, "volts_per_code_nv": 805664,
+        "faults": 0, "volts_per_code_nv": 805664, "drive": 1, "settings": 0,
+        "source_ua_rms": 350, "current_ua_rms": 0, "current_limit_ua_rms": 437,
     }  # fmt: skip
     return BoardInfo(**(values | changes))  # type: ignore[arg-type]
 

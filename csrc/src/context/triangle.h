@@ -1,8 +1,9 @@
-/* The triangles of rows left out (whitening.h), where they are kept and how they are laid out. */
+/* Packed triangles of rank x rank: of rows left out (frame/whitening.h) and of the test of touches.
+ */
 #ifndef EITSKIN_TRIANGLE_H
 #define EITSKIN_TRIANGLE_H
 
-#include "kernels/kernels.h"
+#include "context/context.h"
 
 /* Upper triangles, row after row. Row i has its columns from this one on, a multiple of 8, those
  * before i being zero: */
