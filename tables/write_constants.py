@@ -1,4 +1,4 @@
-"""The table of constants: a header a room, the Python module and the reference page's tables."""
+"""The table of constants: a header a room and the Python module."""
 
 from __future__ import annotations
 
@@ -65,17 +65,3 @@ def _number(value: Any) -> float:
     if isinstance(value, str):
         return float.fromhex(value) if value.startswith("0x") else float(value.removesuffix("f"))
     return value  # type: ignore[no-any-return]
-
-
-def page_of_constants(table: Table) -> Lines:
-    """A table a group, below how it was chosen and what checks it."""
-    for room in table["room"]:
-        yield from ("", f"## {room['name']}")
-        for group in room["group"]:
-            yield from ("", f"Chosen: {plain(group['chosen'])}. Check: `{group['check']}`.", "")
-            yield from ("| name | value | unit | what | trades |", "|---|---|---|---|---|")
-            for name, value, unit, what, trades, *_ in group["rows"]:
-                shown = " / ".join(map(str, value)) if isinstance(value, list) else value
-                cells = (f"`{name}`", shown, unit, what, trades)
-                yield "| " + " | ".join(plain(str(c)).replace("|", "\\|") for c in cells) + " |"
-    yield ""

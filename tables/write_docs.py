@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from typing import Any
 
 from table import ROOT, Lines, Table, Tables, plain, size_on_wire, split_type, types_of, wrapped
-from write_constants import page_of_constants
 
 MARKED = re.compile(r"(<!-- table (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
@@ -28,8 +27,6 @@ def _table(tables: Tables, known: dict[str, Table], name: str) -> Lines:
         yield from _options(tables["options"]["options"])
     elif name == "commands":
         yield from _commands(known)
-    elif name == "constants":
-        yield from page_of_constants(tables["constants"])
     elif "prefix" in known[name]:
         yield from _enum(known[name])
     else:

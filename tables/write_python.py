@@ -220,7 +220,7 @@ def _gestures_module(tables: Tables) -> Lines:
 
 def _constants_module(tables: Tables) -> Lines:
     yield from docstring(
-        "The core's numbers that are a choice; docs/reference/constants.md has their reasons."
+        "The core's numbers that are a choice; tables/constants.toml has their reasons."
         f" {origin('constants')}",
         "",
     )

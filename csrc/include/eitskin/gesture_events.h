@@ -78,8 +78,7 @@ typedef struct eits_event {
     eits_real value;
 } eits_event;
 
-/* What makes a gesture. eits_gestures_usual fills it in; docs/reference/constants.md has the
- * reasons. */
+/* What makes a gesture. eits_gestures_usual fills it in; tables/constants.toml has the reasons. */
 typedef struct eits_gesture_options {
     /* a finger that is not found for so long has lifted */
     uint32_t lost_us;

@@ -1,4 +1,4 @@
-"""The core's numbers that are a choice; docs/reference/constants.md has their reasons. Written by
+"""The core's numbers that are a choice; tables/constants.toml has their reasons. Written by
 tables/make_tables.py from tables/constants.toml.
 """
 
