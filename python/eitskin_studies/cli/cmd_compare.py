@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -118,6 +118,6 @@ def _check(options: argparse.Namespace) -> None:
         check_picture(options.curves)
 
 
-def progress(items: Sequence[Any], what: str) -> Iterable[Any]:
+def progress(items: Iterable[Any], what: str) -> Iterable[Any]:
     """A bar on stderr where that is a terminal; nothing otherwise."""
     return bar(what)(items)

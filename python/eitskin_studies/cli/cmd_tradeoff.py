@@ -38,6 +38,7 @@ def add_parser(subparsers: Any) -> None:
     option(run, "--elements N", "of the frames' mesh", default=11_000)
     option(run, "--counted N", "scenes emulated to count instructions; 0: none", default=24)
     option(run, "--rounds N", "in which times are taken on this host; 0: none", default=25)
+    option(run, "--random-skins N", "of the models' errors; 0: without", default=500)
     option(run, "--front FRONT.json", "also write what the package ships of the results", Path)
     option(run, "--recorded FRONT.json", "also write what the page shows", Path)
     option(run, "--page PAGE.md", "also put tables and pictures into this page", Path)
@@ -96,6 +97,7 @@ def _settings(options: argparse.Namespace, kind: Any) -> Any:
         ("--elements", options.elements, 200, 200_000),
         ("--counted", options.counted, 0, 10_000),
         ("--rounds", options.rounds, 0, 100_000),
+        ("--random-skins", options.random_skins, 0, 100_000),
     ):
         if not low <= value <= high:
             raise UsageError(f"{name} {value} is out of range; use {low} to {high}")
@@ -119,6 +121,7 @@ def _settings(options: argparse.Namespace, kind: Any) -> Any:
         simulated_elements=options.elements,
         counted=options.counted,
         rounds=options.rounds,
+        random_skins=options.random_skins,
         **more,
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -165,6 +165,6 @@ def workspace_in(folder: Path, settings: ExperimentSettings, progress: Progress)
     return Workspace(settings, folder, progress, Store(folder / "results.jsonl"))
 
 
-def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
+def plain(items: Iterable[Any], what: str) -> Iterable[Any]:
     """No progress shown."""
     return items

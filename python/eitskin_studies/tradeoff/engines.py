@@ -3,7 +3,11 @@ mesh."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from eitskin.errors import UsageError
 from eitskin.fem.cem import ForwardModel
@@ -11,14 +15,17 @@ from eitskin.fem.fields import electrode_fields
 from eitskin.fem.grid import grid_for
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import sensitivity
-from eitskin.model.build import Linearisation, make_model
+from eitskin.model.build import Linearisation, make_model, with_model_errors
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
+from eitskin.model.model_errors import ModelErrors
 from eitskin.scoring import metrics
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
+from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.tuning.configuration import ELEMENTS, Configuration, build_settings
+from eitskin_studies.harness.sessions import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +52,7 @@ class ModelShop:
         self._forward: ForwardModel | None = None
         self._linear: dict[int, Linearisation] = {}
         self._image_scorers: dict[int, metrics.ImageScorer] = {}
+        self._errors: dict[tuple[Any, ...], ModelErrors] = {}
         self._raster = metrics.raster_inside(skin.outline)
 
     def refuse(self, one: Configuration) -> None:
@@ -62,17 +70,48 @@ class ModelShop:
                 f"configuration {one.name!r}: rank = {one.rank} is out of range; use 1 to {most}"
             )
 
+    def draw_errors(
+        self, configurations: Sequence[Configuration], samples: int, progress: Progress
+    ) -> None:
+        """Give the models of ``configurations`` their errors, all from the same ``samples`` random
+        skins.
+
+        Raises:
+            GeometryError, MissingExtraError, ModelError: as ``with_model_errors``.
+        """
+        models = {one.model_settings: self._made(one) for one in configurations}
+        ends = np.cumsum([0, *(model.rank for model in models.values())])
+        stacked = np.vstack([model.projection for model in models.values()])
+        some = next(iter(models.values()))
+        uncertainty = replace(self.skin.uncertainty or DEFAULT_UNCERTAINTY, samples=samples)
+        drawn = with_model_errors(
+            replace(some, projection=stacked),
+            self.skin,
+            uncertainty,
+            progress=lambda items, _: progress(items, "random skins"),
+        ).model_errors
+        assert drawn is not None
+        for key, begin, end in zip(models, ends, ends[1:], strict=False):
+            own = slice(begin, end)
+            self._errors[key] = replace(
+                drawn, error=drawn.error[own, own], drift=drawn.drift[own, own]
+            )
+
     def build(self, one: Configuration) -> Built:
-        """The model of a configuration.
+        """The model of a configuration, with its errors where they were drawn.
 
         Raises:
             UsageError: the model cannot be; see ``refuse``.
             GeometryError, MissingExtraError: from meshing.
         """
-        model = make_model(
+        errors = self._errors.get(one.model_settings)
+        model = replace(self._made(one), model_errors=errors)
+        return Built(model, encode_model(model), self._image_scorer(one.pixels))
+
+    def _made(self, one: Configuration) -> Model:
+        return make_model(
             self.skin, self.protocol, self._linearise(one.pixels), build_settings(one, self.skin)
         )
-        return Built(model, encode_model(model), self._image_scorer(one.pixels))
 
     def _linearise(self, pixels: int) -> Linearisation:
         if self._forward is None:

@@ -16,6 +16,7 @@ from eitskin.core.engine import load_core
 from eitskin.errors import ConfigError, FileError, UsageError
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
+from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY
 from eitskin.tuning.configuration import ELEMENTS, Configuration
 from eitskin.tuning.front import Front, Point
 from eitskin_studies.harness.machine import machine
@@ -46,6 +47,7 @@ class RunSettings:
         counted, costliest: scenes whose instructions are counted: evenly spread, and those with the
             most MACs; 0: none.
         rounds: of eight scenes in which times are taken; 0: none.
+        random_skins: that model errors are drawn from; 0: models without, and no test of touches.
     """
 
     scenes: int = 180
@@ -60,6 +62,7 @@ class RunSettings:
     counted: int = 24
     costliest: int = 8
     rounds: int = 25
+    random_skins: int = DEFAULT_UNCERTAINTY.samples
 
     def __post_init__(self) -> None:
         for name in ("scenes", "train_scenes", "set_scenes"):
@@ -145,6 +148,8 @@ def run(
         _world(settings, skin, protocol),
         progress,
     )
+    if settings.random_skins:
+        shop.draw_errors(configurations, settings.random_skins, progress)
     for name in (TRAIN, HEADLINE, *settings.sets):
         workspace.session(name)
     trained = {
@@ -188,7 +193,13 @@ def _world(settings: RunSettings, skin: Skin, protocol: Protocol) -> dict[str, A
     another build measures again."""
     module = load_core("float32")
     core = hashlib.sha256(Path(module.__file__).read_bytes()).hexdigest()[:16]
-    counts = [settings.train_scenes, settings.simulated_elements, ELEMENTS, settings.seed]
+    counts = [
+        settings.train_scenes,
+        settings.simulated_elements,
+        ELEMENTS,
+        settings.seed,
+        settings.random_skins,
+    ]
     return {
         "version": __version__,
         "core": core,

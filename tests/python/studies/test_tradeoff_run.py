@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,20 +22,23 @@ pytest.importorskip("netgen")
 
 from eitskin.errors import EitskinError, UsageError
 from eitskin.fem.mesh import mesh_for_elements
+from eitskin.model.build import with_model_errors
 from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
+from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY
 from eitskin.tuning.configuration import Configuration
 from eitskin.tuning.front import Conditions, Front, front_from
 from eitskin_studies.harness.sessions import FrameSession, copied
+from eitskin_studies.tradeoff.engines import ModelShop
 from eitskin_studies.tradeoff.fronts import as_dict, to_json
 from eitskin_studies.tradeoff.run import RESULTS, RunSettings, run
 from eitskin_studies.tradeoff.scene_sets import SETS, SceneFactory
 from eitskin_studies.tradeoff.table import best_points, to_csv, to_text
 
 ELEMENTS = 1200
-TINY = RunSettings(6, 4, 2, ("pairs", "drift"), (40.0, 60.0), 5, ELEMENTS, 0, 2, 1)
+TINY = RunSettings(6, 4, 2, ("pairs", "drift"), (40.0, 60.0), 5, ELEMENTS, 0, 2, 1, 2)
 PAIR = (
     Configuration("cheap", rank=24, pixels=14, iterations=8),
     Configuration("dear", rank=48, pixels=24, iterations=60, lambda_rel=0.01),
@@ -45,8 +48,25 @@ PAIR = (
 )
 
 
-def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
+def plain(items: Iterable[Any], what: str) -> Iterable[Any]:
     return items
+
+
+def test_models_get_the_errors_that_each_alone_would_get() -> None:
+    shop = ModelShop(paper_skin(), adjacent(16))
+    uncertainty = replace(DEFAULT_UNCERTAINTY, samples=2)
+    alone = [
+        with_model_errors(shop.build(one).model, shop.skin, uncertainty).model_errors
+        for one in PAIR[:2]
+    ]
+    shop.draw_errors(PAIR[:2], 2, plain)
+    for one, expected in zip(PAIR, alone, strict=False):
+        found = shop.build(one).model.model_errors
+        assert found is not None and expected is not None
+        for name in ("error", "drift"):
+            want = getattr(expected, name)
+            assert np.abs(getattr(found, name) - want).max() < 1e-5 * np.abs(want).max()
+        assert found.rms_error == expected.rms_error
 
 
 def comparable(front: Front) -> Any:
@@ -153,7 +173,7 @@ def test_a_killed_command_goes_on(tmp_path: Path) -> None:
         "4",
     ]
     command += ["--set-scenes", "2", "--sets", "pairs", "--elements", str(ELEMENTS)]
-    command += ["--counted", "0", "--rounds", "1", "--no-pictures"]
+    command += ["--random-skins", "2", "--counted", "0", "--rounds", "1", "--no-pictures"]
 
     environment = {
         **os.environ,
