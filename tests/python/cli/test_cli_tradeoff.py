@@ -39,15 +39,6 @@ TINY_RUN = [
 ]
 TINY_RUN += ["--random-skins", "2", "--counted", "0", "--rounds", "1"]
 TINY_RUN += ["--only", "tiny,mini,standard rank 32"]
-    "--random-skins",
-    "2",
-    "--counted",
-    "0",
-    "--rounds",
-    "1",
-    "--only",
-    "tiny,mini,standard rank 32",
-]
 
 
 def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
