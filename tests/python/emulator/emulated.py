@@ -17,6 +17,7 @@ from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import RawFrame
 from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.clocktime import TICKS_PER_S
+from eitskin.emulator.memory import RAM
 from eitskin.emulator.scene_skin import skin_of
 from eitskin.emulator.transport import EmulatedTransport
 from eitskin.model.eitm import decode_model
@@ -45,6 +46,14 @@ def connect(board: EmulatedBoard) -> Device:
         board.clock.now + TICKS_PER_S, lambda: board.line.up_next_end() <= board.clock.now
     )
     return Device(transport)
+
+
+def hang(board: EmulatedBoard, code: bytes) -> None:
+    """Let the processor execute ``code`` at the end of RAM, where the program has nothing."""
+    at = board.memories.ram
+    at[-64 : -64 + len(code)] = code
+    board.cpu.pc = RAM + len(at) - 64
+    board.cpu.masks.write((0, 0, 0))
 
 
 def board_of(device: Device) -> EmulatedBoard:

@@ -150,7 +150,8 @@ def _order(board: EmulatedBoard, protocol: Protocol) -> str | None:
 
 
 def broken_first(session: Session) -> str | None:
-    """No multiplexer changes its address while it may still be closed."""
+    """The monitor of the drive finds nothing: no multiplexer changes its address while it may still
+    be closed, no current flows before a host asks."""
     found = session.board.drive.violations
     return f"{len(found)}, first {found[0]}" if found else None
 

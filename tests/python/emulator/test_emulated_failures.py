@@ -11,11 +11,10 @@ from eitskin.device.client import Device
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import FaultCode, Stream
 from eitskin.device.wire.packets import Fault, SolvedTouches
-from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin.emulator.memory import RAM
 from eitskin.model.prebuilt import load_prebuilt
-from emulated import board_of, clean, connect, power_up
+from emulated import board_of, clean, connect, hang, power_up
 from small_models import small_blob
 
 
@@ -57,15 +56,6 @@ def test_a_wrong_checksum_is_refused_and_the_old_model_stays(image: bytes) -> No
     device.tare(4)
 
 
-def hang(board: EmulatedBoard, code: bytes) -> None:
-    """Let the processor execute ``code`` at the end of RAM, where the program has nothing."""
-    at = board.memories.ram
-    at[-64 : -64 + len(code)] = code
-    board.cpu.pc = RAM + len(at) - 64
-    board.cpu.masks.write((0, 0, 0))
-
-
-WFI_LOOP = bytes.fromhex("30bffde7")  # wfi; b .-2
 LOAD_NOWHERE = bytes.fromhex("4ff0c0400068fee7")  # mov.w r0, #0x60000000; ldr r0, [r0]; b .
 
 
@@ -76,20 +66,6 @@ def faults_of(device: Device) -> list[Fault]:
         if isinstance(item, Fault):
             told.append(item)
     return told
-
-
-def test_a_program_that_hangs_is_restarted_and_says_so(image: bytes) -> None:
-    board = EmulatedBoard(image, power_up(image).skin)
-    connect(board)
-    hang(board, WFI_LOOP)
-    stuck = board.now_s
-    board.run_until(board.clock.now + 20 * TICKS_PER_S, lambda: len(board.record.resets) > 1)
-    assert board.record.resets == ["power", "watchdog"]
-    assert 4 < board.now_s - stuck < 10
-    device = connect(board)
-    assert FaultCode.WATCHDOG in device.board.fault_codes
-    device.clear_faults()
-    assert FaultCode.WATCHDOG not in device.info().fault_codes
 
 
 def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image: bytes) -> None:
