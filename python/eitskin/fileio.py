@@ -10,12 +10,13 @@ import os
 import shutil
 import stat
 import tempfile
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from eitskin.errors import FileError
+from eitskin.errors import FileError, missing_extra
 
 MOST_BYTES = 100_000_000
 
@@ -147,6 +148,36 @@ def read_bytes(path: str | Path, what: str, most: int = MOST_BYTES) -> bytes:
             f"{path}: over {most / 1e6:g} MB, more than a {what} may have; check the path"
         )
     return content
+
+
+def read_mat(path: str | Path) -> dict[str, Any]:
+    """The variables of a .mat file (MATLAB 5 to 7, Octave's -v7): structs as dicts.
+
+    Raises:
+        FileError: it cannot be read.
+        MissingExtraError: scipy is not installed.
+    """
+    try:
+        from scipy.io import loadmat
+    except ImportError:
+        raise missing_extra("model", "scipy") from None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of names that stand twice
+            content = loadmat(str(path), simplify_cells=True, appendmat=False)
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such MAT file; check the path") from None
+    except NotImplementedError:
+        raise FileError(
+            f"{path}: a MATLAB 7.3 file (HDF5); save it with  save('-v7', ...)"
+        ) from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot read this MAT file ({error.strerror or error})") from None
+    except Exception:  # of a damaged file scipy raises whatever its parser meets
+        raise FileError(
+            f"{path}: not a readable MAT file: damaged, cut short, or another kind of file"
+        ) from None
+    return {name: value for name, value in content.items() if not name.startswith("__")}
 
 
 def parse_json(text: str | bytes) -> Any:

@@ -25,7 +25,9 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser("model", help="build, describe, verify or upload an .eitm model")
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
-    option(build, "skin SKIN.toml", "skin description", Path, nargs="?")
+    option(
+        build, "skin SKIN.toml", "skin description, or a .mat with an EIDORS model", Path, nargs="?"
+    )
     option(build, "--paper", "the paper's 194 mm disk instead of a file")
     option(build, "-o --output MODEL.eitm", None, Path, required=True)
     option(build, "--rank", "rows of the reduced Jacobian (default: 64, or all if fewer)", int)
@@ -99,11 +101,14 @@ def add_parser(subparsers: Any) -> None:
 def run_build(options: argparse.Namespace) -> int:
     """Build and write a model."""
     from eitskin.cli.progress import bar
+    from eitskin.fem.grid import grid_for
     from eitskin.fileio import refuse_unwritable
+    from eitskin.frames.eidors import jacobian_on
     from eitskin.frames.front_end import advice, demand_of
     from eitskin.frames.homogeneous_fem import transfer_by_elements
     from eitskin.model.build import BuildSettings, build_model
     from eitskin.model.eitm import save_model
+    from eitskin.skin.eidors import read_eidors
 
     skin, protocol = _skin_of(options)
     refuse_unwritable(options.output)
@@ -125,12 +130,18 @@ def run_build(options: argparse.Namespace) -> int:
         touch_change_ratio=options.touch_change,
         samples=options.samples,
     )
-    model = build_model(skin, protocol, settings, progress=bar("random skins"))
+    their = read_eidors(options.skin) if _is_eidors(options.skin) else None
+    jacobian = None if their is None else jacobian_on(their, grid_for(skin.outline, options.pixels))
+    model = build_model(skin, protocol, settings, progress=bar("random skins"), jacobian=jacobian)
     size = save_model(options.output, model)
     _print_info(model, size, str(options.output), options.json)
     if not options.json:
         print("\n".join(advice(demand_of(transfer_by_elements(skin), protocol))))
     return 0
+
+
+def _is_eidors(path: Path | None) -> bool:
+    return path is not None and path.suffix.lower() == ".mat"
 
 
 def _skin_of(options: argparse.Namespace) -> tuple[Skin, Protocol]:

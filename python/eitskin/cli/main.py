@@ -17,8 +17,9 @@ from eitskin.config import nearest
 from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = (
-    "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate", "teach", "recommend",
-    "devices", "info", "board", "tare", "view", "stream", "record", "replay", "flash", "completion",
+    "demo", "model", "reconstruct", "import", "export", "doctor", "scene", "calibrate", "teach",
+    "recommend", "devices", "info", "board", "tare", "view", "stream", "record", "replay", "flash",
+    "completion",
 )  # fmt: skip
 FIRST = "eitskin stream --device sim:swipe"
 INVALID_CHOICE = re.compile(  # as argparse words it, quoted before Python 3.12

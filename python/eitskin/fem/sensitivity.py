@@ -20,7 +20,7 @@ from eitskin.fem.mesh import Mesh
 from eitskin.fem.patterns import Patterns
 
 try:
-    from scipy.sparse import csc_matrix, csr_matrix
+    from scipy.sparse import csc_matrix, csr_matrix, identity
 except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
 
@@ -66,16 +66,39 @@ def sensitivity(
     Raises:
         UsageError: the conductivity has a wrong shape, or a value not finite and above 0.
     """
+    if weights is None:
+        weights = element_to_pixel(forward.mesh, grid)
+    return _sensitivity(forward, conductivity_s_per_m, weights, rows)
+
+
+def element_sensitivity(
+    forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """As ``sensitivity``, with the mesh's elements for pixels: (m, E) and (m,).
+
+    Raises:
+        UsageError: the conductivity has a wrong shape, or a value not finite and above 0.
+    """
+    each = identity(forward.mesh.n_elements, format="csr")
+    return _sensitivity(forward, conductivity_s_per_m, each, None)
+
+
+def _sensitivity(
+    forward: ForwardModel,
+    conductivity_s_per_m: npt.ArrayLike,
+    weights: csr_matrix,
+    rows: npt.ArrayLike | None,
+) -> tuple[FloatArray, FloatArray]:
     solution = forward.solve(conductivity_s_per_m)
     chosen = (
         np.arange(forward.protocol.n_rows) if rows is None else np.asarray(rows, dtype=np.int64)
     )
-    by_pixel = (element_to_pixel(forward.mesh, grid) if weights is None else weights).tocsc()
+    by_pixel, n_pixels = weights.tocsc(), weights.shape[1]
     by_pixel.data *= forward.mesh.areas_mm2[by_pixel.indices] * 1e-6
     fields = element_fields(forward, solution)
-    jacobian = np.empty((len(chosen), grid.n_pixels))
-    for begin in range(0, grid.n_pixels, PIXELS_AT_ONCE):
-        block = slice(begin, min(begin + PIXELS_AT_ONCE, grid.n_pixels))
+    jacobian = np.empty((len(chosen), n_pixels))
+    for begin in range(0, n_pixels, PIXELS_AT_ONCE):
+        block = slice(begin, min(begin + PIXELS_AT_ONCE, n_pixels))
         jacobian[:, block] = _rows_of_products(
             forward.patterns, _field_products(fields, by_pixel, block), chosen
         )

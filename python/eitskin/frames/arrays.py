@@ -4,7 +4,6 @@ there."""
 from __future__ import annotations
 
 import io
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eitskin.errors import FileError, FrameError, missing_extra
-from eitskin.fileio import read_bytes
+from eitskin.errors import FileError, FrameError
+from eitskin.fileio import read_bytes, read_mat
 from eitskin.frames.frames import read_npz
 
 LISTED = 40
@@ -63,30 +62,8 @@ def _read_npy(path: str | Path) -> NDArray[Any]:
 
 
 def _read_mat(path: str | Path) -> dict[str, NDArray[Any]]:
-    try:
-        from scipy.io import loadmat
-    except ImportError:
-        raise missing_extra("model", "scipy") from None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of names that stand twice
-            content = loadmat(str(path), simplify_cells=True, appendmat=False)
-    except FileNotFoundError:
-        raise FileError(f"{path}: no such MAT file; check the path") from None
-    except NotImplementedError:
-        raise FileError(
-            f"{path}: a MATLAB 7.3 file (HDF5); save it with  save('-v7', ...)"
-        ) from None
-    except OSError as error:
-        raise FileError(f"{path}: cannot read this MAT file ({error.strerror or error})") from None
-    except Exception:  # of a damaged file scipy raises whatever its parser meets
-        raise FileError(
-            f"{path}: not a readable MAT file: damaged, cut short, or another kind of file"
-        ) from None
     arrays: dict[str, NDArray[Any]] = {}
-    _flatten(
-        {name: value for name, value in content.items() if not name.startswith("__")}, "", arrays
-    )
+    _flatten(read_mat(path), "", arrays)
     return arrays
 
 

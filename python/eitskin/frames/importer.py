@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from eitskin import __version__
 from eitskin.errors import FrameError, ProtocolError, UsageError
+from eitskin.frames.eidors import with_eidors_defaults
 from eitskin.frames.frames import Frames, load_frames
 from eitskin.frames.homogeneous import homogeneous
 from eitskin.frames.import_options import ImportOptions
@@ -60,6 +61,8 @@ def import_frames(
     Raises:
         EitskinError: each of its kinds, for what cannot be read or does not fit.
     """
+    if Path(path).suffix.lower() == ".mat":
+        options, n_electrodes = with_eidors_defaults(path, options, protocol, n_electrodes)
     raw, base, protocol = _read(path, options, protocol, n_electrodes)
     if not (lenient or options.impute_channels or options.drop_channels or options.drop_electrodes):
         refuse_nonfinite(raw, str(path))

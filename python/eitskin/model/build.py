@@ -200,9 +200,11 @@ def build_model(
     settings: BuildSettings | None = None,
     *,
     progress: Progress | None = None,
+    jacobian: FloatArray | None = None,
 ) -> Model:
     """The whole way from ``skin`` to a model, with the model errors that its uncertainty asks for;
-    ``progress`` and errors as ``linearise``, ``make_model`` and ``with_model_errors``.
+    ``progress`` and errors as ``linearise``, ``make_model`` and ``with_model_errors``. ``jacobian``
+    (m, n) V per S/m on the settings' grid stands in place of our own.
 
     Raises:
         UsageError: a setting is out of range.
@@ -215,6 +217,8 @@ def build_model(
         asked = replace(asked or DEFAULT_UNCERTAINTY, samples=chosen.samples)
     _refuse_settings(chosen, grid_for(skin.outline, chosen.pixels_across))
     linear = linearise(skin, protocol, pixels_across=chosen.pixels_across, elements=chosen.elements)
+    if jacobian is not None:
+        linear = replace(linear, jacobian=jacobian)
     model = make_model(skin, protocol, linear, chosen)
     return (
         model

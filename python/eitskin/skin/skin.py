@@ -15,10 +15,12 @@ from eitskin.config import check_keys, choice, integer, load_toml, number
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.skin.drawing import Drawing, read_drawing
 from eitskin.skin.drawing_shapes import TOLERANCE_MM, DrawingReading
+from eitskin.skin.eidors import EidorsModel, read_eidors
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT, Electrodes
 from eitskin.skin.outline import MAX_SIZE_MM, MIN_SIZE_MM, Outline, disk, polygon
 from eitskin.skin.placement import SNAP_MM, Placed, by_fractions, by_marks, by_points
 from eitskin.skin.protocol import Protocol, protocol_from_table
+from eitskin.skin.protocol import table as protocol_table
 from eitskin.skin.uncertainty import (
     DEFAULT_UNCERTAINTY,
     Uncertainty,
@@ -168,18 +170,46 @@ def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = 
 
 def load_skin(path: str | Path) -> tuple[Skin, Protocol]:
     """The skin and the protocol in the TOML file ``path``; without [protocol], adjacent drive and
-    measurement.
+    measurement. A .mat file is an EIDORS model's.
 
     Raises:
         FileError: the file, or a drawing that it names, cannot be read.
         ConfigError, GeometryError, ProtocolError: what it describes cannot be.
         MissingExtraError: a drawing's library is not installed.
     """
+    if Path(path).suffix.lower() == ".mat":
+        return skin_of_eidors(read_eidors(path))
     table, where = load_toml(path, "skin description"), str(path)
     skin = skin_from_table(table, where, Path(path).parent)
     return skin, protocol_from_table(
         _subtable(table, "protocol", where), skin.electrodes.count, f"{where} [protocol]"
     )
+
+
+def skin_of_eidors(model: EidorsModel) -> tuple[Skin, Protocol]:
+    """The sheet, electrodes and scan of an EIDORS ``model``; widths and contacts are their means.
+
+    Raises:
+        GeometryError, ProtocolError: eitskin has no such skin or protocol.
+    """
+    outline, origin_mm = model.outline()
+    middles, width_mm = model.contacts()
+    default, thickness_m = Electrodes(), 1e-3 * model.thickness_mm
+    placed = by_points(outline, middles - origin_mm, default.start_angle_deg, None, width_mm)
+    skin = Skin(
+        name=model.name,
+        outline=outline,
+        electrodes=Electrodes(
+            count=len(middles),
+            width_mm=width_mm,
+            clockwise=placed.clockwise,
+            positions_mm=placed.positions_mm,
+            contact_impedance_ohm_m2=float(model.contact_ohm_m.mean()) * thickness_m,
+        ),
+        conductivity_s_per_m=model.sheet_s / thickness_m,
+        thickness_mm=model.thickness_mm,
+    )
+    return skin, protocol_table(len(middles), model.rows, model.current_a)
 
 
 def skin_to_table(skin: Skin) -> dict[str, Any]:

@@ -1,0 +1,71 @@
+"""``eitskin export [FRAMES] -o OUT.mat``: model, frames and images for EIDORS."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from eitskin.cli.arguments import option
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``export``."""
+    parser = subparsers.add_parser(
+        "export",
+        help="a model, frames and their images as a .mat file for EIDORS",
+        description=(
+            "Write EIDORS structs that MATLAB and Octave load: fmdl with electrodes and patterns,"
+            " img_bkgnd, the Jacobian J of its elements, c2f from our pixels to them; with frames"
+            " also vh, vi and img, what our solver makes of them."
+        ),
+    )
+    option(parser, "frames FRAMES.npz", "frames of the model's protocol", Path, nargs="?")
+    option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
+    option(parser, "--elements", "about how many triangles", default=3000)
+    option(parser, "-o --output OUT.mat", "file to write", Path, required=True)
+    option(parser, "--json")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Reconstruct, mesh, write."""
+    import numpy as np
+
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.frames.eidors import save_eidors
+    from eitskin.frames.frames import load_frames
+    from eitskin.model.prebuilt import load_or_prebuilt
+    from eitskin.solve.reconstructor import Reconstructor
+
+    refuse_unwritable(options.output)
+    model, blob, _ = load_or_prebuilt(options.model)
+    frames, images = None, None
+    if options.frames is not None:
+        frames = load_frames(options.frames)
+        solver = Reconstructor(model, blob=blob)
+        solver.check_protocol(frames.protocol)
+        solver.tare(frames.reference_voltage_v)
+        images = np.array(
+            [solver.reconstruct(one, touches=False).image for one in frames.voltage_v], float
+        ).reshape(-1, model.grid.n_pixels)
+    nodes, elements = save_eidors(
+        options.output,
+        model.skin,
+        model.protocol,
+        model.grid,
+        elements=options.elements,
+        frames=frames,
+        images_s_per_m=images,
+    )
+    count = 0 if frames is None else frames.n_frames
+    if options.json:
+        facts = {"written": str(options.output), "nodes": nodes, "elements": elements}
+        print(json.dumps(facts | {"frames": count}))
+        return 0
+    print(
+        f"{options.output}: fmdl of {nodes} nodes and {elements} elements, img_bkgnd, J, c2f"
+        + (f"; vh, vi and img of {count} frames" if frames is not None else "")
+    )
+    return 0
