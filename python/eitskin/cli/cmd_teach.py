@@ -6,7 +6,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-ACTIONS = ("plan", "record", "fit")
+ACTIONS = ("plan", "record", "fit", "update", "check")
 
 
 def add_parser(subparsers: Any) -> None:

@@ -3,6 +3,7 @@ inside are kept."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
@@ -124,3 +125,28 @@ def grid_for(outline: Outline, pixels_across: int = 32) -> Grid:
     index = np.column_stack([ix, iy])
     kept = outline.contains(np.asarray(origin_mm) + (index + 0.5) * pixel_mm)
     return Grid(nx, ny, pixel_mm, origin_mm, np.ascontiguousarray(index[kept], dtype=np.int64))
+
+
+def between_pixels(grid: Grid, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """``values`` (n_pixels, ...) of the kept pixels, linear between their centres; outside the
+    outline as at the nearest pixel. Gives (k, ...) at places (k, 2) mm."""
+    from scipy.ndimage import distance_transform_edt
+
+    whole = np.zeros((grid.ny, grid.nx, *values.shape[1:]))
+    whole[grid.index[:, 1], grid.index[:, 0]] = values
+    near = distance_transform_edt(grid.number < 0, return_distances=False, return_indices=True)
+    whole = whole[tuple(near)]
+    size = np.array([grid.nx, grid.ny])
+    axes = (slice(None), *(None,) * (values.ndim - 1))
+
+    def at(place_mm: FloatArray) -> FloatArray:
+        cell = np.clip((place_mm - grid.origin_mm) / grid.pixel_mm - 0.5, 0, size - 1.001)
+        low = cell.astype(int)
+        (i, j), (u, v) = low.T, (cell - low).T
+        u, v = u[axes], v[axes]
+        return np.asarray(
+            (1 - v) * ((1 - u) * whole[j, i] + u * whole[j, i + 1])
+            + v * ((1 - u) * whole[j + 1, i] + u * whole[j + 1, i + 1])
+        )
+
+    return at

@@ -150,24 +150,39 @@ def noise_of(residual: FloatArray) -> Noise:
     correlation = np.where(off, (1 - shrinkage) * correlation, 1.0)
     sd = np.sqrt(variance)
     covariance = sd[:, None] * correlation * sd
-    lower = np.linalg.cholesky(correlation)
-    return Noise(np.linalg.inv(lower) / sd, covariance, shrinkage)
+    return Noise(whitening_of(covariance), covariance, shrinkage)
+
+
+def whitening_of(covariance: FloatArray) -> FloatArray:
+    """W (m, m) with W C W' = I for the covariance C."""
+    sd = np.sqrt(np.diag(covariance))
+    lower = np.linalg.cholesky(covariance / sd / sd[:, None])
+    return np.asarray(np.linalg.inv(lower) / sd)
+
+
+def suiting_amplitudes(answer: FloatArray, data: FloatArray, whitening: FloatArray) -> FloatArray:
+    """The amplitude (n,) at which each of ``answer`` (n, m) suits ``data`` (n, m) best."""
+    expected, seen = answer @ whitening.T, data @ whitening.T
+    energy = np.maximum((expected**2).sum(axis=1), 1e-300)
+    return np.asarray(np.clip((seen * expected).sum(axis=1) / energy, 0.05, 20))
+
+
+def left_out_amplitudes(process: Process, noise: Noise, given: FloatArray | None) -> FloatArray:
+    """What each press's amplitude is by the others; presses of one given depth get their median,
+    depths that hardly repeat a power law."""
+    answer = (process.data - process.left_out()) / process.amplitude[:, None]
+    amplitude = suiting_amplitudes(answer, process.data, noise.whitening)
+    return amplitude if given is None else by_given(amplitude, given)
 
 
 def refitted_amplitudes(process: Process, noise: Noise, given: FloatArray | None) -> FloatArray:
-    """What each press's amplitude is by the others, mean 1; presses of one given depth get their
-    median, depths that hardly repeat a power law."""
-    residual = process.left_out()
-    answer = (process.data - residual) / process.amplitude[:, None] @ noise.whitening.T
-    seen = process.data @ noise.whitening.T
-    energy = np.maximum((answer**2).sum(axis=1), 1e-300)
-    amplitude = np.clip((seen * answer).sum(axis=1) / energy, 0.05, 20)
-    if given is not None:
-        amplitude = _by_given(amplitude, given)
+    """``left_out_amplitudes``, mean 1."""
+    amplitude = left_out_amplitudes(process, noise, given)
     return np.asarray(amplitude / amplitude.mean())
 
 
-def _by_given(amplitude: FloatArray, given: FloatArray) -> FloatArray:
+def by_given(amplitude: FloatArray, given: FloatArray) -> FloatArray:
+    """Amplitudes (n,) by the given depth or force alone, where that is known."""
     known = np.isfinite(given) & (given > 0)
     levels, which, counts = np.unique(given[known], return_inverse=True, return_counts=True)
     if not len(levels):

@@ -19,7 +19,7 @@ from math import cos, degrees, radians, sin
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.fem.grid import grid_for
+from eitskin.fem.grid import between_pixels, grid_for
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
@@ -83,8 +83,6 @@ def field_sensitivity(skin: Skin, protocol: Protocol) -> Sensitivity:
         GeometryError, MissingExtraError: as ``fem.mesh``.
         ProtocolError: skin and protocol have different numbers of electrodes.
     """
-    from scipy.ndimage import distance_transform_edt
-
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.fields import electrode_fields
     from eitskin.fem.mesh import mesh_for_elements
@@ -94,11 +92,7 @@ def field_sensitivity(skin: Skin, protocol: Protocol) -> Sensitivity:
     kept = electrode_fields(forward, skin.conductivity_s_per_m, grid)
     drive, measure = ([protocol.drive_measure[:, k].astype(int) for k in pair]
                       for pair in ((0, 1), (2, 3)))  # fmt: skip
-    fields = np.zeros((grid.ny, grid.nx, *kept.shape[1:]))
-    fields[grid.index[:, 1], grid.index[:, 0]] = kept
-    near = distance_transform_edt(grid.number < 0, return_distances=False, return_indices=True)
-    fields = fields[tuple(near)]
-    size = np.array([grid.nx, grid.ny])
+    fields = between_pixels(grid, kept)
 
     def products(e: FloatArray) -> FloatArray:
         return -np.asarray(
@@ -109,17 +103,7 @@ def field_sensitivity(skin: Skin, protocol: Protocol) -> Sensitivity:
 
     unit = float(np.sqrt(np.mean(products(kept) ** 2)))
 
-    def at(place_mm: FloatArray) -> FloatArray:
-        cell = (place_mm - grid.origin_mm) / grid.pixel_mm - 0.5
-        cell = np.clip(cell, 0, size - 1.001)
-        low = cell.astype(int)
-        (u, v), (i, j) = (cell - low).T[..., None, None], low.T
-        e = (1 - v) * ((1 - u) * fields[j, i] + u * fields[j, i + 1]) + v * (
-            (1 - u) * fields[j + 1, i] + u * fields[j + 1, i + 1]
-        )
-        return products(e) / unit
-
-    return at
+    return lambda place_mm: products(fields(place_mm)) / unit
 
 
 def matern(p: FloatArray, q: FloatArray, length_mm: float) -> FloatArray:

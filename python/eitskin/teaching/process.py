@@ -2,12 +2,14 @@
 kernel, solved together.
 
 y_c = a o s_c(places) + noise of variance lambda, a the presses' amplitudes, each row over its own
-rms. A = a a' o K + lambda I is factored once; each row's own term is of rank one (Sherman and
-Morrison). Leaving a press out costs nothing more: its residual is A^-1 y / diag(A^-1).
+rms; s_c about ``prior``, 0 where nothing is known before. A = a a' o K + lambda I is factored once;
+each row's own term is of rank one (Sherman and Morrison). Leaving a press out costs nothing more:
+its residual is A^-1 (y - a o prior) / diag(A^-1).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +18,8 @@ import numpy.typing as npt
 from eitskin.teaching.kernel import Kernel
 
 FloatArray = npt.NDArray[np.float64]
+# the answers (k, m) expected at places (k, 2) mm
+Prior = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +39,15 @@ class Process:
     own_gain: FloatArray
     weight: FloatArray
     log_likelihood: float
+    prior: Prior | None = None
 
     def mean(self, q_mm: FloatArray) -> FloatArray:
         """s (k, m) of a press of amplitude 1 at each of ``q_mm`` (k, 2)."""
         jq = self.kernel.features(q_mm)
         shared, own = self._at(q_mm, jq)
         total = (self.amplitude[:, None] * self._own_data() * self.weight).sum(axis=0)
-        return np.asarray(shared @ self.weight + own * total)
+        expected = 0.0 if self.prior is None else self.prior(q_mm)
+        return np.asarray(expected + shared @ self.weight + own * total)
 
     def left_out(self) -> FloatArray:
         """The residuals (n, m) of each press, the others known."""
@@ -76,10 +82,14 @@ class Process:
 
 
 def condition(
-    kernel: Kernel, place_mm: FloatArray, amplitude: FloatArray, data: FloatArray
+    kernel: Kernel,
+    place_mm: FloatArray,
+    amplitude: FloatArray,
+    data: FloatArray,
+    prior: Prior | None = None,
 ) -> Process:
     """The processes after presses at ``place_mm`` (n, 2) of ``amplitude`` (n,) with ``data``
-    (n, m)."""
+    (n, m), about ``prior`` where one is given."""
     from scipy.linalg import cho_factor, cho_solve
 
     count = len(place_mm)
@@ -98,14 +108,15 @@ def condition(
     )
     own_solved = inverse @ own
     own_gain = 1 + np.sum(own * own_solved, axis=0)
-    solved = inverse @ data
+    new = data if prior is None else data - amplitude[:, None] * prior(place_mm)
+    solved = inverse @ new
     weight = solved - own_solved * (np.sum(own * solved, axis=0) / own_gain)
-    fit = np.maximum(np.sum(data * weight, axis=0), 1e-300)
+    fit = np.maximum(np.sum(new * weight, axis=0), 1e-300)
     log_determinant = 2 * np.log(np.diag(factor[0])).sum()
     likelihood = -0.5 * float(
         (count * np.log(fit / count) + np.log(own_gain)).sum() + data.shape[1] * (log_determinant)
     )
     return Process(
         kernel, place_mm, amplitude, data, j, common_unit, own_unit, inverse, own_solved, own_gain,
-        weight, likelihood,
+        weight, likelihood, prior,
     )  # fmt: skip

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.errors import EitskinError, FrameError, ProtocolError, UsageError
+from eitskin.errors import EitskinError, ProtocolError, UsageError
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
 from eitskin.skin.outline import disk
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.solve.reconstructor import Reconstructor
+from eitskin.teaching.checks import MIN_PRESSES, check_presses
 from eitskin.teaching.fit import Learned, chosen_kernel, default_kernel, differences, learn
 from eitskin.teaching.fit import first_amplitudes as begin_amplitudes
 from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity, placement_text
@@ -27,15 +28,12 @@ from eitskin.teaching.presses import Presses
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
-MIN_PRESSES, FEW_PRESSES = 5, 50
+FEW_PRESSES = 50
 FOLDS, COUNTED_ONCE, MAX_HELD_OUT = 5, 0.97, 250
 PIXELS_ACROSS = 32
 MISFIT = 4.0  # times the median: a press that does not fit the others
-FAINT = 0.1  # of the median change: no press
 NOTHING = 0.1  # of a row's energy explained: it carries nothing
 MIRROR_GAIN = 10.0  # of log likelihood
-UNITS = {"cm": 10.0, "m": 1000.0, "inches": 25.4, "µm": 0.001}
-LEAST_COVER, FAIR_COVER = 0.02, 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,69 +153,6 @@ def seen_skin(learned: Learned, skin: Skin | None, presses: Presses) -> Skin:
     reach = float(np.linalg.norm(presses.place_mm, axis=1).max())
     count = presses.protocol.n_electrodes
     return Skin("unknown", disk(2.2 * reach), Electrodes(count=count, width_mm=3.0 * reach / count))
-
-
-def check_presses(presses: Presses, skin: Skin | None) -> list[str]:
-    """Refuse what cannot teach; the rest as notes.
-
-    Raises:
-        FrameError: see the text.
-    """
-    if len(presses) < MIN_PRESSES:
-        raise FrameError(
-            f"teach: {len(presses)} presses are too few; record at least {MIN_PRESSES}, better 20"
-            " (eitskin teach plan says where)"
-        )
-    notes: list[str] = []
-    size = np.linalg.norm(presses.difference, axis=1)
-    faint = np.flatnonzero(size < FAINT * np.median(size))
-    if len(faint) or not np.median(size) > 0:
-        listed = ", ".join(map(str, faint[:8]))
-        raise FrameError(
-            f"teach: presses {listed} (from 0) hardly differ from their untouched frame; leave them"
-            " out, or take the untouched frame before the finger is down"
-        )
-    if skin is None:
-        return notes
-    centre = np.array(skin.outline.centre_mm)
-    corners = np.array(skin.outline.vertices_mm) - centre
-    reach = float(np.linalg.norm(corners, axis=1).max())
-    furthest = float(np.linalg.norm(presses.place_mm - centre, axis=1).max())
-    if not 0.25 * reach <= furthest <= 1.15 * reach:
-        for unit, factor in UNITS.items():
-            if 0.5 * reach <= factor * furthest <= 1.1 * reach:
-                raise FrameError(
-                    f"teach: the places reach {furthest:g} mm from the middle of a skin of"
-                    f" {reach:g} mm; they look like {unit}: multiply place_mm by {factor:g}"
-                )
-    if furthest > 1.15 * reach:
-        far = int(np.argmax(np.linalg.norm(presses.place_mm - centre, axis=1)))
-        raise FrameError(
-            f"teach: press {far} (from 0) lies {furthest:.0f} mm from the middle of a skin that"
-            f" reaches {reach:.0f} mm; correct its place, or the skin's description"
-        )
-    cover = hull_area(presses.place_mm) / skin.outline.area_mm2
-    if cover < LEAST_COVER:
-        raise FrameError(
-            f"teach: the presses cover {100 * cover:.1f} % of the skin; press all over it"
-            " (eitskin teach plan says where)"
-        )
-    if cover < FAIR_COVER:
-        notes.append(
-            f"the presses cover {100 * cover:.0f} % of the skin; elsewhere the model is the"
-            " physics' guess: press there too"
-        )
-    return notes
-
-
-def hull_area(place_mm: FloatArray) -> float:
-    """The area of the convex hull of places, mm²; 0 for places on a line."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return float(ConvexHull(place_mm).volume)
-    except (QhullError, ValueError):
-        return 0.0
 
 
 def mirrored_or_not(

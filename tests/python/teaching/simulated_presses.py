@@ -25,8 +25,15 @@ def fields() -> Sensitivity:
     return field_sensitivity(SKIN, opposite(8))
 
 
-def presses(count: int, seed: int = 1, placement: Placement = TRUE) -> Presses:
-    """So many, anywhere, of three depths."""
+def presses(
+    count: int,
+    seed: int = 1,
+    placement: Placement = TRUE,
+    shift_mm: tuple[float, float] = (0.0, 0.0),
+    dried: float = 0.0,
+) -> Presses:
+    """So many, anywhere, of three depths; on the skin moved by ``-shift_mm``; ``dried``: all rows
+    answer less by that part, and each differently by half of it; at rest by a quarter."""
     draw, protocol = np.random.default_rng(seed), opposite(8)
     row = np.random.default_rng(7)
     gain = row.choice([-1, 1], protocol.n_rows) * np.exp(row.normal(0, 0.5, protocol.n_rows))
@@ -34,8 +41,10 @@ def presses(count: int, seed: int = 1, placement: Placement = TRUE) -> Presses:
     angle = draw.uniform(0, 2 * np.pi, count)
     place = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
     depth = draw.choice([10.0, 15.0, 20.0], count)
-    j = fields()(placement.to_skin(place, (0.0, 0.0)))
+    j = fields()(placement.to_skin(place + shift_mm, (0.0, 0.0)))
     change = 0.01 * depth[:, None] / 15 * gain * j
-    untouched = 1 + row.uniform(0, 1, protocol.n_rows) + 2e-4 * draw.normal(size=change.shape)
+    rest, drier = 1 + row.uniform(0, 1, protocol.n_rows), dried * row.normal(size=gain.shape)
+    change *= np.exp(0.5 * drier - dried)
+    untouched = rest * np.exp(0.25 * drier) + 2e-4 * draw.normal(size=change.shape)
     pressed = untouched + change + 4e-4 * draw.normal(size=change.shape)
     return Presses(protocol, untouched, np.abs(pressed), place, depth_mm=depth)

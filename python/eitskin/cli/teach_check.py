@@ -1,0 +1,113 @@
+"""``eitskin teach check MODEL [FRAMES]``: whether a taught model still fits, from the untouched
+skin alone."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.cli.arguments import option
+from eitskin.cli.device_options import TARE_FRAMES, add_device, say
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from eitskin.skin.protocol import Protocol
+
+REMEDY = {
+    "fits": "tare, and touch",
+    "update": "make 5 to 20 presses and run  eitskin teach update",
+    "teach again": "look at the electrodes, then teach again",
+}
+
+
+def add_parser(actions: Any) -> None:
+    """Add ``check``."""
+    parser = actions.add_parser(
+        "check",
+        help="whether a taught model still fits, from the untouched skin alone",
+        description=(
+            "Compare the untouched skin with what it was when it was taught, and say whether the"
+            " model fits, wants an update, or is to be taught again. Places that were turned or"
+            " shifted are not seen by it: after remounting make 5 presses and update."
+        ),
+    )
+    option(parser, "model MODEL.eitm", "from  eitskin teach fit  or  update", Path)
+    option(
+        parser,
+        "frames FRAMES.npz",
+        "the quiet frames of a frames file, or the untouched ones of presses; without it a board"
+        " whose skin nobody touches is asked",
+        Path,
+        nargs="?",
+    )
+    add_device(parser, model=False)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Look, say."""
+    from eitskin.model.eitm import load_model
+    from eitskin.teaching.still import still_fits
+
+    model, _ = load_model(options.model)
+    untouched, protocol = _of_board(options) if options.frames is None else _of_file(options.frames)
+    found = still_fits(model, untouched, protocol, where=str(options.model))
+    if options.json:
+        print(json.dumps({"frames": len(untouched), **asdict(found)}))
+    else:
+        print(f"{options.model}: {found.verdict} ({found.rule}); {REMEDY[found.verdict]}")
+        print(
+            f"correlation with the frame taught {found.correlation:.4f}, distance"
+            f" {found.distance:.2f} presses, {len(untouched)} frames"
+        )
+    return 0
+
+
+def _of_file(path: Path) -> tuple[np.ndarray, Protocol]:
+    from eitskin.frames.frames import load_frames
+    from eitskin.teaching.presses import load_presses
+
+    if _holds_presses(path):
+        presses = load_presses(path)
+        return presses.untouched, presses.protocol
+    frames = load_frames(path, allow_nonfinite=True)
+    return frames.reference_voltage_v, frames.protocol
+
+
+def _holds_presses(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as packed:
+            return "untouched.npy" in packed.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return False
+
+
+def _of_board(options: argparse.Namespace) -> tuple[np.ndarray, Protocol]:
+    import numpy as np
+
+    from eitskin.device.known_model import scanned_protocol
+    from eitskin.device.live import LiveFrame
+    from eitskin.device.settings import ScanSettings
+    from eitskin.device.wire.link_table import Stream
+    from eitskin.errors import DeviceError
+    from eitskin.live.session import Session, SessionSettings
+
+    settings = SessionSettings(
+        mode=Stream.RAW, every=1, frames=TARE_FRAMES, model=options.model,
+        scan=ScanSettings(check_every=1),
+    )  # fmt: skip
+    with Session(options.device, settings, say=say) as session:
+        protocol = scanned_protocol(session.device.board, session.known, session.name)
+        frames = [
+            item.raw.voltage_v
+            for item in session.items()
+            if isinstance(item, LiveFrame) and item.raw is not None
+        ]
+    if not frames:
+        raise DeviceError(f"{options.device}: no frame came; look at it with  eitskin info")
+    return np.array(frames), protocol

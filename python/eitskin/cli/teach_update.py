@@ -1,0 +1,85 @@
+"""``eitskin teach update MODEL PRESSES -o NEW``: a taught model after remounting or drying."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from eitskin.cli.arguments import option
+from eitskin.errors import FrameError
+
+
+def add_parser(actions: Any) -> None:
+    """Add ``update``."""
+    parser = actions.add_parser(
+        "update",
+        help="adapt a taught model by a few new presses",
+        description=(
+            "Adapt a taught model after the skin was remounted, turned or has dried: 5 to 20 new"
+            " presses, in the coordinates that touches shall have. The model brings all else. It is"
+            " only moved, fully adapted, or kept as it is, whichever does best by more than chance"
+            " on presses held out; the report says which."
+        ),
+    )
+    option(parser, "model MODEL.eitm", "from  eitskin teach fit  or  update", Path)
+    option(parser, "presses PRESSES.npz", "new ones, from  eitskin teach record", Path)
+    option(parser, "-o --output NEW.eitm", None, Path, required=True)
+    option(parser, "--json")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Adapt, write, say."""
+    from eitskin.cli.progress import bar
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.model.eitm import load_model, save_model
+    from eitskin.teaching.presses import load_presses
+    from eitskin.teaching.update import update
+
+    refuse_unwritable(options.output)
+    model, _ = load_model(options.model)
+    presses = load_presses(options.presses)
+
+    def progress(items: Iterable[Any], what: str) -> Iterable[Any]:
+        return bar(what)(items)
+
+    try:
+        updated = update(model, presses, where=str(options.model), progress=progress)
+    except FrameError as error:
+        raise FrameError(f"{options.presses}: {error}") from None
+    save_model(options.output, updated.model)
+    if options.json:
+        print(json.dumps({"output": str(options.output), **updated.report}, indent=2))
+    else:
+        print("\n".join(report_lines(updated.report)))
+        print(f"{options.output}: tare, then touches; eitskin model upload sends it to a board")
+    return 0
+
+
+CHOSEN = {
+    "kept": "kept as it was: these presses make it no better beyond chance",
+    "moved": "moved: the places are others, the answers are the old ones",
+    "full": "fully adapted: places, gains and answers",
+}
+
+
+def report_lines(report: dict[str, Any]) -> list[str]:
+    """The report as a person reads it."""
+    found = report["update"]
+    lines = [
+        f"presses          {found['presses']} new",
+        f"chosen           {CHOSEN[found['chosen']]}",
+        "held out         "
+        + ", ".join(f"{how} {error:.1f} mm" for how, error in found["held_out_mm"].items())
+        + f" median; {report['error_mm']['held_out_p95']:.1f} p95 of what was chosen",
+    ]
+    if found["chosen"] != "kept":
+        x, y = found["shift_mm"]
+        lines.append(
+            f"skin             places turned by {found['turn_deg']:.1f} degrees and shifted by"
+            f" ({x:.1f}, {y:.1f}) mm are the old ones"
+        )
+    return lines + [f"note             {note}" for note in report["notes"]]

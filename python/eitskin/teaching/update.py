@@ -1,0 +1,368 @@
+"""A taught model after remounting or drying, adapted by a few new presses.
+
+    s_new,c(p) = (1 + gamma_c) s_old,c(T p) + delta_c(p)
+
+T turns and shifts new places into old ones, gamma_c is the change of row c's gain, delta_c a
+Gaussian process with the physics' kernel. Both are one process (process.py) about the old answer:
+its own-row term is the old answer in place of the physics'.
+
+Few presses may make a model worse. So each candidate, the old model, the moved one (T alone) and
+the full one, is tried on presses that it did not know, solved by the C core, and a richer one is
+taken only where it is better by more than chance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, exp, log, radians, sin
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import ProtocolError
+from eitskin.fem.grid import Grid, between_pixels, grid_for
+from eitskin.model.force_law import LoadLaw, monomials
+from eitskin.model.model import Model
+from eitskin.skin.outline import polygon
+from eitskin.skin.skin import Skin, skin_to_table
+from eitskin.teaching.checks import check_presses
+from eitskin.teaching.fit import (
+    LOG_BOUND,
+    Learned,
+    Noise,
+    by_given,
+    left_out_amplitudes,
+    suiting_amplitudes,
+    whitening_of,
+)
+from eitskin.teaching.kernel import Kernel, Placement
+from eitskin.teaching.known import Known, known_of
+from eitskin.teaching.make import taught_model
+from eitskin.teaching.presses import Presses
+from eitskin.teaching.process import Prior, condition
+from eitskin.teaching.teach import (
+    PIXELS_ACROSS,
+    Progress,
+    known_size,
+    quiet_progress,
+    solve_presses,
+    starting_kernel,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+KEPT, MOVED, FULL = "kept", "moved", "full"
+START_TURNS, REFINED_STARTS = 36, 4
+SHIFT_SD = 0.03  # of the skin's width
+ROUNDS = 3
+MAX_FOLDS = 10
+BETTER_BY = 1.0  # standard errors of the mean logarithm of two errors' ratio
+ERROR_FLOOR = 0.01  # of the skin's width: errors below are alike
+STILL_POOR = 3.0  # times the error of the model when it was taught
+
+
+@dataclass(frozen=True)
+class Move:
+    """From new places to old ones: turned by ``turn_deg`` counterclockwise about the skin's
+    middle, then shifted."""
+
+    turn_deg: float = 0.0
+    shift_mm: tuple[float, float] = (0.0, 0.0)
+
+    def to_old(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
+        """Places (n, 2) as the old model has them."""
+        return np.asarray((place_mm - centre_mm) @ self._turn.T + centre_mm + self.shift_mm)
+
+    def to_new(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
+        """Old places (n, 2) as they are now."""
+        away = place_mm - np.add(centre_mm, self.shift_mm)
+        return np.asarray(away @ self._turn + centre_mm)
+
+    @property
+    def _turn(self) -> FloatArray:
+        c, s = cos(radians(self.turn_deg)), sin(radians(self.turn_deg))
+        return np.array([[c, -s], [s, c]])
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation(Kernel):
+    """The kernel of gamma and delta: ``features``, the own-row term, are the ``old`` answers."""
+
+    old: Prior | None = None
+    move: Move = Move()
+
+    def features(self, place_mm: FloatArray) -> FloatArray:
+        """The old answer (n, m) at new places (n, 2)."""
+        assert self.old is not None
+        return self.old(self.move.to_old(place_mm, self.centre_mm))
+
+    def common(self, p: FloatArray, q: FloatArray, jp: FloatArray, jq: FloatArray) -> FloatArray:
+        """The physics' part, (n, k); the answers ``jp``, ``jq`` are none of it."""
+        before = [self.move.to_old(one, self.centre_mm) for one in (p, q)]
+        j = [Kernel.features(self, one) for one in before]
+        return Kernel.common(self, *before, *j)
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """What new presses are held against: ``old`` as it is known, its ``kernel``, the skin's
+    ``width_mm``; ``unit`` (m,) V, the rms of each row's old answer."""
+
+    old: Known
+    kernel: Deviation
+    width_mm: float
+    unit: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Updated:
+    """The adapted ``model``, which candidate was ``chosen``, the ``move``, and the ``report``."""
+
+    model: Model
+    chosen: str
+    move: Move
+    report: dict[str, Any]
+
+
+def update(
+    model: Model, presses: Presses, *, where: str = "model", progress: Progress = quiet_progress
+) -> Updated:
+    """``model`` adapted by new ``presses``; ``where`` names it in errors.
+
+    Raises:
+        ModelError: ``model`` was not taught.
+        ProtocolError: it is of another protocol.
+        FrameError: the presses cannot teach; the text says which, and what to do.
+        MissingExtraError: scipy or netgen is not installed.
+    """
+    old = known_of(model, where)
+    if model.protocol.hash != presses.protocol.hash:
+        raise ProtocolError(
+            f"{where}: taught with {model.protocol.n_rows} rows of another protocol than the"
+            f" presses' {presses.protocol.n_rows}; give the model of this skin, or  eitskin teach"
+            " fit  a new one"
+        )
+    skin = model.skin if "skin" in model.meta else None
+    check_presses(presses, skin)
+    session = _session(old, skin, presses)
+    found = {how: adapted(session, presses, how) for how in progress((MOVED, FULL), "candidates")}
+    errors = held_out_errors(model, session, presses, found, progress)
+    chosen = choice(errors, ERROR_FLOOR * session.width_mm)
+    before = float(model.meta["teach"].get("error_mm", {}).get("held_out_median", np.inf))
+    notes = []
+    medians = {how: float(np.median(one)) for how, one in errors.items()}
+    if medians[chosen] > STILL_POOR * max(before, ERROR_FLOOR * session.width_mm):
+        notes.append(
+            f"presses held out are still off by {medians[chosen]:.1f} mm; look at the electrodes,"
+            " then teach again with 50 presses"
+        )
+    move = Move() if chosen == KEPT else _move(found[chosen])
+    report: dict[str, Any] = {
+        "presses": old.presses + (0 if chosen == KEPT else len(presses)),
+        "error_mm": {
+            "held_out_median": round(medians[chosen], 2),
+            "held_out_p95": round(float(np.quantile(errors[chosen], 0.95)), 2),
+        },
+        "update": {
+            "presses": len(presses),
+            "chosen": chosen,
+            "held_out_mm": {how: round(one, 2) for how, one in medians.items()},
+            "turn_deg": round((move.turn_deg + 180) % 360 - 180, 1),
+            "shift_mm": [round(one, 1) for one in move.shift_mm],
+        },
+        "notes": notes,
+    }
+    if chosen == KEPT:
+        return Updated(model, chosen, move, report)
+    meta = {**model.meta, "teach": {"lambda_rel": model.defaults.lambda_rel, **report}}
+    if skin is not None:
+        seen = moved_skin(skin, move)
+        meta["skin"] = skin_to_table(seen)
+        grid = grid_for(seen.outline, PIXELS_ACROSS)
+    else:
+        middle = move.to_new(np.array([session.kernel.centre_mm]), session.kernel.centre_mm)[0]
+        grid = shifted_grid(model.grid, middle - session.kernel.centre_mm)
+    new = taught_model(
+        found[chosen], presses.protocol, grid, presses.untouched, model.defaults.lambda_rel, meta
+    )
+    new = replace(new, defaults=model.defaults, load=_law(model, new, move, session, presses))
+    return Updated(new, chosen, move, report)
+
+
+def _session(old: Known, skin: Skin | None, presses: Presses) -> Session:
+    begin, width_mm = starting_kernel(presses, skin)
+    unit = np.sqrt(np.mean(old.answer**2, axis=0))
+    unit = np.maximum(unit, 1e-9 * unit.max())
+    kernel = Deviation(
+        begin.sensitivity, begin.centre_mm, begin.length_mm,
+        old=between_pixels(old.grid, old.answer / unit),
+    )  # fmt: skip
+    return Session(old, kernel, width_mm, unit)
+
+
+def _move(learned: Learned) -> Move:
+    assert isinstance(learned.kernel, Deviation)
+    return learned.kernel.move
+
+
+def adapted(
+    session: Session, presses: Presses, how: str, start: Deviation | None = None
+) -> Learned:
+    """The answer after ``presses`` by the candidate ``how``; with ``start`` the likelihood is
+    searched from there alone."""
+    data, given = presses.difference / session.unit, known_size(presses)
+    old_noise = session.old.noise / session.unit / session.unit[:, None]
+    white = whitening_of(old_noise)
+    kernel = likeliest(session, presses, how, white, start)
+    amplitude = _amplitudes(kernel, presses.place_mm, data, given, white)
+    process = condition(kernel, presses.place_mm, amplitude, data, kernel.features)
+    noise = _pooled(old_noise, session.old.presses, process.left_out())
+    for _ in range(ROUNDS):
+        amplitude = left_out_amplitudes(process, noise, given)
+        process = condition(kernel, presses.place_mm, amplitude, data, kernel.features)
+        noise = _pooled(old_noise, session.old.presses, process.left_out())
+    return Learned(process, noise, session.unit, process.log_likelihood)
+
+
+def _amplitudes(
+    kernel: Deviation,
+    place_mm: FloatArray,
+    data: FloatArray,
+    given: FloatArray | None,
+    white: FloatArray,
+) -> FloatArray:
+    """By the old answer alone; 1 is a press of the old ones' mean."""
+    amplitude = suiting_amplitudes(kernel.features(place_mm), data, white)
+    return amplitude if given is None else by_given(amplitude, given)
+
+
+def _pooled(old: FloatArray, count: int, residual: FloatArray) -> Noise:
+    """The covariance of old presses, ``count`` of them, and new residuals (n, m) together."""
+    covariance = (count * old + residual.T @ residual) / (count + len(residual))
+    return Noise(whitening_of(covariance), covariance, 0.0)
+
+
+def likeliest(
+    session: Session, presses: Presses, how: str, white: FloatArray, start: Deviation | None
+) -> Deviation:
+    """The kernel with turn, shift, gain's and noise's variances (over delta's) of the greatest
+    likelihood; ``MOVED`` has noise alone.
+
+    Raises:
+        MissingExtraError: scipy is not installed.
+    """
+    from scipy.optimize import minimize
+
+    data, given, place = presses.difference / session.unit, known_size(presses), presses.place_mm
+    sd_mm = SHIFT_SD * session.width_mm
+    free = 5 if how == FULL else 3
+    fixed = np.array([0, 0, 0, LOG_BOUND, -LOG_BOUND])
+
+    def at(numbers: FloatArray) -> Deviation:
+        turn, x, y, noise, own = np.concatenate([numbers, fixed[free:]]).tolist()
+        noise, own = (min(max(one, -LOG_BOUND), LOG_BOUND) for one in (noise, own))
+        return replace(session.kernel, move=Move(turn, (x, y)), noise=exp(noise), own=exp(own))
+
+    def cost(numbers: FloatArray) -> float:
+        kernel = at(numbers)
+        amplitude = _amplitudes(kernel, place, data, given, white)
+        try:
+            found = condition(kernel, place, amplitude, data, kernel.features).log_likelihood
+        except np.linalg.LinAlgError:
+            return 1e30
+        return -found + 0.5 * float(numbers[1] ** 2 + numbers[2] ** 2) / sd_mm**2
+
+    if start is None:
+        turns = 360 / START_TURNS * np.arange(START_TURNS)
+        starts = [np.array([turn, 0, 0, log(0.1), log(0.3)])[:free] for turn in turns]
+    else:
+        begin = [start.move.turn_deg, *start.move.shift_mm, log(start.noise), log(start.own)]
+        starts = [np.array(begin)[:free]]
+    steps = np.diag([5.0, 0.7 * sd_mm, 0.7 * sd_mm, 0.7, 0.7])[:free, :free]
+    best = None
+    for k in np.argsort([cost(one) for one in starts])[:REFINED_STARTS]:
+        found = minimize(
+            cost, starts[k], method="Nelder-Mead",
+            options={"initial_simplex": starts[k] + np.vstack([np.zeros(free), steps]),
+                     "xatol": 0.02, "fatol": 0.05, "maxfev": 300},
+        )  # fmt: skip
+        if best is None or found.fun < best.fun:
+            best = found
+    assert best is not None
+    return at(best.x)
+
+
+def held_out_errors(
+    model: Model,
+    session: Session,
+    presses: Presses,
+    found: dict[str, Learned],
+    progress: Progress = quiet_progress,
+) -> dict[str, FloatArray]:
+    """Errors (n,) mm of each candidate for presses that it did not know, as the core solves them;
+    of the old model, which knew none, for all."""
+    count = len(presses)
+    fold = np.random.default_rng(1).permutation(count) % min(count, MAX_FOLDS)
+    errors = {KEPT: solve_presses(model, presses)[0]} | {how: np.zeros(count) for how in found}
+    for k in progress(range(int(fold.max()) + 1), "held-out presses"):
+        known = presses.take(np.flatnonzero(fold != k))
+        for how, learned in found.items():
+            assert isinstance(learned.kernel, Deviation)
+            less = adapted(session, known, how, learned.kernel)
+            middle = _move(less).to_new(np.zeros((1, 2)), (0.0, 0.0))[0]
+            tried = taught_model(
+                less, presses.protocol, shifted_grid(model.grid, middle), known.untouched,
+                model.defaults.lambda_rel,
+            )  # fmt: skip
+            out = np.flatnonzero(fold == k)
+            errors[how][out] = solve_presses(tried, presses.take(out))[0]
+    return errors
+
+
+def choice(errors: dict[str, FloatArray], floor_mm: float) -> str:
+    """The last candidate that is better than the one chosen before it by more than chance."""
+    chosen = KEPT
+    for how in (MOVED, FULL):
+        gain = np.log((errors[chosen] + floor_mm) / (errors[how] + floor_mm))
+        if gain.mean() > BETTER_BY * gain.std(ddof=1) / np.sqrt(len(gain)):
+            chosen = how
+    return chosen
+
+
+def moved_skin(skin: Skin, move: Move) -> Skin:
+    """The skin in the new presses' coordinates."""
+    turned = Placement(move.turn_deg).skin_in_places(skin)
+    x, y = move.to_new(np.array([skin.outline.centre_mm]), skin.outline.centre_mm)[0]
+    dx, dy = x - skin.outline.centre_mm[0], y - skin.outline.centre_mm[1]
+    corners = [(px + dx, py + dy) for px, py in turned.outline.vertices_mm]
+    return replace(turned, outline=polygon(corners))
+
+
+def shifted_grid(grid: Grid, by_mm: FloatArray) -> Grid:
+    """``grid`` with its origin moved."""
+    x, y = np.add(grid.origin_mm, by_mm).tolist()
+    return replace(grid, origin_mm=(x, y))
+
+
+def _law(old: Model, new: Model, move: Move, session: Session, presses: Presses) -> LoadLaw | None:
+    """The old law of force where the skin is now, its strengths in the new model's scale: that of
+    presses whose size is known."""
+    law = old.load
+    if law is None:
+        return None
+    at = new.grid.centres_mm()
+    gains = law.gains_at(move.to_old(at, session.kernel.centre_mm))
+    u, v = at.T / law.radius_mm
+    terms = monomials(u, v, law.order)
+    law = replace(law, gain=np.linalg.lstsq(terms, gains, rcond=None)[0].astype(np.float32))
+    given = known_size(presses)
+    if given is None:
+        return law
+    strength = solve_presses(new, presses)[2]
+    expected = np.interp(given, law.force_n, law.strength) / law.gains_at(presses.place_mm)
+    good = np.isfinite(given) & (given > 0) & (strength > 0) & (expected > 0)
+    if not good.any():
+        return law
+    factor = float(np.median(strength[good] / expected[good]))
+    return replace(law, strength=(law.strength * factor).astype(np.float32))
