@@ -1,8 +1,8 @@
 """A scene becomes a list of steps that is fixed before the first frame: ``compile_scene``.
 
 Only the effects that the scene names are imported and made. What can be known before solving is
-worked out here: which frames share a state of sheet, touches and contacts, and whether touches are
-solved by factorisation or by update. The frame loop (``runner.py``) then asks nothing.
+worked out here: which frames and rows share a state of sheet, touches and contacts, and whether
+touches are solved by factorisation or by update. The frame loop (``runner.py``) then asks nothing.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from eitskin.scene.effect import (
     VoltageStep,
 )
 from eitskin.scene.forward_steps import Change, UpdateCost, count_costs, touched_unknowns
+from eitskin.scene.motion import Mix, Motion
 from eitskin.scene.parameters import parse_parameters
 from eitskin.scene.plan import Plan, make_plan
 from eitskin.scene.random_touches import TrueTouch
@@ -37,7 +38,7 @@ from eitskin.scene.reading import live_rows, solved_impedance, with_bridges
 from eitskin.scene.registry import Registry
 from eitskin.scene.session import MeshCache, SessionWork, check_shared, load_effects, make_steps
 from eitskin.scene.touch_path import touches_at
-from eitskin.skin.skin import Skin
+from eitskin.skin.skin import Skin, size_to_paper
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -58,16 +59,71 @@ class State:
     frame: int
 
 
+class States:
+    """The distinct states of a scene's ``frames``, numbered in the order that they are first asked
+    for, and which of them each row has at given instants."""
+
+    def __init__(self, scene: Scene, cover: Cover, steps: Sequence[Step], frames: range) -> None:
+        self._scene, self._cover, self._frames = scene, cover, frames
+        self._varying = [s for s in steps if isinstance(s, MaterialStep) and s.varies]
+        self._contacts = _contacts(scene, steps, frames)
+        self._changes: dict[tuple[TrueTouch, ...], Change] = {(): NO_CHANGE}
+        self._number: dict[Any, int] = {}
+        self.all: list[State] = []
+        self.motion = Motion(scene.touches, size_to_paper(scene.skin.outline))
+
+    def of(self, frame: int, touches: tuple[TrueTouch, ...]) -> int:
+        """The number of the state that ``frame`` has with ``touches``."""
+        place = frame - self._frames.start
+        contact = self._contacts[place if len(self._contacts) > 1 else 0]
+        time_s = (frame - self._scene.quiet_frames) / self._scene.rate_hz
+        sheet = tuple(
+            float(frame) if s.same is None else s.same(time_s, frame) for s in self._varying
+        )
+        key = (touches, contact_key(contact), sheet)
+        if key not in self._number:
+            self._number[key] = len(self.all)
+            self.all.append(State(touches, self.change(touches), contact, frame))
+        return self._number[key]
+
+    def change(self, touches: tuple[TrueTouch, ...]) -> Change:
+        """What ``touches`` do to the sheet."""
+        if touches not in self._changes:
+            self._changes[touches] = Change(*self._cover.factor(touches))
+        return self._changes[touches]
+
+    def mix(self, frame: int, times_s: FloatArray) -> Mix:
+        """The states of ``frame``'s rows at their instants (m,)."""
+        if frame < self._scene.quiet_frames:
+            return self._same(self.of(frame, ()), len(times_s))
+        if (times_s == times_s[0]).all():
+            touches = self.motion.touches_at(float(times_s[0]))
+            return self._same(self.of(frame, touches), len(times_s))
+        mix, touches_of = self.motion.at(times_s), self.motion.states
+        number = {k: self.of(frame, touches_of[k]) for k in used_in(mix)}
+        every = np.zeros(len(touches_of), np.int64)
+        every[list(number)] = list(number.values())
+        return Mix(every[mix.lower], every[mix.upper], mix.part)
+
+    @staticmethod
+    def _same(number: int, rows: int) -> Mix:
+        numbers = np.full(rows, number, np.int64)
+        return Mix(numbers, numbers, np.zeros(rows))
+
+
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """A scene ready to run; nothing in it changes any more but ``work``, which counts.
+    """A scene ready to run; nothing in it changes any more but ``work``, which counts, and
+    ``table``, which grows where rows are asked for at other instants.
 
     Attributes:
         skin: as it truly is, after geometry steps.
         steps: those of the named effects, in the order that they run.
         parameters: of each effect.
         frames: which of all frames, quiet ones first, are compiled; n of them.
-        states: solved once each; ``state_of_frame`` (n,) says which one a frame has.
+        states: solved once each; ``state_of_frame`` (n,) says which one a frame has, -1 where
+            touches move while it is scanned: then ``mixes`` says it, by the frame's place in
+            ``frames``. ``table`` has them, and those of other instants.
         known: potentials of states that were solved already, for V0.
         base_factors: those of the untouched skin, made for V0 and used again by the update.
         functions: from a state's true voltages to the recorded ones, for each frame.
@@ -84,7 +140,9 @@ class Compiled:
     phase: PhaseStep | None
     frames: range
     states: tuple[State, ...]
+    table: States
     state_of_frame: IntArray
+    mixes: dict[int, Mix]
     known: dict[int, FloatArray]
     base_factors: Any
     functions: tuple[VoltageFunction, ...]
@@ -153,18 +211,21 @@ def prepare_scene(
     return Prepared(scene, skin, steps, parameters, phase, mesh_cache, work, factors)
 
 
-def compile_frames(prepared: Prepared, frames: range) -> Compiled:
-    """Compile only ``frames`` of a prepared scene, of all frames, quiet ones first. Raises as
-    ``compile_scene``."""
+def compile_frames(prepared: Prepared, frames: range, *, roam: bool = False) -> Compiled:
+    """Compile only ``frames`` of a prepared scene, of all frames, quiet ones first; ``roam``: rows
+    may be asked for at any instant up to a period around them. Raises as ``compile_scene``."""
     scene, skin, steps = prepared.scene, prepared.skin, prepared.steps
     phase, mesh_cache, work = prepared.phase, prepared.mesh_cache, prepared.work
-    states, state_of_frame = _states(scene, mesh_cache.cover(skin, scene.elements), steps, frames)
+    table = States(scene, mesh_cache.cover(skin, scene.elements), steps, frames)
+    state_of_frame, mixes = _states_of_frames(scene, table, frames)
+    states = tuple(table.all)
     model = mesh_cache.model(
         skin, scene.protocol, scene.elements, solved_impedance(states[0].contacts)
     )
     pairs = tuple(dict.fromkeys((i, j) for state in states for i, j, _ in state.contacts.bridges))
     model.patterns = with_bridges(model.patterns, pairs)
-    method, reach, counted = _choose_method(scene, model, states, steps)
+    spare = _spare(scene, table, frames) if roam else []
+    method, reach, counted = _choose_method(scene, model, states, steps, spare)
     known = {}
     as_described = prepared.as_described
     base_factors = prepared.base_factors if method == "update" and as_described else None
@@ -185,7 +246,9 @@ def compile_frames(prepared: Prepared, frames: range) -> Compiled:
         phase=phase,
         frames=frames,
         states=states,
+        table=table,
         state_of_frame=state_of_frame,
+        mixes=mixes,
         known=known,
         base_factors=base_factors,
         functions=functions,
@@ -206,6 +269,7 @@ def compile_frames(prepared: Prepared, frames: range) -> Compiled:
             len(reach),
             work,
             base_factors is not None,
+            len(mixes),
         ),
         work=work,
     )
@@ -265,33 +329,40 @@ def _is_voltage(step: Step) -> bool:
     return isinstance(step, VoltageStep | LoadedStep)
 
 
-def _states(
-    scene: Scene, cover: Cover, steps: Sequence[Step], frames: range
-) -> tuple[tuple[State, ...], IntArray]:
-    """The distinct states of ``frames``, in the order that they first have them, and which one each
-    has (n,)."""
-    varying = [step for step in steps if isinstance(step, MaterialStep) and step.varies]
-    contacts = _contacts(scene, steps, frames)
-    first = max(frames.start - scene.quiet_frames, 0)  # of the recorded frames, whose samples
-    samples = scene.samples(range(first, max(frames.stop - scene.quiet_frames, first)))
-    changes: dict[tuple[TrueTouch, ...], Change] = {(): NO_CHANGE}
-    states: dict[Any, State] = {}
-    state_of_frame = np.zeros(len(frames), dtype=np.int64)
-    number: dict[Any, int] = {}
+def used_in(mix: Mix) -> list[int]:
+    """The states that ``mix`` is of, ascending."""
+    needed = np.concatenate([mix.lower, mix.upper[mix.part > 0]])
+    return [int(k) for k in np.unique(needed)]
+
+
+def _states_of_frames(
+    scene: Scene, states: States, frames: range
+) -> tuple[IntArray, dict[int, Mix]]:
+    """Which state each of ``frames`` has (n,), -1 where touches move in it, and what those have."""
+    state_of_frame, mixes = np.zeros(len(frames), np.int64), {}
+    recorded = range(max(frames.start - scene.quiet_frames, 0), frames.stop - scene.quiet_frames)
+    samples, delays_s = scene.samples(recorded) if scene.frozen else (), scene.row_delays_s
     for place, frame in enumerate(frames):
-        recorded = frame - scene.quiet_frames
-        touches = touches_at(samples, recorded - first) if recorded >= 0 else ()
-        contact = contacts[place if len(contacts) > 1 else 0]
-        time_s = recorded / scene.rate_hz
-        sheet = tuple(float(frame) if s.same is None else s.same(time_s, frame) for s in varying)
-        key = (touches, contact_key(contact), sheet)
-        if key not in number:
-            if touches not in changes:
-                changes[touches] = Change(*cover.factor(touches))
-            number[key] = len(states)
-            states[key] = State(touches, changes[touches], contact, frame)
-        state_of_frame[place] = number[key]
-    return tuple(states.values()), state_of_frame
+        number = frame - scene.quiet_frames
+        if number < 0 or not scene.touches:
+            state_of_frame[place] = states.of(frame, ())
+        elif scene.frozen:
+            state_of_frame[place] = states.of(frame, touches_at(samples, number - recorded.start))
+        else:
+            mix = states.mix(frame, number / scene.rate_hz + delays_s)
+            state_of_frame[place] = mix.lower[0] if mix.still else -1
+            if not mix.still:
+                mixes[place] = mix
+    return state_of_frame, mixes
+
+
+def _spare(scene: Scene, states: States, frames: range) -> list[Change]:
+    """Of all states that rows around ``frames`` may have."""
+    start, stop = (number - scene.quiet_frames for number in (frames.start, frames.stop))
+    if scene.frozen or stop <= 0:
+        return []
+    start_s, stop_s = max(start - 1, 0) / scene.rate_hz, (stop + 1) / scene.rate_hz
+    return [states.change(touches) for touches in states.motion.between(start_s, stop_s)]
 
 
 def contact_key(contacts: Contacts) -> tuple[bytes, bytes, tuple[tuple[int, int, float], ...]]:
@@ -338,10 +409,14 @@ def _check_contacts(contacts: Contacts, count: int, where: str) -> None:
 
 
 def _choose_method(
-    scene: Scene, model: ForwardModel, states: Sequence[State], steps: Sequence[Step]
+    scene: Scene,
+    model: ForwardModel,
+    states: Sequence[State],
+    steps: Sequence[Step],
+    spare: Sequence[Change],
 ) -> tuple[str, IntArray, UpdateCost | None]:
-    """How to solve, the unknowns that touches reach (for the update), and the count that decided
-    it."""
+    """How to solve, the unknowns that touches and ``spare`` reach (for the update), and the count
+    that decided it."""
     nothing = np.zeros(0, np.int64)
     varying = [
         step.name for step in steps if isinstance(step, MaterialStep | ContactStep) and step.varies
@@ -359,7 +434,8 @@ def _choose_method(
     reach = np.unique(np.concatenate([*under, nothing]))
     counted = count_costs(model, shunted, np.array([len(one) for one in under]), len(reach))
     if scene.solver == "update" or counted.cheaper == "update":
-        return "update", reach, counted
+        more = [touched_unknowns(model, shunted, change.elements) for change in spare]
+        return "update", np.unique(np.concatenate([reach, *more])), counted
     return "factorise", nothing, counted
 
 

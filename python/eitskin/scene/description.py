@@ -45,7 +45,9 @@ TOUCH_KEYS = {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_
     "aspect",
     "angle_deg",
 }
+SCAN_KEYS = ("frozen", "row_us")
 SOLVERS = ("auto", "factorise", "update")
+ROW_US = 100.0  # from row to row on the board with its default settings
 MAX_FRAMES = 1_000_000
 MAX_TIME_S = 1e7
 # another mesh than models are built on by default (about 3,000 elements): a simulation must not
@@ -67,6 +69,8 @@ class Scene:
         solver: "factorise" again for each conductivity, "update" the untouched skin's factors, or
             "auto": whichever counts cheaper where touches move, "factorise" where they do not.
         touches: in the order of [[touch]].
+        frozen: each frame is a snapshot of its time; otherwise touches move while it is scanned.
+        row_us: from row to row of a scan; None is 100, or less where the frames follow faster.
         effects: name to its table, as in TOML.
         where: the file, for errors.
         dataset: the table [dataset], as in TOML.
@@ -88,6 +92,8 @@ class Scene:
     quiet_frames: int = 16
     elements: int = DEFAULT_ELEMENTS
     solver: str = "auto"
+    frozen: bool = False
+    row_us: float | None = None
     description: str = ""
     where: str = "scene"
     dataset: Mapping[str, Any] = field(default_factory=dict)
@@ -102,6 +108,14 @@ class Scene:
         integer(numbers, "elements", None, place, low=200, high=200_000)
         number({"rate_hz": self.rate_hz}, "rate_hz", None, place, low=0, high=1e6, open_low=True)
         choice({"solver": self.solver}, "solver", None, SOLVERS, place)
+        if self.row_us is not None:
+            most = 1e6 / (self.rate_hz * self.protocol.n_rows)
+            if not 0 < self.row_us <= most * (1 + 1e-9):
+                raise ConfigError(
+                    f"{self.where} [scan]: row_us = {self.row_us:g} must be above 0 and at most"
+                    f" {most:.4g}, or {self.protocol.n_rows} rows take longer than a frame; use"
+                    " a lower rate_hz"
+                )
         _check_touches(self)
 
     @property
@@ -110,13 +124,37 @@ class Scene:
         return self.quiet_frames + self.frames
 
     def times_s(self) -> FloatArray:
-        """The recorded frames' times (frames,)."""
+        """The recorded frames' times (frames,), at which their scans begin."""
         return np.asarray(np.arange(self.frames) / self.rate_hz)
 
+    @property
+    def scan_s(self) -> float:
+        """From the beginning of a scan to its end."""
+        rows = self.protocol.n_rows
+        if self.row_us is not None:
+            return 1e-6 * self.row_us * rows
+        return min(1e-6 * ROW_US * rows, 1 / self.rate_hz)
+
+    @property
+    def row_delays_s(self) -> FloatArray:
+        """Each row's instant (m,) after the beginning of the scan; 0 where ``frozen``."""
+        rows = self.protocol.n_rows
+        return np.asarray(0.0 if self.frozen else self.scan_s / rows) * np.arange(rows)
+
+    @property
+    def truth_delay_s(self) -> float:
+        """When, after its time, a frame's truth was so: at the end of its scan, or at its time
+        where ``frozen``."""
+        return 0.0 if self.frozen else self.scan_s
+
     def samples(self, frames: range | None = None) -> tuple[TrackSamples, ...]:
-        """Each track at the recorded frames' times, or at those of ``frames`` of them."""
+        """Each track when the truth of the recorded frames, or of ``frames`` of them, was so."""
         times = self.times_s() if frames is None else np.asarray(frames) / self.rate_hz
-        return tuple(sample(track, times) for track in self.touches)
+        return self.samples_at(times + self.truth_delay_s)
+
+    def samples_at(self, times_s: FloatArray) -> tuple[TrackSamples, ...]:
+        """Each track at any instants (k,)."""
+        return tuple(sample(track, times_s) for track in self.touches)
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -139,9 +177,14 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
     Raises:
         FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
     """
-    check_keys(table, ("scene", "touch", "effects", "dataset"), where)
+    check_keys(table, ("scene", "scan", "touch", "effects", "dataset"), where)
     head, place = _table(table, "scene", where), f"{where} [scene]"
     check_keys(head, SCENE_KEYS, place)
+    scan = _table(table, "scan", where)
+    check_keys(scan, SCAN_KEYS, f"{where} [scan]")
+    frozen = scan.get("frozen", False)
+    if not isinstance(frozen, bool):
+        raise ConfigError(f"{where} [scan]: frozen must be true or false, not {frozen!r}")
     skin, protocol = _skin(head, place, folder)
     given = {
         "frames": integer(head, "frames", 1, place, low=1, high=MAX_FRAMES),
@@ -169,6 +212,10 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
         effects=effects,
         rate_hz=number(head, "rate_hz", 20.0, place, low=0, high=1e6, open_low=True),
         solver=choice(head, "solver", "auto", SOLVERS, place),
+        frozen=frozen,
+        row_us=number(scan, "row_us", None, f"{where} [scan]", low=0, high=1e6, open_low=True)
+        if "row_us" in scan
+        else None,
         where=where,
         dataset=_table(table, "dataset", where),
         text=text,
@@ -291,7 +338,8 @@ def _keyframe(table: Mapping[str, Any], driving: str, where: str) -> Keyframe:
 
 
 def _check_touches(scene: Scene) -> None:
-    """Refuse touches outside the skin, without size, or overlapping, in any recorded frame."""
+    """Refuse touches outside the skin, without size, or overlapping, in any recorded frame: when
+    its scan begins and ends, and at keyframes in it."""
     for k, track in enumerate(scene.touches):
         where = f"{scene.where} [[touch]] {k} (from 0)"
         if not track.keyframes:
@@ -302,7 +350,8 @@ def _check_touches(scene: Scene) -> None:
             raise ConfigError(
                 f"{where}: contrast must be above 0; a negative conductivity cannot be"
             )
-    samples, times = scene.samples(), scene.times_s()
+    times = _scanned_s(scene)
+    samples = scene.samples_at(times)
     for k, one in enumerate(samples):
         if len(scene.touches[k].keyframes) and not one.there.any():
             continue
@@ -317,6 +366,17 @@ def _check_touches(scene: Scene) -> None:
                 f" {scene.skin.name!r}; move it inwards or make it smaller"
             )
     _refuse_overlaps(scene, samples, times)
+
+
+def _scanned_s(scene: Scene) -> FloatArray:
+    """Instants at which touches that go in straight lines are looked at."""
+    times = scene.times_s()
+    if scene.frozen:
+        return times
+    keys = np.array([key.t_s for track in scene.touches for key in track.keyframes])
+    keys = keys[(keys >= 0) & (keys < scene.frames / scene.rate_hz)]
+    keys = keys[keys % (1 / scene.rate_hz) <= scene.scan_s]
+    return np.asarray(np.unique(np.concatenate([times, times + scene.scan_s, keys])))
 
 
 def _room_mm(outline: Outline, one: TrackSamples, at: npt.NDArray[np.int64]) -> FloatArray:

@@ -119,9 +119,11 @@ def make_plan(
     reach: int,
     work: SessionWork,
     factorised: bool = False,
+    moving: int = 0,
 ) -> Plan:
     """The plan of a compiled scene: the steps that every scene has, with those of the named effects
-    in their places. ``factorised``: the untouched skin is already, for V0."""
+    in their places. ``factorised``: the untouched skin is already, for V0; ``moving``: frames in
+    which touches change while they are scanned."""
     own = [PlanStep(step.name, step.stage, step.note, step.cost, True) for step in steps]
     kinds = dict(zip(own, steps, strict=True))
     patterns, total = len(model.patterns.solved), scene.n_frames
@@ -154,8 +156,8 @@ def make_plan(
     ]
     touches = []
     if scene.touches:
-        moving = sum(track.moves for track in scene.touches)
-        note_touches = f"{len(scene.touches)}, of which {moving} change while they are there"
+        changing = sum(track.moves for track in scene.touches)
+        note_touches = f"{len(scene.touches)}, of which {changing} change while they are there"
         shapes = {track.shape.profile for track in scene.touches if track.shape is not None}
         if shapes:
             note_touches += f"; shapes: {', '.join(sorted(shapes))}"
@@ -163,6 +165,13 @@ def make_plan(
         touches = [PlanStep("touches", Stage.MATERIAL, note_touches, cost, False)]
     read = EffectCost(vector_passes_per_frame=1)
     forward = [PlanStep("solve", Stage.BOUNDARY, f"{patterns} patterns; {note}", solve, False)]
+    if moving:
+        note = (
+            f"{1e3 * scene.scan_s:.3g} ms; touches change in {moving} frames, whose rows are"
+            f" interpolated between the {states} states"
+        )
+        cost = EffectCost(vector_passes_per_frame=4 * moving / total)
+        forward.append(PlanStep("scan", Stage.BOUNDARY, note, cost, False))
     forward.append(
         PlanStep("read", Stage.BOUNDARY, f"{scene.protocol.n_rows} voltages", read, False)
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,10 @@ import numpy.typing as npt
 from eitskin import __version__
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
-from eitskin.scene.compiler import Compiled, State, background_of, compile_scene
+from eitskin.scene.compiler import Compiled, State, background_of, compile_scene, used_in
 from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import Factorise, FactoriseComplex, Forward, Update, Work
+from eitskin.scene.motion import Mix
 from eitskin.scene.reading import PlainReader, TrueVoltages, WholeReader, solved_impedance
 from eitskin.scene.truth import Truth, truth_of
 from eitskin.skin.skin import skin_to_table
@@ -66,21 +67,22 @@ class FrameMaker:
     def reading(self, number: int) -> TrueVoltages:
         """State ``number``'s voltages before excitation, front end and converter."""
         if number not in self._readings:
-            state = self.compiled.states[number]
+            state = self.compiled.table.all[number]
             solved = self._forward.electrodes(
                 self._background(state), state.change, solved_impedance(state.contacts)
             )
             self._readings[number] = self._read(solved, state)
         return self._readings[number]
 
-    def frame(self, frame: int) -> FloatArray:
-        """Frame number ``frame`` of all frames, quiet ones first: (m,) in V.
+    def frame(self, frame: int, row_times_s: FloatArray | None = None) -> FloatArray:
+        """Frame number ``frame`` of all frames, quiet ones first: (m,) in V. Its rows are those of
+        its scan, or of the instants ``row_times_s`` (m,); its effects are the frame's.
 
         Raises:
             ConfigError: a voltage is not finite.
         """
         scene, place = self.compiled.scene, frame - self.compiled.frames.start
-        reading = self.reading(int(self.compiled.state_of_frame[place]))
+        reading = self._true(frame, row_times_s)
         v, time_s = reading.v, float(self._times[place])
         for function in self.compiled.functions:
             v = function(v, reading.loads, time_s, frame)  # type: ignore[arg-type]
@@ -93,6 +95,50 @@ class FrameMaker:
             )
         return np.asarray(v, dtype=np.float64)
 
+    def _true(self, frame: int, row_times_s: FloatArray | None) -> TrueVoltages:
+        place = frame - self.compiled.frames.start
+        if row_times_s is not None:
+            mix = self.compiled.table.mix(frame, row_times_s)
+        elif place in self.compiled.mixes:
+            mix = self.compiled.mixes[place]
+        else:
+            return self.reading(int(self.compiled.state_of_frame[place]))
+        if mix.still:
+            return self.reading(int(mix.lower[0]))
+        return blend({k: self.reading(k) for k in used_in(mix)}, mix)
+
+
+def blend(readings: dict[int, TrueVoltages], mix: Mix) -> TrueVoltages:
+    """Each row's voltage, and loads, between those of its two states."""
+    numbers = sorted(readings)
+    upper = np.where(mix.part > 0, mix.upper, mix.lower)
+    low, high = (np.searchsorted(numbers, one) for one in (mix.lower, upper))
+    rows = np.arange(len(low))
+
+    def between(values: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        stack = np.array(values)
+        first = stack[low, rows]
+        return np.asarray(first + mix.part * (stack[high, rows] - first))
+
+    every = [readings[k] for k in numbers]
+    v, loads = between([one.v for one in every]), [one.loads for one in every]
+    if loads[0] is None:
+        return TrueVoltages(v)
+
+    def potential(name: str) -> npt.NDArray[Any]:
+        return between([getattr(one, name) for one in loads])
+
+    return TrueVoltages(
+        v,
+        replace(
+            loads[0],
+            source_v=potential("source_v"),
+            sink_v=potential("sink_v"),
+            plus_v=potential("plus_v"),
+            minus_v=potential("minus_v"),
+        ),
+    )
+
 
 def simulate_frames(
     compiled: Compiled, progress: Callable[[range], Iterable[int]] | None = None
@@ -104,17 +150,18 @@ def simulate_frames(
         ConfigError: an effect makes a conductivity that cannot be, or a voltage that is not finite.
     """
     scene, maker = compiled.scene, FrameMaker(compiled)
-    unknown = [k for k in range(len(compiled.states)) if k not in compiled.known]
+    states = compiled.states
+    unknown = [k for k in range(len(states)) if k not in compiled.known]
     recorded, numbers = 0, range(len(unknown))
     for k in map(unknown.__getitem__, progress(numbers) if progress else numbers):
         before = maker.work.factorisations
         maker.reading(k)
-        if compiled.states[k].frame >= scene.quiet_frames:
+        if states[k].frame >= scene.quiet_frames:
             recorded += maker.work.factorisations - before
     voltage_v = np.zeros((len(compiled.frames), scene.protocol.n_rows))
     for place, frame in enumerate(compiled.frames):
         voltage_v[place] = maker.frame(frame)
-    true_v = np.array([maker.reading(k).v for k in range(len(compiled.states))])
+    true_v = np.array([maker.reading(k).v for k in range(len(states))])
     return SceneRun(voltage_v, true_v, maker.work, recorded, compiled.work.generators)
 
 

@@ -3,7 +3,7 @@ solved."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,10 @@ import numpy.typing as npt
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.fem.sensitivity import element_to_pixel
-from eitskin.scene.compiler import Compiled, background_of
+from eitskin.scene.compiler import Compiled, State, background_of
 from eitskin.scene.forward_steps import touched
 from eitskin.scene.random_touches import TrueTouch
+from eitskin.scene.touch_path import touches_at
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -44,13 +45,12 @@ def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
         UsageError: ``pixels`` is neither 0 nor 4 to 512, or the rasters would hold over 500 million
             cells.
     """
-    scene = compiled.scene
-    numbers = compiled.state_of_frame[scene.quiet_frames :]
-    flat = [(frame, t) for frame, k in enumerate(numbers) for t in compiled.states[k].touches]
+    numbers, states = _states_at_truth(compiled)
+    flat = [(frame, t) for frame, k in enumerate(numbers) for t in states[k].touches]
     contrast = np.array([t.contrast for _, t in flat], dtype=np.float64)
     masks = conductivity = extent = None
     if pixels:
-        masks, conductivity, extent = _rasters(compiled, numbers, pixels)
+        masks, conductivity, extent = _rasters(compiled, numbers, states, pixels)
     return Truth(
         touch_frame=np.array([frame for frame, _ in flat], dtype=np.int64),
         touch_xy_mm=np.array([(t.x_mm, t.y_mm) for _, t in flat], dtype=np.float64).reshape(-1, 2),
@@ -61,6 +61,21 @@ def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
         truth_mask_extent_mm=extent,
         truth_conductivity_s_per_m=conductivity,
     )
+
+
+def _states_at_truth(compiled: Compiled) -> tuple[npt.NDArray[np.int64], list[State]]:
+    """The recorded frames' states when their truth was so, and which one each has (n,); those of
+    frames in which touches move are not solved."""
+    scene, states = compiled.scene, list(compiled.states)
+    numbers, samples = compiled.state_of_frame.copy(), scene.samples()
+    for place in np.flatnonzero(numbers < 0):
+        frame = int(place) + compiled.frames.start
+        touches = touches_at(samples, frame - scene.quiet_frames)
+        numbers[place] = len(states)
+        states.append(
+            replace(states[0], touches=touches, change=compiled.table.change(touches), frame=frame)
+        )
+    return numbers[scene.quiet_frames :], states
 
 
 def mask_of(
@@ -75,7 +90,7 @@ def mask_of(
 
 
 def _rasters(
-    compiled: Compiled, numbers: npt.NDArray[np.int64], pixels: int
+    compiled: Compiled, numbers: npt.NDArray[np.int64], states: list[State], pixels: int
 ) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.float32], tuple[float, float, float, float]]:
     grid, mesh = grid_for(compiled.skin.outline, pixels), compiled.model.mesh
     if len(numbers) * grid.nx * grid.ny > MAX_CELLS:
@@ -90,15 +105,15 @@ def _rasters(
     )
     share: Any = element_to_pixel(mesh, grid).multiply(mesh.areas_mm2[:, None]).T
     total = np.asarray(share.sum(axis=1)).ravel()
-    used, background = np.unique(numbers), background_of(compiled)
-    masks = np.zeros((len(compiled.states), grid.ny, grid.nx), dtype=np.int8)
-    images = np.zeros((len(compiled.states), grid.ny, grid.nx), dtype=np.float32)
-    for k in used:
-        state = compiled.states[k]
+    used, which = np.unique(numbers, return_inverse=True)
+    background = background_of(compiled)
+    masks = np.zeros((len(used), grid.ny, grid.nx), dtype=np.int8)
+    images = np.zeros((len(used), grid.ny, grid.nx), dtype=np.float32)
+    for k, state in enumerate(states[number] for number in used):
         masks[k] = mask_of(state.touches, x_mm, y_mm)
         values = (
             share @ touched(background(state), state.change) / np.where(total > 0, total, np.nan)
         )
         images[k] = grid.image(values)
     extent = (x0, y0, x0 + grid.nx * grid.pixel_mm, y0 + grid.ny * grid.pixel_mm)
-    return masks[numbers], images[numbers], extent
+    return masks[which], images[which], extent

@@ -50,6 +50,7 @@ def moving_scene(frames: int = 100, elements: int = 3000) -> Scene:
         rate_hz=rate_hz,
         quiet_frames=4,
         elements=elements,
+        frozen=True,
     )
 
 

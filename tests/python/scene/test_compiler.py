@@ -46,7 +46,7 @@ def test_naming_an_effect_adds_exactly_one_step(name: str, mesh_cache: MeshCache
 
 
 def test_frames_without_effects_are_the_forward_models_to_the_bit() -> None:
-    for scene in (still_scene(), moving_scene(4, solver="factorise")):
+    for scene in (still_scene(), moving_scene(4, solver="factorise", frozen=True)):
         frames = run_scene(scene)
         forward = ForwardModel(
             mesh_for_elements(scene.skin, ELEMENTS), scene.skin, scene.protocol, 0.0
@@ -100,7 +100,7 @@ def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(
 
 def test_update_and_factorisation_agree_to_1e_9(mesh_cache: MeshCache) -> None:
     """Real, with contacts, with bridges and complex, and with the grounded electrode off."""
-    around = moving_scene(16, rate_hz=20.0)
+    around = moving_scene(16, frozen=True)
     for effects in (
         {},
         {"contact_impedance": {"mean_ohm_m2": 0.02, "spread": 0.5}},

@@ -12,7 +12,7 @@ from eitskin.scene.description import Scene, load_scene
 from eitskin.scene.laws import Piezoresistive, ShortCircuit
 from eitskin.scene.touch_path import Keyframe, TouchTrack, always, sample, touches_at
 
-HEAD = '[scene]\nname = "s"\nframes = 40\nrate_hz = 20.0\nquiet_frames = 4\n'
+HEAD = '[scan]\nfrozen = true\n[scene]\nname = "s"\nframes = 40\nrate_hz = 20.0\nquiet_frames = 4\n'
 TOUCH = (
     "[[touch]]\nradius_mm = 8.0\npath = [{t_s = 0.5, x_mm = -30, y_mm = 0}, {t_s = 1.5, x_mm = 30,"
     " y_mm = 10}]\n"

@@ -26,7 +26,7 @@ RANDOM = ("noise", "jitter", "channel_gain", "contact_impedance", "background", 
 
 
 def test_frames_carry_the_truth_and_survive_their_file(tmp_path: Path) -> None:
-    scene = moving_scene(6, effects={"noise": {"snr_db": 60.0}})
+    scene = moving_scene(6, frozen=True, effects={"noise": {"snr_db": 60.0}})
     frames = run(compile_scene(scene), truth_pixels=32)
     save_frames(tmp_path / "f.npz", frames)
     again = load_frames(tmp_path / "f.npz")

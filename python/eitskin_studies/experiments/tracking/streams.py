@@ -64,7 +64,7 @@ class TouchStream:
         other set."""
         return Scene(
             self.name, touches=self.tracks, frames=FRAMES, rate_hz=RATE_HZ, quiet_frames=1,
-            elements=elements, solver="update",
+            elements=elements, solver="update", frozen=True,
             effects={"contact_impedance": CONTACTS},
         )  # fmt: skip
 

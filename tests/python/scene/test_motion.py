@@ -1,0 +1,173 @@
+"""Touches that come, move and go while a frame is scanned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.python.scene.scene_helpers import moving_scene, still_scene
+
+from eitskin.errors import ConfigError
+from eitskin.scene.compiler import compile_scene
+from eitskin.scene.description import Scene, load_scene
+from eitskin.scene.laws import ShortCircuit
+from eitskin.scene.motion import Motion
+from eitskin.scene.runner import FrameMaker, run, simulate_frames
+from eitskin.scene.session import MeshCache
+from eitskin.scene.touch_path import Keyframe, TouchTrack
+
+RATE_HZ = 1e4 / 208  # scans of 100 us a row, one behind the other
+
+
+@pytest.fixture(scope="module")
+def mesh_cache() -> MeshCache:
+    return MeshCache()
+
+
+def press(start_s: float, rise_s: float, end_s: float) -> TouchTrack:
+    """A touch that comes at ``start_s``, at once or in ``rise_s``, and is gone after ``end_s``."""
+    times = [(start_s, 0.0 if rise_s else 1.0), (start_s + rise_s, 1.0), (end_s, 1.0)]
+    keys = [Keyframe(t_s, 20, -30, 9, drive) for t_s, drive in times]
+    return TouchTrack(tuple(keys if rise_s else keys[1:]), ShortCircuit(5.0))
+
+
+def swipe(mm_per_s: float) -> TouchTrack:
+    return TouchTrack((Keyframe(0, -60, 11, 9), Keyframe(120 / mm_per_s, 60, 11, 9)))
+
+
+def scene_of(track: TouchTrack, **changes: object) -> Scene:
+    given = {"touches": (track,), "frames": 5, "rate_hz": RATE_HZ, "elements": 1500}
+    return still_scene(**{**given, **changes})  # type: ignore[arg-type]
+
+
+def test_each_row_of_a_sudden_press_has_its_own_instant(mesh_cache: MeshCache) -> None:
+    """Of a touch that is there from row 60 of frame 1 to row 20 of frame 3."""
+    row_s = 1e-4
+    scene = scene_of(press((208 + 59.5) * row_s, 0, (3 * 208 + 20.5) * row_s))
+    v = simulate_frames(compile_scene(scene, mesh_cache=mesh_cache)).voltage_v[2:]
+    there = scene_of(press(-1, 0, 9))
+    full = simulate_frames(compile_scene(there, mesh_cache=mesh_cache)).voltage_v
+    expected = np.array([full[0], full[0], full[2], full[0], full[0]])
+    expected[1, 60:], expected[3, :21] = full[2, 60:], full[2, :21]
+    assert np.array_equal(v, expected)
+    assert run(compile_scene(scene)).touch_frame.tolist() == [1, 2]  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("track", "effects", "solver", "most"),
+    [
+        (press(0.03, 0.03, 1.0), {}, "update", 0.005),
+        (press(0.03, 0.03, 1.0), {"phase": {}, "contact_impedance": {}}, "factorise", 0.005),
+        (press(0.03, 0.03, 1.0), {"source_impedance": {}}, "update", 0.002),
+        (press(0.03, 0.03, 1.0), {"temperature": {"drift_k_per_min": 9.0}}, "auto", 0.005),
+        (swipe(600), {}, "update", 0.03),
+    ],
+    ids=["press", "complex", "loads", "sheet", "swipe"],
+)
+def test_rows_are_near_those_that_are_solved_at_their_instants(
+    track: TouchTrack, effects: dict, solver: str, most: float, mesh_cache: MeshCache
+) -> None:
+    """The mean square of what interpolation is wrong by, over that of the touch's signal."""
+    scene = scene_of(track, effects=effects, solver=solver)
+    done = simulate_frames(compile_scene(scene, mesh_cache=mesh_cache)).voltage_v[2:]
+    wrong, signal = [], []
+    for frame, row in [(1, 150), (2, 10), (2, 77), (2, 205), (3, 31), (4, 100)]:
+        at = scene.samples_at(np.array([frame / RATE_HZ + row * 1e-4]))[0]
+        place = Keyframe(-1, float(at.x_mm[0]), float(at.y_mm[0]), 9)
+        still = TouchTrack((place,), ShortCircuit(float(at.contrast[0])), hold=True)
+        solved, quiet = (
+            simulate_frames(
+                compile_scene(
+                    replace(scene, touches=touches, solver="factorise"), mesh_cache=mesh_cache
+                )
+            ).voltage_v[2 + frame]
+            for touches in ((still,), ())
+        )
+        wrong.append(done[frame, row] - solved[row])
+        signal.append(solved - quiet)
+    assert 0 < np.sqrt(np.mean(np.square(wrong))) < most * np.sqrt(np.mean(np.square(signal)))
+
+
+@pytest.mark.parametrize("effects", [{}, {"noise": {"snr_db": 60.0}, "mains": {}}])
+def test_still_skins_keep_their_bits(effects: dict, mesh_cache: MeshCache) -> None:
+    for scene in (still_scene(3, effects=effects), still_scene(3, touches=(), effects=effects)):
+        frozen = replace(scene, frozen=True)
+        moved, shot = (
+            simulate_frames(compile_scene(one, mesh_cache=mesh_cache)) for one in (scene, frozen)
+        )
+        assert np.array_equal(moved.voltage_v, shot.voltage_v)
+        plans = [compile_scene(one, mesh_cache=mesh_cache).plan.text() for one in (scene, frozen)]
+        assert plans[0] == plans[1] and "scan" not in plans[0]
+
+
+def test_the_plan_tells_how_many_states_are_solved(mesh_cache: MeshCache) -> None:
+    """A swipe of 12 mm has a state each mm; a snapshot has one a frame."""
+    for frozen, states in ((False, 1 + 13), (True, 1 + 5)):
+        path = (Keyframe(0, 0, 0, 9), Keyframe(0.08, 12, 0, 9))
+        compiled = compile_scene(
+            scene_of(TouchTrack(path, hold=True), frozen=frozen), mesh_cache=mesh_cache
+        )
+        assert len(compiled.states) == compiled.plan.states == states
+        assert (f"the {states} states" in compiled.plan.text()) is not frozen
+        assert sorted(compiled.mixes) == ([] if frozen else [2, 3, 4, 5])
+
+
+def test_rows_may_be_asked_for_at_other_instants(mesh_cache: MeshCache) -> None:
+    scene = scene_of(swipe(300), effects={"noise": {"snr_db": 60.0}})
+    maker = FrameMaker(compile_scene(scene, mesh_cache=mesh_cache))
+    nominal = 1 / RATE_HZ + scene.row_delays_s
+    assert np.array_equal(maker.frame(3), maker.frame(3, nominal))
+    half = maker.frame(3, nominal + 0.5 / RATE_HZ)
+    assert not np.array_equal(half, maker.frame(3))
+    assert np.array_equal(maker.frame(1), maker.frame(1, nominal))  # quiet: no touch
+
+
+def test_states_are_those_at_the_keyframes_and_steps_between() -> None:
+    motion = Motion([press(0.1, 0.04, 0.3), TouchTrack((Keyframe(0.2, -30, 0, 5),), hold=True)])
+    mix = motion.at(np.array([0.05, 0.1, 0.12, 0.14, 0.17, 0.2, 0.25, 0.3, 0.4]))
+    counts = [len(motion.states[k]) for k in mix.lower]
+    assert counts == [0, 0, 1, 1, 1, 2, 2, 2, 1]
+    assert np.flatnonzero(mix.part).tolist() == [2]
+    assert not mix.still and motion.at(np.array([0.15, 0.19])).still
+    states = motion.between(0.0, 1.0)
+    assert {len(one) for one in states} == {0, 1, 2} and set(states) >= set(motion.states)
+
+
+def test_truth_is_that_of_the_end_of_the_scan() -> None:
+    scene = moving_scene(4)
+    frames = run(compile_scene(scene), truth_pixels=16)
+    assert scene.truth_delay_s == scene.scan_s == pytest.approx(0.0208)
+    at = scene.samples_at(scene.times_s() + 0.0208)[0]
+    assert frames.touch_frame is not None and frames.touch_xy_mm is not None
+    assert frames.touch_frame.tolist() == [0, 1, 2]  # it has lifted during the last scan
+    assert frames.touch_xy_mm[:, 0] == pytest.approx(at.x_mm[:3])
+    assert frames.truth_mask is not None
+    assert [bool(mask.any()) for mask in frames.truth_mask] == [True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("scan", "problem"),
+    [
+        ("frozen = 1", "frozen must be true or false"),
+        ("row_us = 500", "row_us = 500 must be above 0 and at most 240.4"),
+        ("rows = 5", "unknown key"),
+    ],
+)
+def test_bad_scans_are_refused(scan: str, problem: str, tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(f"[scene]\nframes = 2\n[scan]\n{scan}\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=problem):
+        load_scene(path)
+
+
+def test_a_touch_may_not_leave_the_skin_during_a_scan(tmp_path: Path) -> None:
+    text = "[scene]\n[[touch]]\nradius_mm = 8\npath = [{t_s = 0, x_mm = 80, y_mm = 0}, "
+    text += "{t_s = 0.01, x_mm = 95, y_mm = 0}]\n"
+    path = tmp_path / "s.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"at 0\.01 s x_mm = 95"):
+        load_scene(path)
+    path.write_text(text + "[scan]\nfrozen = true\n", encoding="utf-8")
+    assert load_scene(path).frozen
