@@ -44,7 +44,7 @@ class Placement:
     def to_skin(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
         """Places (n, 2) in the description's coordinates."""
         away = (place_mm - centre_mm) * (1, -1 if self.mirrored else 1)
-        return np.asarray(centre_mm + self.scale * away @ _rotation(self.turn_deg).T)
+        return np.asarray(centre_mm + self.scale * away @ rotation(self.turn_deg).T)
 
     def skin_in_places(self, skin: Skin) -> Skin:
         """The skin as the places see it."""
@@ -52,7 +52,7 @@ class Placement:
         if outline.diameter_mm is not None:
             moved = disk(outline.diameter_mm / self.scale)
         else:
-            away = (np.array(outline.vertices_mm) - outline.centre_mm) @ _rotation(self.turn_deg)
+            away = (np.array(outline.vertices_mm) - outline.centre_mm) @ rotation(self.turn_deg)
             away = away / self.scale * (1, -1 if self.mirrored else 1)
             moved = polygon([(x, y) for x, y in away + outline.centre_mm])
         start = electrodes.start_angle_deg - self.turn_deg
@@ -70,7 +70,8 @@ class Placement:
         )
 
 
-def _rotation(turn_deg: float) -> FloatArray:
+def rotation(turn_deg: float) -> FloatArray:
+    """The matrix (2, 2) of a turn counterclockwise."""
     c, s = cos(radians(turn_deg)), sin(radians(turn_deg))
     return np.array([[c, -s], [s, c]])
 

@@ -15,6 +15,7 @@ from eitskin.teaching.fit import PLACE_KEPT, PLACE_ROUNDS, Learned, learn
 FloatArray = npt.NDArray[np.float64]
 
 CHI2_90 = 4.605  # the .9 quantile of two squared normal numbers
+MISFIT = 4.0  # times the median: a press that does not fit the others
 TEMPERATURE = 2.0  # of scores as probabilities: residuals are heavier than normal
 
 
@@ -78,6 +79,14 @@ def _moments(
     mean = chance @ at
     away = at - mean
     return mean, (chance[:, None] * away).T @ away + np.eye(2) * pixel_mm**2 / 12
+
+
+def stranger_note(strangers: npt.NDArray[np.int64]) -> str:
+    """For a report."""
+    return (
+        "presses that do not fit the others (two fingers at once, a slip, a wrong place); leave"
+        " them out or record them again: " + ", ".join(map(str, strangers[:12]))
+    )
 
 
 def placed(learned: Learned, grid: Grid, difference: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -87,7 +87,18 @@ class Presses:
 
 def _refuse_numbers(presses: Presses) -> None:
     for name in ("untouched", "pressed"):
-        bad = np.flatnonzero(~np.isfinite(getattr(presses, name)).all(axis=1))
+        finite = np.isfinite(getattr(presses, name))
+        dead = np.flatnonzero(~finite.any(axis=0))
+        if 0 < len(dead) < finite.shape[1]:
+            raise FrameError(
+                f"presses: row {dead[0]} (from 0) of {name} is never finite, as {len(dead)} of"
+                f" {finite.shape[1]} are not; leave those rows out, of drive_measure too"
+            )
+        if name == "untouched" and not np.any(presses.untouched[finite.all(axis=1)]):
+            raise FrameError(
+                "presses: every untouched frame is 0; take the frame just before each press"
+            )
+        bad = np.flatnonzero(~finite.all(axis=1))
         if len(bad):
             raise FrameError(
                 f"presses: press {bad[0]} (from 0) has a number in {name} that is not finite, as"

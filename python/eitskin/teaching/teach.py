@@ -21,7 +21,14 @@ from eitskin.teaching.checks import MIN_PRESSES, check_presses
 from eitskin.teaching.fit import Learned, chosen_kernel, default_kernel, differences, learn
 from eitskin.teaching.fit import first_amplitudes as begin_amplitudes
 from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity, placement_text
-from eitskin.teaching.left_out import CHI2_90, LeftOut, leave_one_out, refined_places
+from eitskin.teaching.left_out import (
+    CHI2_90,
+    MISFIT,
+    LeftOut,
+    leave_one_out,
+    refined_places,
+    stranger_note,
+)
 from eitskin.teaching.make import LAMBDA_RELS, taught_model
 from eitskin.teaching.presses import Presses
 
@@ -31,8 +38,8 @@ Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 FEW_PRESSES = 50
 FOLDS, COUNTED_ONCE, MAX_HELD_OUT = 5, 0.97, 250
 PIXELS_ACROSS = 32
-MISFIT = 4.0  # times the median: a press that does not fit the others
 NOTHING = 0.1  # of a row's energy explained: it carries nothing
+OTHER_SCALE = 0.16  # of its logarithm: more is another unit or another skin
 MIRROR_GAIN = 10.0  # of log likelihood
 
 
@@ -309,11 +316,13 @@ def _report(
     few = len(presses) < FEW_PRESSES
     if few:
         notes.append(f"{len(presses)} presses are too few to tell 90 % ellipses")
-    if len(strangers):
+    if abs(np.log(placement.scale)) > OTHER_SCALE:
         notes.append(
-            "presses that do not fit the others (two fingers at once, a slip, a wrong place);"
-            " leave them out or record them again: " + ", ".join(map(str, strangers[:12]))
+            f"the places suit a skin {1 / placement.scale:.2f} times as large as described; correct"
+            " their unit or the description; the model follows the places"
         )
+    if len(strangers):
+        notes.append(stranger_note(strangers))
     return {
         "presses": len(presses),
         "error_mm": {

@@ -14,17 +14,16 @@ taken only where it is better by more than chance.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, exp, log, radians, sin
+from math import exp, log
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import ProtocolError
-from eitskin.fem.grid import Grid, between_pixels, grid_for
-from eitskin.model.force_law import LoadLaw, monomials
+from eitskin.fem.grid import between_pixels, grid_for
+from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
-from eitskin.skin.outline import polygon
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.teaching.checks import check_presses
 from eitskin.teaching.fit import (
@@ -36,12 +35,15 @@ from eitskin.teaching.fit import (
     suiting_amplitudes,
     whitening_of,
 )
-from eitskin.teaching.kernel import Kernel, Placement
+from eitskin.teaching.kernel import Kernel
 from eitskin.teaching.known import Known, known_of
+from eitskin.teaching.left_out import stranger_note
 from eitskin.teaching.make import taught_model
+from eitskin.teaching.move import UNMOVED, Move
 from eitskin.teaching.presses import Presses
 from eitskin.teaching.process import Prior, condition
 from eitskin.teaching.teach import (
+    MIRROR_GAIN,
     PIXELS_ACROSS,
     Progress,
     known_size,
@@ -57,32 +59,10 @@ START_TURNS, REFINED_STARTS = 36, 4
 SHIFT_SD = 0.03  # of the skin's width
 ROUNDS = 3
 MAX_FOLDS = 10
+STRANGE = 6.0  # times the median misfit: no press like the others
 BETTER_BY = 1.0  # standard errors of the mean logarithm of two errors' ratio
 ERROR_FLOOR = 0.01  # of the skin's width: errors below are alike
 STILL_POOR = 3.0  # times the error of the model when it was taught
-
-
-@dataclass(frozen=True)
-class Move:
-    """From new places to old ones: turned by ``turn_deg`` counterclockwise about the skin's
-    middle, then shifted."""
-
-    turn_deg: float = 0.0
-    shift_mm: tuple[float, float] = (0.0, 0.0)
-
-    def to_old(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
-        """Places (n, 2) as the old model has them."""
-        return np.asarray((place_mm - centre_mm) @ self._turn.T + centre_mm + self.shift_mm)
-
-    def to_new(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
-        """Old places (n, 2) as they are now."""
-        away = place_mm - np.add(centre_mm, self.shift_mm)
-        return np.asarray(away @ self._turn + centre_mm)
-
-    @property
-    def _turn(self) -> FloatArray:
-        c, s = cos(radians(self.turn_deg)), sin(radians(self.turn_deg))
-        return np.array([[c, -s], [s, c]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +70,7 @@ class Deviation(Kernel):
     """The kernel of gamma and delta: ``features``, the own-row term, are the ``old`` answers."""
 
     old: Prior | None = None
-    move: Move = Move()
+    move: Move = UNMOVED
 
     def features(self, place_mm: FloatArray) -> FloatArray:
         """The old answer (n, m) at new places (n, 2)."""
@@ -145,19 +125,22 @@ def update(
         )
     skin = model.skin if "skin" in model.meta else None
     check_presses(presses, skin)
-    session = _session(old, skin, presses)
+    session, mirrored = _mirrored_or_not(_session(old, skin, presses), presses)
     found = {how: adapted(session, presses, how) for how in progress((MOVED, FULL), "candidates")}
     errors = held_out_errors(model, session, presses, found, progress)
     chosen = choice(errors, ERROR_FLOOR * session.width_mm)
     before = float(model.meta["teach"].get("error_mm", {}).get("held_out_median", np.inf))
-    notes = []
+    strangers = _strangers(session, found[MOVED])
+    notes = [stranger_note(strangers)] if len(strangers) else []
+    if mirrored and chosen != KEPT:
+        notes.append("the new places are mirrored against the old; the model follows the new ones")
     medians = {how: float(np.median(one)) for how, one in errors.items()}
     if medians[chosen] > STILL_POOR * max(before, ERROR_FLOOR * session.width_mm):
         notes.append(
             f"presses held out are still off by {medians[chosen]:.1f} mm; look at the electrodes,"
             " then teach again with 50 presses"
         )
-    move = Move() if chosen == KEPT else _move(found[chosen])
+    move = UNMOVED if chosen == KEPT else _move(found[chosen])
     report: dict[str, Any] = {
         "presses": old.presses + (0 if chosen == KEPT else len(presses)),
         "error_mm": {
@@ -177,12 +160,11 @@ def update(
         return Updated(model, chosen, move, report)
     meta = {**model.meta, "teach": {"lambda_rel": model.defaults.lambda_rel, **report}}
     if skin is not None:
-        seen = moved_skin(skin, move)
+        seen = move.skin(skin)
         meta["skin"] = skin_to_table(seen)
         grid = grid_for(seen.outline, PIXELS_ACROSS)
     else:
-        middle = move.to_new(np.array([session.kernel.centre_mm]), session.kernel.centre_mm)[0]
-        grid = shifted_grid(model.grid, middle - session.kernel.centre_mm)
+        grid = move.grid(model.grid, session.kernel.centre_mm)
     new = taught_model(
         found[chosen], presses.protocol, grid, presses.untouched, model.defaults.lambda_rel, meta
     )
@@ -199,6 +181,20 @@ def _session(old: Known, skin: Skin | None, presses: Presses) -> Session:
         old=between_pixels(old.grid, old.answer / unit),
     )  # fmt: skip
     return Session(old, kernel, width_mm, unit)
+
+
+def _mirrored_or_not(session: Session, presses: Presses) -> tuple[Session, bool]:
+    """``session``, mirrored where that is far more likely."""
+    other = replace(session, kernel=replace(session.kernel, move=Move(mirrored=True)))
+    plain, turned = (adapted(one, presses, MOVED).log_likelihood for one in (session, other))
+    return (other, True) if turned > plain + MIRROR_GAIN else (session, False)
+
+
+def _strangers(session: Session, learned: Learned) -> npt.NDArray[np.int64]:
+    """Presses that the others and the old noise do not explain; new noise would hide them."""
+    white = whitening_of(session.old.noise / session.unit / session.unit[:, None])
+    misfit = np.sum((learned.process.left_out() @ white.T) ** 2, axis=1)
+    return np.flatnonzero(misfit > STRANGE * np.median(misfit))
 
 
 def _move(learned: Learned) -> Move:
@@ -262,7 +258,8 @@ def likeliest(
     def at(numbers: FloatArray) -> Deviation:
         turn, x, y, noise, own = np.concatenate([numbers, fixed[free:]]).tolist()
         noise, own = (min(max(one, -LOG_BOUND), LOG_BOUND) for one in (noise, own))
-        return replace(session.kernel, move=Move(turn, (x, y)), noise=exp(noise), own=exp(own))
+        move = replace(session.kernel.move, turn_deg=turn, shift_mm=(x, y))
+        return replace(session.kernel, move=move, noise=exp(noise), own=exp(own))
 
     def cost(numbers: FloatArray) -> float:
         kernel = at(numbers)
@@ -310,11 +307,10 @@ def held_out_errors(
         for how, learned in found.items():
             assert isinstance(learned.kernel, Deviation)
             less = adapted(session, known, how, learned.kernel)
-            middle = _move(less).to_new(np.zeros((1, 2)), (0.0, 0.0))[0]
+            grid = _move(less).grid(model.grid, session.kernel.centre_mm)
             tried = taught_model(
-                less, presses.protocol, shifted_grid(model.grid, middle), known.untouched,
-                model.defaults.lambda_rel,
-            )  # fmt: skip
+                less, presses.protocol, grid, known.untouched, model.defaults.lambda_rel
+            )
             out = np.flatnonzero(fold == k)
             errors[how][out] = solve_presses(tried, presses.take(out))[0]
     return errors
@@ -330,33 +326,13 @@ def choice(errors: dict[str, FloatArray], floor_mm: float) -> str:
     return chosen
 
 
-def moved_skin(skin: Skin, move: Move) -> Skin:
-    """The skin in the new presses' coordinates."""
-    turned = Placement(move.turn_deg).skin_in_places(skin)
-    x, y = move.to_new(np.array([skin.outline.centre_mm]), skin.outline.centre_mm)[0]
-    dx, dy = x - skin.outline.centre_mm[0], y - skin.outline.centre_mm[1]
-    corners = [(px + dx, py + dy) for px, py in turned.outline.vertices_mm]
-    return replace(turned, outline=polygon(corners))
-
-
-def shifted_grid(grid: Grid, by_mm: FloatArray) -> Grid:
-    """``grid`` with its origin moved."""
-    x, y = np.add(grid.origin_mm, by_mm).tolist()
-    return replace(grid, origin_mm=(x, y))
-
-
 def _law(old: Model, new: Model, move: Move, session: Session, presses: Presses) -> LoadLaw | None:
     """The old law of force where the skin is now, its strengths in the new model's scale: that of
     presses whose size is known."""
-    law = old.load
-    if law is None:
-        return None
-    at = new.grid.centres_mm()
-    gains = law.gains_at(move.to_old(at, session.kernel.centre_mm))
-    u, v = at.T / law.radius_mm
-    terms = monomials(u, v, law.order)
-    law = replace(law, gain=np.linalg.lstsq(terms, gains, rcond=None)[0].astype(np.float32))
     given = known_size(presses)
+    if old.load is None:
+        return None
+    law = move.law(old.load, new.grid, session.kernel.centre_mm)
     if given is None:
         return law
     strength = solve_presses(new, presses)[2]

@@ -37,11 +37,7 @@ def test_what_cannot_be_presses_is_refused(tmp_path: Path) -> None:
         "place_mm": some().place_mm,
         "drive_measure": opposite(8).drive_measure,
     }
-    holed = arrays["pressed"].copy()
-    holed[1, 4] = np.nan
     for change, words in (
-        ({"untouched": None}, "just before it"),
-        ({"pressed": holed}, "press 1 .* leave those presses out"),
         ({"place_mm": np.zeros((2, 2))}, "shape"),
         ({"place_mm": np.full((3, 2), np.inf)}, "give it in mm"),
         ({"depth_mm": np.full(3, -1.0)}, "depth_mm must be"),

@@ -9,20 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from simulated_presses import RADIUS_MM, SKIN, TRUE, presses
 
 from eitskin.cli.main import main
-from eitskin.errors import EitskinError, ModelError, ProtocolError
 from eitskin.model.eitm import decode_model, encode_model, load_model, save_model
 from eitskin.model.model import Model
-from eitskin.model.prebuilt import load_prebuilt
-from eitskin.skin.protocol import adjacent
 from eitskin.teaching.kernel import Placement
 from eitskin.teaching.known import known_of
 from eitskin.teaching.presses import Presses, save_presses
 from eitskin.teaching.still import FITS, TEACH_AGAIN, UPDATE, still_fits
 from eitskin.teaching.teach import Taught, solve_presses, teach
 from eitskin.teaching.update import FULL, KEPT, MOVED, choice, update
+from simulated_presses import RADIUS_MM, SKIN, TRUE, presses
 
 REMOUNTED: dict[str, Any] = {
     "placement": Placement(TRUE.turn_deg + 130, TRUE.scale),
@@ -129,19 +126,15 @@ def test_check_and_update_at_the_command_line(
     assert "fits" in capsys.readouterr().out
 
 
-def test_what_cannot_be_updated_or_checked_is_refused(model: Model) -> None:
-    some = presses(12)
-    physics = load_prebuilt()[0]
-    other = replace(some, protocol=adjacent(8), **{
-        name: np.zeros((12, adjacent(8).n_rows)) + getattr(some, name)[:, :1]
-        for name in ("untouched", "pressed")
-    })  # fmt: skip
-    wrong: tuple[tuple[Model, Presses, type[EitskinError], str], ...] = (
-        (physics, some, ModelError, "make one with  eitskin teach fit"),
-        (model, other, ProtocolError, "another protocol"),
-    )
-    for one, given, kind, words in wrong:
-        with pytest.raises(kind, match=words):
-            update(one, given)
-        with pytest.raises(kind, match=words):
-            still_fits(one, given.untouched, given.protocol)
+def test_mirrored_and_strange_presses_are_told(model: Model) -> None:
+    some = presses(12, seed=4)
+    pressed = some.pressed.copy()
+    pressed[7] += some.difference[2]
+    odd = replace(some, pressed=pressed, place_mm=some.place_mm * (1, -1))
+    updated = update(model, odd)
+    notes = " ".join(updated.report["notes"])
+    assert updated.move.mirrored and "the new places are mirrored" in notes
+    assert "wrong place); leave them out or record them again: 7" in notes
+    judged = presses(40, seed=9)
+    judged = replace(judged, place_mm=judged.place_mm * (1, -1))
+    assert median_error(updated.model, judged) < 0.03 * RADIUS_MM < median_error(model, judged)

@@ -1,0 +1,64 @@
+"""Where a skin went when it was remounted, and what goes with it: outline and electrodes, grid, the
+law of force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.fem.grid import Grid
+from eitskin.model.force_law import LoadLaw, monomials
+from eitskin.skin.outline import polygon
+from eitskin.skin.skin import Skin
+from eitskin.teaching.kernel import Placement, rotation
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Move:
+    """From new places to old ones: mirrored in y, turned by ``turn_deg`` counterclockwise about the
+    skin's middle, then shifted."""
+
+    turn_deg: float = 0.0
+    shift_mm: tuple[float, float] = (0.0, 0.0)
+    mirrored: bool = False
+
+    @property
+    def _placement(self) -> Placement:
+        return Placement(self.turn_deg, mirrored=self.mirrored)
+
+    def to_old(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
+        """Places (n, 2) as the old model has them."""
+        return self._placement.to_skin(place_mm, centre_mm) + self.shift_mm
+
+    def to_new(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
+        """Old places (n, 2) as they are now."""
+        away = (place_mm - np.add(centre_mm, self.shift_mm)) @ rotation(self.turn_deg)
+        return np.asarray(away * (1, -1 if self.mirrored else 1) + centre_mm)
+
+    def skin(self, skin: Skin) -> Skin:
+        """``skin`` in the new coordinates."""
+        turned, centre = self._placement.skin_in_places(skin), skin.outline.centre_mm
+        dx, dy = (self.to_new(np.array([centre]), centre)[0] - centre).tolist()
+        corners = [(x + dx, y + dy) for x, y in turned.outline.vertices_mm]
+        return replace(turned, outline=polygon(corners))
+
+    def grid(self, grid: Grid, centre_mm: tuple[float, float]) -> Grid:
+        """``grid`` shifted with the skin, not turned."""
+        middle = self.to_new(np.array([centre_mm]), centre_mm)[0] - centre_mm
+        x, y = (grid.origin_mm + middle).tolist()
+        return replace(grid, origin_mm=(x, y))
+
+    def law(self, law: LoadLaw, grid: Grid, centre_mm: tuple[float, float]) -> LoadLaw:
+        """``law`` where the skin is now, on ``grid``."""
+        at = grid.centres_mm()
+        u, v = at.T / law.radius_mm
+        gains = law.gains_at(self.to_old(at, centre_mm))
+        found = np.linalg.lstsq(monomials(u, v, law.order), gains, rcond=None)[0]
+        return replace(law, gain=found.astype(np.float32))
+
+
+UNMOVED = Move()
