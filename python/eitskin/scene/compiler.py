@@ -17,10 +17,12 @@ import numpy.typing as npt
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.scene.cover import Cover
+from eitskin.scene.deformation import FLAT, Deformation, one_after_another
 from eitskin.scene.description import Scene
 from eitskin.scene.effect import (
     Contacts,
     ContactStep,
+    DeformationStep,
     LoadedStep,
     Loads,
     MaterialStep,
@@ -57,6 +59,7 @@ class State:
     change: Change
     contacts: Contacts
     frame: int
+    deformation: Deformation = FLAT
 
 
 class States:
@@ -66,6 +69,7 @@ class States:
     def __init__(self, scene: Scene, cover: Cover, steps: Sequence[Step], frames: range) -> None:
         self._scene, self._cover, self._frames = scene, cover, frames
         self._varying = [s for s in steps if isinstance(s, MaterialStep) and s.varies]
+        self._deforming = [s for s in steps if isinstance(s, DeformationStep)]
         self._contacts = _contacts(scene, steps, frames)
         self._changes: dict[tuple[TrueTouch, ...], Change] = {(): NO_CHANGE}
         self._number: dict[Any, int] = {}
@@ -80,10 +84,12 @@ class States:
         sheet = tuple(
             float(frame) if s.same is None else s.same(time_s, frame) for s in self._varying
         )
-        key = (touches, contact_key(contact), sheet)
+        deformation = one_after_another(s.apply(time_s, frame) for s in self._deforming)
+        key = (touches, contact_key(contact), sheet, deformation)
         if key not in self._number:
             self._number[key] = len(self.all)
-            self.all.append(State(touches, self.change(touches), contact, frame))
+            change = self.change(touches)
+            self.all.append(State(touches, change, contact, frame, deformation))
         return self._number[key]
 
     def change(self, touches: tuple[TrueTouch, ...]) -> Change:
@@ -419,7 +425,10 @@ def _choose_method(
     that decided it."""
     nothing = np.zeros(0, np.int64)
     varying = [
-        step.name for step in steps if isinstance(step, MaterialStep | ContactStep) and step.varies
+        step.name
+        for step in steps
+        if isinstance(step, DeformationStep)
+        or (isinstance(step, MaterialStep | ContactStep) and step.varies)
     ]
     if varying and scene.solver == "update":
         raise ConfigError(

@@ -37,6 +37,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.fem.mesh import Mesh
+from eitskin.scene.deformation import Deformation
 from eitskin.skin.protocol import Protocol as ScanProtocol
 from eitskin.skin.skin import Skin
 
@@ -184,6 +185,18 @@ class MaterialStep:
 
 
 @dataclass(frozen=True, eq=False)
+class DeformationStep:
+    """``apply(time_s, frame) -> Deformation`` of sheet and electrodes, one upon another. Frames
+    that are deformed alike share a solve."""
+
+    name: str
+    cost: EffectCost
+    note: str
+    apply: Callable[[float, int], Deformation]
+    stage: Stage = Stage.MATERIAL
+
+
+@dataclass(frozen=True, eq=False)
 class ContactStep:
     """``apply(contacts, time_s, frame) -> Contacts``; applied once unless it ``varies``."""
 
@@ -238,7 +251,15 @@ class VoltageStep:
     apply: Callable[[Voltages, float, int], Voltages]
 
 
-Step: TypeAlias = GeometryStep | MaterialStep | ContactStep | PhaseStep | LoadedStep | VoltageStep
+Step: TypeAlias = (
+    GeometryStep
+    | MaterialStep
+    | DeformationStep
+    | ContactStep
+    | PhaseStep
+    | LoadedStep
+    | VoltageStep
+)
 
 
 @runtime_checkable

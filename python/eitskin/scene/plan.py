@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from eitskin.scene.effect import (
     ContactStep,
+    DeformationStep,
     EffectCost,
     GeometryStep,
     MaterialStep,
@@ -179,11 +180,11 @@ def make_plan(
     def of(*kind: type) -> list[PlanStep]:
         return [line for line in own if isinstance(kinds[line], kind)]
 
-    before = of(GeometryStep, MaterialStep, ContactStep, PhaseStep)
+    before = of(GeometryStep, DeformationStep, MaterialStep, ContactStep, PhaseStep)
     lines = [
         *of(GeometryStep),
         *base,
-        *of(MaterialStep),
+        *of(DeformationStep, MaterialStep),
         *touches,
         *of(ContactStep, PhaseStep),
         *forward,

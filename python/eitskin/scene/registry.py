@@ -26,6 +26,9 @@ BUILT_IN: dict[str, str] = {
     for name in (
         "out_of_round",
         "misplacement",
+        "stretch",
+        "bend",
+        "creep",
         "gel_drying",
         "temperature",
         "background",

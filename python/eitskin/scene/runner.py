@@ -15,6 +15,7 @@ from eitskin import __version__
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
 from eitskin.scene.compiler import Compiled, State, background_of, compile_scene, used_in
+from eitskin.scene.deformation import FLAT, Deformation, deformed
 from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import Factorise, FactoriseComplex, Forward, Update, Work
 from eitskin.scene.motion import Mix
@@ -59,6 +60,7 @@ class FrameMaker:
     def __init__(self, compiled: Compiled) -> None:
         self.compiled, self.work = compiled, Work()
         self._forward, self._background = forward_of(compiled, self.work), background_of(compiled)
+        self._last: tuple[Deformation, Forward] | None = None
         self._read = _reader(compiled)
         self._times = compiled.times_s()
         states = compiled.states
@@ -68,11 +70,23 @@ class FrameMaker:
         """State ``number``'s voltages before excitation, front end and converter."""
         if number not in self._readings:
             state = self.compiled.table.all[number]
-            solved = self._forward.electrodes(
-                self._background(state), state.change, solved_impedance(state.contacts)
+            forward, thickness = self._forward, state.deformation.thickness
+            if state.deformation != FLAT:
+                forward = self._deformed(state.deformation)
+            solved = forward.electrodes(
+                self._background(state) * thickness,
+                state.change,
+                solved_impedance(state.contacts) / thickness,
             )
             self._readings[number] = self._read(solved, state)
         return self._readings[number]
+
+    def _deformed(self, how: Deformation) -> Forward:
+        """The forward step of a deformed skin; the last one is kept."""
+        if self._last is None or self._last[0] != how:
+            model = deformed(self.compiled.model, how)
+            self._last = how, forward_of(replace(self.compiled, model=model), self.work)
+        return self._last[1]
 
     def frame(self, frame: int, row_times_s: FloatArray | None = None) -> FloatArray:
         """Frame number ``frame`` of all frames, quiet ones first: (m,) in V. Its rows are those of

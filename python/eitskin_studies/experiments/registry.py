@@ -38,6 +38,9 @@ EXPERIMENTS = {
         "a model taught from presses at known places on a measured skin, with every baseline on the"
         " same splits"
     ),
+    "deformation": (
+        "a skin stretched and bent, by the flat one's model, before and after a fresh tare"
+    ),
     "levers": (
         "what was tried to do better, each for itself: what helps for its MACs, and what does not"
     ),

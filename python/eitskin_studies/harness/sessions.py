@@ -145,7 +145,8 @@ class SceneSolver:
     folder: Path | None = None
 
     @cached_property
-    def _mesh(self) -> Mesh:
+    def mesh(self) -> Mesh:
+        """The mesh, made when it is first asked for."""
         from eitskin.fem.mesh import mesh_for_elements
 
         return mesh_for_elements(self.skin, self.elements)
@@ -200,7 +201,7 @@ class SceneSolver:
         self, name: str, drawn: TouchSet, progress: Progress, drift: Drift | None
     ) -> FloatArray:
         """The quiet frame, then one a scene: (1 + k, m)."""
-        mesh, skin, sheet, seed = self._mesh, self.skin, self.skin.conductivity_s_per_m, drawn.seed
+        mesh, skin, sheet, seed = self.mesh, self.skin, self.skin.conductivity_s_per_m, drawn.seed
         spread = (
             stream(seed, f"contact {drawn.role}").uniform(-1.0, 1.0, skin.electrodes.count)
             * Measurement.contact_spread

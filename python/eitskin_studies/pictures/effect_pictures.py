@@ -44,6 +44,9 @@ PRESS = {"x_mm": 30.0, "y_mm": 20.0, "radius_mm": 12.0}
 SHOWN: dict[str, dict[str, Any]] = {
     "out_of_round": {"spread": 0.05},
     "misplacement": {"spread_mm": 6.0},
+    "stretch": {"strain": 0.1, "at_s": 0.5, "rise_s": 1.0},
+    "bend": {"radius_mm": 100.0},
+    "creep": {"strain": 0.05, "time_constant_s": 0.5, "until_s": 1.0},
     "background": {"spread": 0.2, "length_mm": 25.0},
     "temperature": {"offset_k": 2.0, "drift_k_per_min": 0.5},
     "gel_drying": {"time_constant_h": 0.01, "final_water": 0.5},

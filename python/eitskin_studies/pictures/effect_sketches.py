@@ -104,6 +104,50 @@ def out_of_round(axes: Axes, session: EffectSession, parameters: Any) -> None:
     axes.set(xlabel="x (mm)", ylabel="y (mm)", title="the outline")
 
 
+def stretch(axes: Axes, session: EffectSession, parameters: Any) -> None:
+    """Rim and electrodes, flat and stretched."""
+    from eitskin.scene.deformation import FLAT
+    from eitskin.scene.effects.stretch import make
+
+    skin, whole_s = session.skin, parameters.at_s + parameters.rise_s
+    pulled = make(parameters, session).apply(whole_s, 0)
+    rim = skin.outline.points_at(np.linspace(0, skin.outline.perimeter_mm, 361))
+    for how, colour, label in ((FLAT, LIGHT, "flat"), (pulled, STRONG, "stretched")):
+        axes.plot(*(rim @ how.matrix.T).T, color=colour, label=label)
+        axes.plot(*(skin.electrode_centres_mm() @ how.matrix.T).T, "s", color=colour, ms=4)
+    axes.set_aspect("equal")
+    axes.legend(loc="center", frameon=False)
+    title = f"by {100 * parameters.strain:g} %, electrodes with it"
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=title)
+
+
+def bend(axes: Axes, session: EffectSession, parameters: Any) -> None:
+    """The lengthening that it acts like, by radius, about the lower face and about the middle."""
+    from dataclasses import replace
+
+    from eitskin.scene.effects.bend import lengthening
+
+    radii = np.geomspace(50, 1000, 60)
+    for neutral, colour, label in ((0.0, STRONG, "lower face"), (0.5, ELECTRODE, "middle")):
+        shown = [
+            100 * (lengthening(replace(parameters, radius_mm=float(r), neutral=neutral), 12, 1) - 1)
+            for r in radii
+        ]
+        axes.semilogx(radii, shown, color=colour, label=f"neutral layer: {label}")
+    axes.legend(frameon=False)
+    title = "acts as a stretch between held sides"
+    axes.set(xlabel="radius (mm)", ylabel="lengthening (%)", title=title)
+
+
+def creep(axes: Axes, session: EffectSession, parameters: Any) -> None:
+    """Strain against time."""
+    from eitskin.scene.effects.creep import strain_at
+
+    times = np.linspace(-0.5, 3, 400)
+    axes.plot(times, [100 * strain_at(float(t), parameters) for t in times], color=STRONG)
+    axes.set(xlabel="time (s)", ylabel="strain (%)", title="pulled, then let go")
+
+
 def sheet_change(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The whole change on the mesh."""
     from eitskin.scene.effects.sheet_change import make
@@ -362,7 +406,8 @@ def jitter(axes: Axes, session: EffectSession, parameters: Any) -> None:
 SKETCHES: dict[str, Callable[[Any, EffectSession, Any], None]] = {
     sketch.__name__: sketch
     for sketch in (
-        out_of_round, misplacement, background, temperature, gel_drying, sheet_change,
+        out_of_round, misplacement, stretch, bend, creep,
+        background, temperature, gel_drying, sheet_change,
         contact_impedance, detached, bridged,
         phase,
         source_impedance, amplitude_drift, crosstalk, mux, charge_injection, mains, common_mode,

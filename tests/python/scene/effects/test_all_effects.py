@@ -26,6 +26,9 @@ BENCH = MeshCache()  # keeps the meshes
 STRONG: dict[str, dict[str, Any]] = {
     "out_of_round": {"spread": 0.05},
     "misplacement": {"spread_mm": 4.0},
+    "stretch": {"strain": 0.2, "direction_deg": 30.0},
+    "bend": {"radius_mm": 50.0},
+    "creep": {"strain": 0.1, "time_constant_s": 0.05},
     "background": {"spread": 0.4},
     "temperature": {"offset_k": 5.0, "drift_k_per_min": 10.0},
     "gel_drying": {"time_constant_h": 0.001},
@@ -53,7 +56,7 @@ STRONG: dict[str, dict[str, Any]] = {
 # load, potentials or chance.
 KEEP = {
     "misplacement", "background", "temperature", "gel_drying", "contact_impedance", "detached",
-    "bridged", "phase", "out_of_round", "sheet_change",
+    "bridged", "phase", "out_of_round", "sheet_change", "stretch", "bend", "creep",
     "amplitude_drift", "saturation", "adc",
 }  # fmt: skip
 RANDOM = {

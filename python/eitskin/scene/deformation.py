@@ -1,0 +1,66 @@
+"""A sheet that is deformed evenly, with its electrodes, while its volume stays.
+
+Touches, truth and pictures stay in the flat skin's coordinates: they move with the material. The
+forward problem is solved on the deformed mesh. A gel's resistivity is that of its salt water and
+does not change (Keplinger et al., Science 341, 2013); its lengths and thickness do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import cos, radians, sin
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.fem.cem import ForwardModel
+from eitskin.fem.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Deformation:
+    """A place (x, y) comes to (xx x + xy y, yx x + yy y); the volume is kept."""
+
+    xx: float = 1.0
+    xy: float = 0.0
+    yx: float = 0.0
+    yy: float = 1.0
+
+    @property
+    def matrix(self) -> npt.NDArray[np.float64]:
+        """As (2, 2), to multiply a column (x, y) by."""
+        return np.array([[self.xx, self.xy], [self.yx, self.yy]])
+
+    @property
+    def thickness(self) -> float:
+        """The thickness, relative to the flat sheet's."""
+        return 1 / (self.xx * self.yy - self.xy * self.yx)
+
+
+FLAT = Deformation()
+
+
+def one_after_another(steps: Iterable[Deformation]) -> Deformation:
+    """All of ``steps``, the first first."""
+    whole = np.eye(2)
+    for step in steps:
+        whole = step.matrix @ whole
+    return Deformation(*whole.ravel().tolist())
+
+
+def stretched(along: float, across: float, direction_deg: float) -> Deformation:
+    """Lengths times ``along`` in a direction and times ``across`` at right angles to it."""
+    c, s = cos(radians(direction_deg)), sin(radians(direction_deg))
+    slant = (along - across) * c * s
+    return Deformation(along * c * c + across * s * s, slant, slant, along * s * s + across * c * c)
+
+
+def deformed(model: ForwardModel, how: Deformation) -> ForwardModel:
+    """``model`` on the deformed mesh; conductivities are then multiplied by ``how.thickness``, and
+    contact impedances divided by it."""
+    mesh = model.mesh
+    moved = Mesh(mesh.nodes_mm @ how.matrix.T, mesh.triangles, mesh.electrode_edges)
+    other = ForwardModel(moved, model.skin, model.protocol)
+    other.patterns, other.counters = model.patterns, model.counters
+    return other

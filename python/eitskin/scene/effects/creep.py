@@ -1,0 +1,66 @@
+"""A skin that gives way under a pull that stays, and comes back slowly when it is let go.
+
+A standard linear solid (a spring beside a damper, in line with a spring; Findley, Lai and Onaran,
+Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976): under a constant pull from ``at_s``
+on
+
+    strain(t) = strain (1 + creep (1 - exp(-(t - at) / tau))),
+
+and after ``until_s`` the elastic part is gone at once and the crept part decays with tau. What the
+strain does to sheet and electrodes is as of ``stretch``, with free sides. A tare just after the
+release is wrong for some tau.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp
+
+from eitskin.scene.deformation import Deformation, stretched
+from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage
+from eitskin.scene.parameter import parameter
+
+NAME = "creep"
+STAGE = Stage.MATERIAL
+ORDER = 6
+SUMMARY = "The skin gives way under a pull that stays, and comes back slowly."
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """How far at once, how much more, how slowly, when."""
+
+    strain: float = parameter(0.05, "1", "length gained at once / length", low=-0.2, high=0.5)
+    creep: float = parameter(0.3, "1", "crept in the end / gained at once", low=0, high=2)
+    time_constant_s: float = parameter(
+        60.0, "s", "in which 63 % of the creep happens", low=0, open_low=True
+    )
+    direction_deg: float = parameter(0.0, "deg", "of the pull, from the x axis")
+    at_s: float = parameter(0.0, "s", "when the pull begins")
+    until_s: float | None = parameter(None, "s", "when it ends; without it, never")
+
+
+def strain_at(time_s: float, parameters: Parameters) -> float:
+    """The strain at ``time_s``."""
+    end = float("inf") if parameters.until_s is None else parameters.until_s
+    tau, most = parameters.time_constant_s, parameters.strain * parameters.creep
+    if time_s < parameters.at_s or end <= parameters.at_s:
+        return 0.0
+    crept = most * (1 - exp(-(min(time_s, end) - parameters.at_s) / tau))
+    if time_s < end:
+        return parameters.strain + crept
+    return crept * exp(-(time_s - end) / tau)
+
+
+def make(parameters: Parameters, session: EffectSession) -> DeformationStep:
+    """A solve for each frame while it creeps."""
+
+    def apply(time_s: float, frame: int) -> Deformation:
+        along = 1 + strain_at(time_s, parameters)
+        return stretched(along, along**-0.5, parameters.direction_deg)
+
+    note = (
+        f"{100 * parameters.strain:g} % at once and {100 * parameters.creep:g} % of that more with"
+        f" {parameters.time_constant_s:g} s, from {parameters.at_s:g} s on"
+    )
+    return DeformationStep(NAME, EffectCost(factorisations_per_frame=1), note, apply)

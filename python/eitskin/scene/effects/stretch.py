@@ -1,0 +1,46 @@
+"""A skin that is pulled lengthwise after the tare: sheet and electrodes deform together.
+
+Lengths along the pull become 1 + strain; the volume stays, so that a free sheet gets narrower and
+thinner by 1 / sqrt(1 + strain) each, and one held at its sides thinner only. The resistivity of a
+gel stays (Keplinger et al., Science 341, 2013), so a free strip's resistance goes with the square
+of its length. Touches stay on the material that they are on. To tare the stretched skin, let it
+begin before the quiet frames (``at_s`` of -1000).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from eitskin.scene.change import part_at
+from eitskin.scene.deformation import Deformation, stretched
+from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage
+from eitskin.scene.parameter import parameter
+
+NAME = "stretch"
+STAGE = Stage.MATERIAL
+ORDER = 2
+SUMMARY = "The skin is pulled lengthwise, electrodes with it."
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """How far, which way, when."""
+
+    strain: float = parameter(0.1, "1", "length gained / length", low=-0.3, high=1.0)
+    direction_deg: float = parameter(0.0, "deg", "of the pull, from the x axis")
+    sides: str = parameter("free", "", "whether the sides may come in", choices=("free", "held"))
+    at_s: float = parameter(0.0, "s", "when it begins")
+    rise_s: float = parameter(0.0, "s", "time until it is whole; 0: at once", low=0)
+
+
+def make(parameters: Parameters, session: EffectSession) -> DeformationStep:
+    """The strain rises evenly; frames with the same strain share a solve."""
+
+    def apply(time_s: float, frame: int) -> Deformation:
+        along = 1 + parameters.strain * part_at(time_s, parameters.at_s, parameters.rise_s)
+        across = along**-0.5 if parameters.sides == "free" else 1.0
+        return stretched(along, across, parameters.direction_deg)
+
+    states = {apply(float(t), k) for k, t in enumerate(session.times_s())}
+    note = f"{100 * parameters.strain:g} % from {parameters.at_s:g} s on, sides {parameters.sides}"
+    return DeformationStep(NAME, EffectCost(factorisations=len(states)), note, apply)
