@@ -156,7 +156,7 @@ def check(
                 raise UsageError(f"--threads {how.threads}: {reason}; use --threads 1")
     if how.target is not None and how.engine != "c":
         raise UsageError(
-            "--budget and --accuracy are of the C core in float32; leave  --engine"
+            "--preset, --budget and --accuracy are of the C core in float32; leave  --engine"
             f" {how.engine}  out"
         )
     refuse_unwritable(output, picture, film)

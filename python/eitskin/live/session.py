@@ -332,7 +332,7 @@ class Session:
         if self.replays:
             return
         self._look_on()
-        self.solver = set_up(self.device, how.scan, self._solver_settings(), self.known)
+        self.solver = set_up(self.device, *self._scan_and_solver(), self.known)
         if how.record is not None:
             from eitskin.device.recordings.recording import Recorder
 
@@ -380,35 +380,35 @@ class Session:
         if not simulated:
             self._say("touch it")
 
-    def _solver_settings(self) -> SolverSettings:
+    def _scan_and_solver(self) -> tuple[ScanSettings, SolverSettings]:
         """As named; with a target those of the measured point that it chooses."""
-        named, target = self.settings.solver, self.settings.target
+        scan, named, target = self.settings.scan, self.settings.solver, self.settings.target
         if target is None:
-            return named
+            return scan, named
         from eitskin.tuning.for_model import chosen_point, settings_text
-        from eitskin.tuning.front import board_takes
+        from eitskin.tuning.front import REPORT_US, board_takes
 
         known = self.known
         if known is None:
             known = need_model(self.device.board, self.settings.model, self.name, "a budget")
-        point = chosen_point(
-            target, known.model, named.applied(known.model, self.device.board), board_takes()
-        )
+        any_scan = target.unit == REPORT_US
+        now = named.applied(known.model, self.device.board)
+        point = chosen_point(target, known.model, now, board_takes(), any_scan)
         self._say(settings_text(point, target.board))
-        kept = {
-            name: value
-            for name, value in point.configuration.solver_settings.items()
-            if name in board_takes()
-        }
+        one = point.configuration
+        kept = {k: value for k, value in one.solver_settings.items() if k in board_takes()}
         own = {key: getattr(named, key) for key in ("sign", "warm_start", "diagnostics", "track")}
-        return replace(SolverSettings(**kept), **own)
+        if any_scan:
+            check_every = 1 if one.scan == "full" else 0
+            scan = replace(scan, samples=one.samples, check_every=check_every)
+        return scan, replace(SolverSettings(**kept), **own)
 
     def _refuse_settings(self) -> None:
         """A recording takes no settings."""
         how = self.settings
         named: dict[str, Any] = {**how.scan.named, **how.solver.named}
         if how.target is not None:
-            named["budget or accuracy"] = True
+            named["preset, budget or accuracy"] = True
         if named or how.tare is not None:
             what = next(iter(named), "tare").replace("_", "-")
             raise UsageError(

@@ -13,11 +13,15 @@ from eitskin.tuning.front import Conditions, Point, Target, choose, load_front
 
 
 def chosen_point(
-    target: Target, model: Model, now: Options, settable: set[str] | None = None
+    target: Target,
+    model: Model,
+    now: Options,
+    settable: set[str] | None = None,
+    any_scan: bool = False,
 ) -> Point:
     """The measured point that fulfils ``target`` with ``model``: of its rank, grid, storage and
-    reduction, scanned fully with 80 samples, and with no other settings than ``now`` but those in
-    ``settable`` (None: any).
+    reduction, with no other settings than ``now`` but those in ``settable`` (None: any), and
+    scanned fully with 80 samples unless ``any_scan``.
 
     Raises:
         UsageError: there is none, or none that does what is asked for.
@@ -34,15 +38,15 @@ def chosen_point(
         }
         if (
             _is_of(one, point, model)
-            and (one.samples, one.scan) == (usual.samples, usual.scan)
+            and (any_scan or (one.samples, one.scan) == (usual.samples, usual.scan))
             and one.warm_start == now.warm_start
             and (settable is None or other <= settable)
         ):
             points.append(point)
     if not points:
         raise UsageError(
-            f"--budget and --accuracy: no measured point has this model's rank {model.rank},"
-            f" {model.grid.n_pixels} pixels in"
+            "--preset, --budget and --accuracy: no measured point has this model's rank"
+            f" {model.rank}, {model.grid.n_pixels} pixels in"
             f" {model.stored.storage}{' and starts warm' if now.warm_start else ''}; make a model"
             " of one by  eitskin recommend -o MODEL.eitm"
         )
@@ -87,6 +91,8 @@ def settings_text(point: Point, board: str) -> str:
     )
     text += f", gap {one.gap:g}" if one.gap else ""
     text += f", at most {one.mac_limit} MACs" if one.mac_limit else ""
+    if (one.samples, one.scan) != (Configuration("").samples, Configuration("").scan):
+        text += f", {one.samples} samples, {one.scan} scan"
     if score is not None:
         text += f"; measured: image MIoU {score:.3f}"
     if typical is not None and most is not None:

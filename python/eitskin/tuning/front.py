@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -15,12 +16,14 @@ from eitskin.device.settings import SolverSettings
 from eitskin.errors import ConfigError, FileError, UsageError
 from eitskin.fileio import parse_json, read_bytes
 from eitskin.tuning.configuration import Configuration, configuration_from
+from eitskin.tuning.report_time import report_us
 
 FORMAT, VERSION = "eitskin-tradeoff", 1
 SHIPPED = "front.json"
 F767_MHZ = 216
 F767_RAM = 256 * 1024  # the linker script promises the workspace as much
 DEFAULT_PERIOD_US = 20_800  # of the default scan
+REPORT_US = "report_us"
 MIN_SWEEPS = Configuration.touch_sweeps  # fewer save little, and at the cost of the discs
 MEASURED = ("threshold", "force_scale", "costs", "instructions", "host_us")
 SHORT_CELL = (
@@ -32,13 +35,14 @@ MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_fit"}  # of the solv
 
 @dataclass(frozen=True)
 class Budget:
-    """A bound of a frame's solve and touches: ``unit`` is "us", "MACs" or "instructions"."""
+    """A bound of a frame's solve and touches, ``unit`` "us", "MACs" or "instructions", or of the
+    time from contact to report, "report_us"."""
 
     value: float
     unit: str
 
     def __str__(self) -> str:
-        if self.unit == "us":
+        if self.unit.endswith("us"):
             return f"{self.value / 1000:.3g} ms"
         return f"{self.value / 1e6:.3g} million {self.unit}"
 
@@ -115,8 +119,13 @@ class Point:
 
     def cost(self, unit: str, board: str, where: Conditions, worst: bool = False) -> float | None:
         """Solve and touches of a frame in ``unit``: the mean (host: the median), or of the
-        costliest frame that was counted or timed; None if unknown. Times of the F767 are estimates:
+        costliest frame that was counted or timed; None if unknown. ``report_us``: from contact to
+        report (tuning.report_time). Times of the F767 are estimates:
         an instruction a cycle."""
+        if unit == REPORT_US:
+            solve_us = self.cost("us", board, where, worst)
+            scan_us = float(self.costs["acquisition_us"])
+            return None if solve_us is None else report_us(scan_us, solve_us, board)
         if unit == "MACs":
             macs = self.macs(where)
             return None if macs is None else macs[worst]
@@ -238,7 +247,8 @@ def load_front(path: Path | None = None) -> Front:
 @dataclass(frozen=True)
 class Target:
     """What is asked for: at most ``budget``, for the mean frame or the ``worst``, at least
-    ``accuracy``, on ``board``; a frame measured within ``period_us``."""
+    ``accuracy``, on ``board``; a frame measured within ``period_us``. ``unit``: in which cost is
+    compared, the budget's where there is one."""
 
     budget: Budget | None
     accuracy: float | None
@@ -246,20 +256,35 @@ class Target:
     where: Conditions
     period_us: float | None = None
     worst: bool = False
+    unit: str = "us"
+
+    def __post_init__(self) -> None:
+        if self.budget is not None:
+            object.__setattr__(self, "unit", self.budget.unit)
 
     @property
     def acquisition_us(self) -> float:
         """How long measuring may take: the period, or without one the longer of the budget and the
-        default scan."""
-        if self.period_us is not None:
-            return self.period_us
+        default scan; any time where reports are compared, which it is part of."""
+        if self.period_us is not None or self.unit == REPORT_US:
+            return self.period_us or math.inf
         longest = self.budget.value if self.budget is not None and self.budget.unit == "us" else 0.0
         return max(longest, DEFAULT_PERIOD_US)
 
-    @property
-    def unit(self) -> str:
-        """In which cost is compared."""
-        return "us" if self.budget is None else self.budget.unit
+
+# What a preset asks for: the soonest report with the paper's .84; the most accurate whose report
+# comes within so many ms of contact; the most accurate of all.
+PRESET_ACCURACY = {"fast": 0.84}
+PRESET_REPORT_MS = {"balanced": 45.0, "accurate": 1e6}
+PRESETS = (*PRESET_ACCURACY, *PRESET_REPORT_MS)
+
+
+def preset(name: str, board: str, where: Conditions | None = None) -> Target:
+    """What the preset ``name`` asks for on ``board``."""
+    ms = PRESET_REPORT_MS.get(name)
+    budget = None if ms is None else Budget(1000 * ms, REPORT_US)
+    accuracy = PRESET_ACCURACY.get(name)
+    return Target(budget, accuracy, board, where or Conditions(), unit=REPORT_US)
 
 
 def check_wish(target: Target) -> Target:
@@ -269,7 +294,9 @@ def check_wish(target: Target) -> Target:
         UsageError: nothing is asked for, or a number is out of range.
     """
     if target.budget is None and target.accuracy is None:
-        raise UsageError("name what to choose by:  --budget 10ms  or  --accuracy 0.86")
+        raise UsageError(
+            "name what to choose by:  --preset balanced,  --budget 10ms  or  --accuracy 0.86"
+        )
     if target.accuracy is not None and not 0 < target.accuracy < 1:
         raise UsageError(f"--accuracy {target.accuracy:g} is an MIoU; use above 0 to below 1")
     if target.period_us is not None and not target.period_us > 0:

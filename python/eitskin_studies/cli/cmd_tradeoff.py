@@ -39,6 +39,7 @@ def add_parser(subparsers: Any) -> None:
     option(run, "--counted N", "scenes emulated to count instructions; 0: none", default=24)
     option(run, "--rounds N", "in which times are taken on this host; 0: none", default=25)
     option(run, "--random-skins N", "of the models' errors; 0: without", default=500)
+    option(run, "--no-peers", "no other methods on the same scenes")
     option(run, "--front FRONT.json", "also write what the package ships of the results", Path)
     option(run, "--recorded FRONT.json", "also write what the page shows", Path)
     option(run, "--page PAGE.md", "also put tables and pictures into this page", Path)
@@ -82,10 +83,10 @@ def run_run(options: argparse.Namespace) -> int:
 
         draw_all(options.output, front)
     if options.page is not None:
-        from eitskin_studies.pictures.tradeoff_pictures import PICTURES
+        from eitskin_studies.pictures.tradeoff_pictures import DRAWN
         from eitskin_studies.tradeoff.page import fill_page
 
-        fill_page(options.page, recorded, options.output, PICTURES)
+        fill_page(options.page, recorded, options.output, tuple(DRAWN))
     print(to_json(as_dict(front)) if options.json else to_text(front, Conditions()))
     return 0
 
@@ -122,6 +123,7 @@ def _settings(options: argparse.Namespace, kind: Any) -> Any:
         counted=options.counted,
         rounds=options.rounds,
         random_skins=options.random_skins,
+        peers=not options.no_peers,
         **more,
     )
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from eitskin.tuning.front import F767_MHZ, Conditions, Front, Point
 from eitskin.view.pictures import INK, STYLE, load_matplotlib
 from eitskin.view.sheets import save_picture
+from eitskin_studies.pictures.report_time_picture import draw_report_time
 from eitskin_studies.tradeoff.table import best_points, x_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-PICTURES = ("front.png", "knobs.png", "noise.png", "samples.png", "scenes.png", "objective.png")
 KNOBS = {
     "iterations": "iterations at most",
     "rank": "rank of the reduced Jacobian",
@@ -33,17 +33,13 @@ LOGARITHMIC = ("iterations", "lambda_rel", "regularisation")
 
 
 def draw_all(folder: Path, front: Front) -> None:
-    """The pictures of ``PICTURES`` that the results have something for.
+    """The pictures of ``DRAWN`` that the results have something for.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: one cannot be written.
     """
-    for name, draw in zip(
-        PICTURES,
-        (draw_front, draw_knobs, draw_noise, draw_samples, draw_scenes, draw_objective),
-        strict=True,
-    ):
+    for name, draw in DRAWN.items():
         draw(folder / name, front)
 
 
@@ -396,3 +392,14 @@ def draw_objective(path: Path, front: Front) -> None:
         if axes.lines:
             axes.legend(frameon=False, fontsize=7)
         save_picture(figure, path)
+
+
+DRAWN = {
+    "report-time.png": draw_report_time,
+    "front.png": draw_front,
+    "knobs.png": draw_knobs,
+    "noise.png": draw_noise,
+    "samples.png": draw_samples,
+    "scenes.png": draw_scenes,
+    "objective.png": draw_objective,
+}

@@ -28,6 +28,7 @@ from eitskin_studies.tradeoff.emulation import Emulator, count_instructions, mak
 from eitskin_studies.tradeoff.engines import Built, ModelShop
 from eitskin_studies.tradeoff.fronts import estimated_instructions, recorded_front
 from eitskin_studies.tradeoff.host_times import host_times
+from eitskin_studies.tradeoff.peers import measure_peers
 from eitskin_studies.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, SceneFactory
 
 RESULTS = "results.jsonl"
@@ -48,6 +49,7 @@ class RunSettings:
             most MACs; 0: none.
         rounds: of eight scenes in which times are taken; 0: none.
         random_skins: that model errors are drawn from; 0: models without, and no test of touches.
+        peers: whether other methods are measured on the same scenes.
     """
 
     scenes: int = 180
@@ -63,6 +65,7 @@ class RunSettings:
     costliest: int = 8
     rounds: int = 25
     random_skins: int = DEFAULT_UNCERTAINTY.samples
+    peers: bool = True
 
     def __post_init__(self) -> None:
         for name in ("scenes", "train_scenes", "set_scenes"):
@@ -185,6 +188,7 @@ def run(
         "kernels": kernels,
     }
     facts |= {"skin": skin.name, "instructions": why, "model_elements": ELEMENTS}
+    facts["peers"] = _peers(workspace, skin, protocol)
     return Front({**settings.as_dict(), **facts}, tuple(_estimated(points)), str(folder))
 
 
@@ -322,6 +326,26 @@ def _host(
     return {one.name: row for one, row in zip(configurations, kept["rows"], strict=True)}, str(
         kept["kernels"]
     )
+
+
+def _peers(workspace: _Desk, skin: Skin, protocol: Protocol) -> list[dict[str, Any]]:
+    """The other methods; none where they are not wanted."""
+    how = workspace.settings
+    if not how.peers:
+        return []
+    settings = {
+        "scenes": how.scenes,
+        "train_scenes": how.train_scenes,
+        "seed": how.seed,
+        "simulated_elements": how.simulated_elements,
+        "snr_db": HEADLINE_DB,
+    }
+    facts = {**workspace.world, "what": "peers", **settings}
+    kept = workspace.store.get(facts)
+    if kept is None:
+        peers = measure_peers(skin, protocol, settings, how.rounds, workspace.progress)
+        kept = workspace.store.put(facts, {"peers": peers})
+    return list(kept["peers"])
 
 
 def _estimated(points: Sequence[Point]) -> list[Point]:

@@ -16,7 +16,8 @@ from eitskin.cli.main import main
 from eitskin.model.eitm import load_model
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.tuning.front import Conditions, load_front
+from eitskin.tuning.front import PRESETS, Conditions, load_front
+from eitskin_studies.pictures.tradeoff_pictures import DRAWN
 from eitskin_studies.tradeoff.engines import ModelShop
 from small_models import prebuilt
 
@@ -37,7 +38,7 @@ TINY_RUN = [
     "--elements",
     "1200",
 ]
-TINY_RUN += ["--random-skins", "2", "--counted", "0", "--rounds", "1"]
+TINY_RUN += ["--random-skins", "2", "--no-peers", "--counted", "0", "--rounds", "1"]
 TINY_RUN += ["--only", "tiny,mini,standard rank 32"]
 
 
@@ -48,7 +49,7 @@ def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
     )
     assert "standard rank 32" in out and "* " in out
     found = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
-    pictures = {"front.png", "knobs.png", "noise.png", "samples.png", "scenes.png", "objective.png"}
+    pictures = set(DRAWN)
     assert found == {"results.jsonl", "front.json", "table.csv"} | pictures
     assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     assert len(load_front(tmp_path / "out" / "front.json").points) == 3
@@ -95,6 +96,18 @@ def test_recommendations_name_what_bounds_the_rate(done: Done) -> None:
     assert facts["acquisition_us"] <= 11_000 and facts["configuration"]["scan"] == "reciprocal"
     discs = json.loads(done("recommend", "--budget", "10ms", "--by", "discs", "--json"))
     assert discs["judged"].startswith("discs") and discs["accuracy"] > 0.9
+
+
+@pytest.mark.parametrize("board", ["f767", "host"])
+def test_presets_are_dearer_and_better_from_fast_to_accurate(done: Done, board: str) -> None:
+    chosen = [
+        json.loads(done("recommend", "--preset", name, "--board", board, "--json"))
+        for name in PRESETS
+    ]
+    assert [one["accuracy"] for one in chosen] == sorted({one["accuracy"] for one in chosen})
+    assert [one["solve_us"] for one in chosen] == sorted({one["solve_us"] for one in chosen})
+    assert chosen[0]["accuracy"] >= 0.84
+    assert all(one["acquisition_us"] <= 20_800 for one in chosen)
 
 
 @pytest.mark.parametrize(
@@ -151,6 +164,8 @@ def test_reconstruct_within_a_budget(
     ("arguments", "said"),
     [
         (["--budget", "1ms", "--iterations", "5"], "--iterations"),
+        (["--preset", "fast", "--iterations", "5"], "--iterations is chosen by --preset"),
+        (["--preset", "fast", "--budget", "1ms"], "leave the others out"),
         (["--accuracy", "0.8", "--gap", "0.1"], "--gap"),
         (["--accuracy", "0.8", "--solver", "fista"], "--solver"),
         (["--accuracy", "0.8", "--engine", "numpy"], "--engine numpy"),

@@ -38,7 +38,7 @@ from eitskin_studies.tradeoff.scene_sets import SETS, SceneFactory
 from eitskin_studies.tradeoff.table import best_points, to_csv, to_text
 
 ELEMENTS = 1200
-TINY = RunSettings(6, 4, 2, ("pairs", "drift"), (40.0, 60.0), 5, ELEMENTS, 0, 2, 1, 2)
+TINY = RunSettings(6, 4, 2, ("pairs", "drift"), (40.0, 60.0), 5, ELEMENTS, 0, 2, 1, 2, False)
 PAIR = (
     Configuration("cheap", rank=24, pixels=14, iterations=8),
     Configuration("dear", rank=48, pixels=24, iterations=60, lambda_rel=0.01),
@@ -173,7 +173,16 @@ def test_a_killed_command_goes_on(tmp_path: Path) -> None:
         "4",
     ]
     command += ["--set-scenes", "2", "--sets", "pairs", "--elements", str(ELEMENTS)]
-    command += ["--random-skins", "2", "--counted", "0", "--rounds", "1", "--no-pictures"]
+    command += [
+        "--random-skins",
+        "2",
+        "--no-peers",
+        "--counted",
+        "0",
+        "--rounds",
+        "1",
+        "--no-pictures",
+    ]
 
     environment = {
         **os.environ,
