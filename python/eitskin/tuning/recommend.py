@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import build_settings
-from eitskin.tuning.front import Point, Target
+from eitskin.tuning.front import REPORT_US, Point, Target
 
 if TYPE_CHECKING:
     from eitskin.model.build import Progress
@@ -29,6 +29,11 @@ class Recommendation:
         time."""
         solve = self.point.cost("us", self.target.board, self.target.where)
         return None if solve is None else max(solve, self.point.costs["acquisition_us"])
+
+    @property
+    def report_us(self) -> float | None:
+        """From contact to report, the mean."""
+        return self.point.cost(REPORT_US, self.target.board, self.target.where)
 
     @property
     def options(self) -> list[str]:
@@ -68,6 +73,7 @@ class Recommendation:
             "solve_most_us": point.cost("us", target.board, target.where, True),
             "acquisition_us": point.costs["acquisition_us"],
             "frame_us": self.frame_us,
+            "report_us": self.report_us,
             "instructions": point.instructions,
             "flash_bytes": point.costs["flash_bytes"],
             "ram_bytes": point.costs["ram_bytes"],
@@ -109,6 +115,10 @@ class Recommendation:
             lines.append(
                 f"scan: {one.scan}, {one.samples} samples: {acquisition / 1000:.1f} ms a frame;"
                 f" {bound} bounds the rate: {1e6 / self.frame_us:.1f} frames a second"
+            )
+            lines.append(
+                f"from contact to report: {(self.report_us or 0) / 1000:.0f} ms, of 1.5 scans,"
+                " solve and link at 1 Mbaud, an estimate"
             )
         lines.append("options: " + " ".join(self.options))
         return "\n".join(lines)

@@ -13,7 +13,7 @@ pytest.importorskip("scipy")
 from eitskin.errors import ConfigError
 from eitskin.tuning.configuration import Configuration
 from eitskin.tuning.front import Conditions, Front, choose, front_from, load_front
-from eitskin_studies.pictures.tradeoff_pictures import PICTURES as DRAWN
+from eitskin_studies.pictures.tradeoff_pictures import DRAWN
 from eitskin_studies.tradeoff.default_set import default_set
 from eitskin_studies.tradeoff.fronts import (
     estimated_instructions,
