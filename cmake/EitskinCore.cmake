@@ -5,7 +5,7 @@
 set(EITSKIN_CORE_SOURCES
     base/arithmetic.c base/status.c base/texts.c
     kernels/kernels.c kernels/portable.c
-    model/model.c model/options.c model/force.c model/row_form.c model/uncertainty.c
+    model/model.c model/options.c model/force.c model/row_form.c model/uncertainty.c model/scan_order.c
     context/column_cache.c context/products.c
     frame/projection.c frame/reference.c frame/fold.c frame/regularisation.c frame/whitening.c
     frame/whitening_products.c frame/rows_out.c

@@ -48,8 +48,8 @@ static void lay_out(fw_engine *engine)
     engine->saved.core = end - eits_saved_size(&engine->model);
 }
 
-/* Rows that no fold names as a second one, in order. Rows that no fold names at all are among them.
- */
+/* Rows that no fold names as a second one, as they are measured. Rows that no fold names at all are
+ * among them. */
 static void list_unique(fw_engine *engine)
 {
     const eits_model *model = &engine->model;
@@ -59,9 +59,10 @@ static void list_unique(fw_engine *engine)
     }
     engine->n_unique = 0;
     for (uint32_t i = 0; i < model->n_rows; ++i) {
-        if (!engine->flags[i])
-            engine->unique[engine->n_unique++] = (uint16_t)i;
-        engine->flags[i] = 0;
+        const uint32_t row = model->scan_order == NULL ? i : model->scan_order[i];
+        if (!engine->flags[row])
+            engine->unique[engine->n_unique++] = (uint16_t)row;
+        engine->flags[row] = 0;
     }
 }
 
@@ -115,8 +116,8 @@ void fw_engine_set_noise_floor(fw_engine *engine, float volts)
 
 fw_scan_table fw_engine_table(const fw_engine *engine)
 {
-    return (fw_scan_table){engine->model.protocol, engine->model.n_rows, engine->unique,
-                           engine->n_unique};
+    return (fw_scan_table){engine->model.protocol, engine->model.n_rows, engine->model.scan_order,
+                           engine->unique, engine->n_unique};
 }
 
 void fw_engine_save(fw_engine *engine)

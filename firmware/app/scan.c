@@ -33,20 +33,21 @@ uint32_t fw_scan_rows(const fw_scan_settings *settings, const fw_scan_table *tab
     return settings->check_every == 0 ? table->n_unique : table->n_rows;
 }
 
-static uint32_t frame_rows(const fw_scan *scan)
+uint32_t fw_scan_next_rows(const fw_scan *scan)
 {
     return scan->next_full ? scan->table.n_rows : scan->table.n_unique;
 }
 
-static uint32_t row_at(const fw_scan *scan, uint32_t position)
+uint32_t fw_scan_row_at(const fw_scan *scan, uint32_t position)
 {
-    return scan->next_full ? position : scan->table.unique[position];
+    const uint16_t *order = scan->next_full ? scan->table.order : scan->table.unique;
+    return order == NULL ? position : order[position];
 }
 
 /* Select the row at `position`. A switch that failed is known by `switched`. */
 static void switch_to(fw_scan *scan, uint32_t position)
 {
-    const uint8_t *electrodes = scan->table.protocol + 4 * (size_t)row_at(scan, position);
+    const uint8_t *electrodes = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, position);
     scan->position = position;
     scan->switched = fw_adg1206_select(&scan->mux, electrodes) == FW_OK;
     scan->switched_us = now_us(scan);
@@ -120,8 +121,8 @@ static void on_burst(void *user, const fw_burst *burst)
     if (scan->frame == NULL && !begin_frame(scan, burst->start_us))
         return;
     fw_frame *frame = scan->frame;
-    const uint32_t row = row_at(scan, scan->position);
-    const bool last = scan->position + 1 == frame_rows(scan);
+    const uint32_t row = fw_scan_row_at(scan, scan->position);
+    const bool last = scan->position + 1 == fw_scan_next_rows(scan);
     const bool bus_error = !scan->switched;
     if (last) {
         ++scan->next_number;

@@ -50,7 +50,8 @@ typedef struct fw_frame {
 typedef struct fw_scan_table {
     const uint8_t *protocol; /* n_rows x 4 */
     uint32_t n_rows;
-    const uint16_t *unique; /* n_unique rows in order */
+    const uint16_t *order;  /* n_rows, as they are measured; NULL: as they stand */
+    const uint16_t *unique; /* n_unique rows, as they are measured */
     uint32_t n_unique;
 } fw_scan_table;
 
@@ -84,6 +85,10 @@ void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *de
  * quarter more, made a whole number of excitation periods. */
 uint32_t fw_burst_us(const fw_scan_settings *settings);
 uint32_t fw_slot_us(const fw_scan_settings *settings);
+
+/* Rows of the next frame, and which one is measured at `position`, slot by slot. */
+uint32_t fw_scan_next_rows(const fw_scan *scan);
+uint32_t fw_scan_row_at(const fw_scan *scan, uint32_t position);
 
 /* Rows measured in the longest frame. */
 uint32_t fw_scan_rows(const fw_scan_settings *settings, const fw_scan_table *table);

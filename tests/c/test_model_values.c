@@ -28,6 +28,49 @@ static eits_status with_number(small_spec spec, const char *tag, uint32_t at, fl
     return with_word(spec, tag, at, word);
 }
 
+/* Every third of 8 drives of 5 rows; rows i and j of the scan then change places, and word `at` of
+ * the section becomes `value`. */
+static eits_status with_order(uint32_t i, uint32_t j, uint32_t at, uint32_t value, uint32_t size)
+{
+    enum { ROWS = 40 };
+    uint8_t bytes[4 * ROWS + 4] = {0};
+    uint32_t order[ROWS];
+    for (uint32_t k = 0; k < ROWS; ++k)
+        order[k] = 5 * (k / 5 * 3 % 8) + k % 5;
+    const uint32_t kept = order[i];
+    order[i] = order[j];
+    order[j] = kept;
+    for (uint32_t k = 0; k < ROWS; ++k) {
+        small_put_u16(bytes + 2 * k, order[k]);
+        small_put_u16(bytes + 2 * (ROWS + order[k]), k);
+    }
+    if (at < 2 * ROWS)
+        small_put_u16(bytes + 2 * at, value);
+    small_model bare = small_model_make(TINY);
+    small_model made = small_model_with_section(&bare, "ORDR", bytes, size);
+    eits_model model;
+    const eits_status status = eits_model_open(&model, made.blob, made.size);
+    if (status == EITS_OK)
+        CHECK(model.scan_order[6] == 16 && model.scan_place[16] == 6);
+    small_model_free(&made);
+    small_model_free(&bare);
+    return status;
+}
+
+static void orders_have_each_drive_once_and_whole(void)
+{
+    CHECK_EQUAL(with_order(0, 0, 80, 0, 160), EITS_OK);
+    CHECK_EQUAL(with_order(0, 0, 80, 0, 158), EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(with_order(0, 0, 80, 0, 164), EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(with_order(0, 0, 0, 40, 160), EITS_E_MODEL_VALUE);   /* no row */
+    CHECK_EQUAL(with_order(0, 0, 5, 0, 160), EITS_E_MODEL_VALUE);    /* row 0 twice */
+    CHECK_EQUAL(with_order(0, 0, 40, 1, 160), EITS_E_MODEL_VALUE);   /* another place */
+    CHECK_EQUAL(with_order(0, 0, 79, 999, 160), EITS_E_MODEL_VALUE); /* no place */
+    CHECK_EQUAL(with_order(6, 7, 80, 0, 160), EITS_E_MODEL_VALUE);   /* rows of a drive turned */
+    CHECK_EQUAL(with_order(0, 1, 80, 0, 160), EITS_E_MODEL_VALUE);   /* the first no drive's */
+    CHECK_EQUAL(with_order(4, 9, 80, 0, 160), EITS_E_MODEL_VALUE);   /* drives mixed */
+}
+
 static void dimensions(void)
 {
     static const struct {
@@ -374,6 +417,7 @@ static void many_bytes_changed_and_sealed(void)
 
 int main(void)
 {
+    orders_have_each_drive_once_and_whole();
     dimensions();
     numbers_of_the_dimensions();
     electrodes_folds_and_pixels();

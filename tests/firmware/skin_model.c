@@ -10,11 +10,13 @@ const skin_spec SKIN_ADJACENT = {
     .electrodes = 16, .drive_step = 1, .measure_step = 1, .rank = 24, .side = 8};
 const skin_spec SKIN_OPPOSITE = {
     .electrodes = 16, .drive_step = 8, .measure_step = 1, .rank = 20, .side = 8};
+const skin_spec SKIN_BY_SEVEN = {
+    .electrodes = 16, .drive_step = 1, .measure_step = 1, .rank = 24, .side = 8, .order = 7};
 
-enum { MAX_ROWS = 4096, SECTIONS = 11 };
+enum { MAX_ROWS = 4096, SECTIONS = 12 };
 static const char TAGS[SECTIONS][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS",
-                                       "COLW", "GRID", "DEFS", "GOLD", "META"};
-enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, META };
+                                       "COLW", "GRID", "DEFS", "GOLD", "META", "ORDR"};
+enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, META, ORDR };
 
 typedef struct draft {
     uint32_t n_rows, n_folded;
@@ -87,6 +89,20 @@ static double wave(uint32_t order, uint32_t place, uint32_t side)
     return sqrt((order == 0 ? 1.0 : 2.0) / side) * cos(acos(-1.0) * order * (place + 0.5) / side);
 }
 
+static void put_order(uint8_t *at, const draft *d, const skin_spec *spec)
+{
+    const uint32_t drives = spec->electrodes, step = spec->order == 0 ? 1 : spec->order;
+    uint32_t place = 0;
+    for (uint32_t k = 0; k < drives; ++k) {
+        for (uint32_t row = 0; row < d->n_rows; ++row) {
+            if (d->rows[row][0] != step * k % drives)
+                continue;
+            small_put_u16(at + 2 * (size_t)place, row);
+            small_put_u16(at + 2 * ((size_t)d->n_rows + row), place++);
+        }
+    }
+}
+
 static void fill(const skin_spec *spec, const draft *d, uint32_t stride,
                  uint8_t *const at[SECTIONS])
 {
@@ -132,6 +148,7 @@ static void fill(const skin_spec *spec, const draft *d, uint32_t stride,
     for (uint32_t i = 0; i < 12; ++i)
         small_put_f32(at[DEFS] + 8 + 4 * i, defaults[i]);
     memcpy(at[META], "{}", 2);
+    put_order(at[ORDR], d, spec);
 }
 
 static void seal(skin_model *made)
@@ -173,7 +190,8 @@ skin_model skin_model_make(const skin_spec *spec)
                                       4 * n,
                                       64,
                                       4 * (2 * d.n_rows + n),
-                                      2};
+                                      2,
+                                      4 * d.n_rows};
     skin_model made = {.size = table};
     for (uint32_t p = 0; p < SECTIONS; ++p)
         made.size += (sizes[p] + 15u) & ~15u;
@@ -185,7 +203,7 @@ skin_model skin_model_make(const skin_spec *spec)
         memcpy(entry, TAGS[p], 4);
         small_put_u32(entry + 4, offset);
         small_put_u32(entry + 8, sizes[p]);
-        small_put_u32(entry + 12, p != META);
+        small_put_u32(entry + 12, p < META);
         at[p] = made.blob + offset;
         offset += (sizes[p] + 15u) & ~15u;
     }

@@ -13,7 +13,7 @@ static const eits_packet_raw *raw_head(uint32_t k)
     return packet == NULL ? NULL : (const eits_packet_raw *)(const void *)packet->payload;
 }
 
-/* Rows are measured in the table's order, each with its own four electrodes, and never is one made
+/* Rows are measured in the model's order, each with its own four electrodes, and never is one made
  * before another broke. */
 static void test_order(const skin_spec *spec, uint32_t rows)
 {
@@ -24,7 +24,9 @@ static void test_order(const skin_spec *spec, uint32_t rows)
     uint32_t wrong = 0;
     /* at its interrupt, a burst's own electrodes are still selected */
     for (uint32_t k = 0; k < b.board.bursts; ++k)
-        wrong += memcmp(b.board.selected[k], b.open.protocol + 4 * (size_t)(k % rows), 4) != 0;
+        wrong += memcmp(b.board.selected[k],
+                        b.open.protocol + 4 * (size_t)b.open.scan_order[k % rows], 4) != 0;
+    CHECK_EQUAL(b.open.scan_order[13], spec->order == 7 ? 7 * 13 : 13);
     CHECK_EQUAL(wrong, 0);
     CHECK(b.board.monitor.violation == NULL);
     CHECK_EQUAL(b.host.instrument.scan.slots_repeated, 0);
@@ -332,13 +334,16 @@ int main(void)
     test_slots();
     test_order(&SKIN_ADJACENT, 208);
     test_order(&SKIN_OPPOSITE, 192);
+    test_order(&SKIN_BY_SEVEN, 208);
     test_voltages(&SKIN_ADJACENT);
     test_voltages(&SKIN_OPPOSITE);
+    test_voltages(&SKIN_BY_SEVEN);
     test_settling();
     test_late_switch();
     test_never_settles();
     test_reciprocal(&SKIN_ADJACENT);
     test_reciprocal(&SKIN_OPPOSITE);
+    test_reciprocal(&SKIN_BY_SEVEN);
     test_frame_period();
     test_two_buffers();
     test_stall();

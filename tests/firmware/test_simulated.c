@@ -216,6 +216,41 @@ static void test_frames_by_and_by(void)
     }
 }
 
+/* A frame that is put once is shown in the scan that it was made for, and in no other; the host
+ * learns when that begins and when each row is measured. */
+static void test_frames_of_one_scan(void)
+{
+    uint32_t delays_us[ROWS];
+    start(&a, 50000);
+    stream(&a, EITS_STREAM_RAW, 0);
+    show(&a, 20.0);
+    sim_begin_scene(&a.sim);
+    sim_put(&a.sim, volts, 0, UNTOUCHED);
+    CHECK(!sim_scan_frame(&a.sim));
+    CHECK_EQUAL(sim_frame_wanted(&a.sim), UNTOUCHED);
+    CHECK(sim_wanted_s(&a.sim) == 0);
+    sim_row_delays(&a.sim, delays_us);
+    for (uint32_t i = 0; i < ROWS; ++i)
+        CHECK_EQUAL(delays_us[i], 100 * i);
+    sim_put_once(&a.sim, volts + UNTOUCHED * ROWS, UNTOUCHED);
+    CHECK_EQUAL(scan(&a), UNTOUCHED);
+    CHECK(!sim_scan_frame(&a.sim));
+    CHECK(sim_wanted_s(&a.sim) == 0.05);
+    sim_put_once(&a.sim, volts + UNTOUCHED * ROWS, UNTOUCHED); /* not the frame that is wanted */
+    CHECK(!sim_scan_frame(&a.sim));
+    CHECK_EQUAL(sim_frame_wanted(&a.sim), UNTOUCHED + 1);
+    eits_command_scan half = host_default_scan();
+    half.request = 901;
+    half.check_every = 0;
+    send(&a, EITS_PACKET_SCAN, &half, sizeof half);
+    CHECK(!sim_scan_frame(&a.sim));
+    sim_row_delays(&a.sim, delays_us);
+    uint32_t measured = 1; /* the first row, at 0 as those that are left out */
+    for (uint32_t i = 0; i < ROWS; ++i)
+        measured += delays_us[i] != 0;
+    CHECK_EQUAL(measured, ROWS / 2);
+}
+
 /* Another instrument's numbers reach the host bit for bit; what is not finite is no voltage.
  * Nothing is said of a scan, and none can be set. Where frames stay away that is a fault, which
  * goes. */
@@ -272,6 +307,7 @@ int main(void)
     test_time_and_restart();
     test_two_boards();
     test_frames_by_and_by();
+    test_frames_of_one_scan();
     test_frames_given();
     bench_stop(&source);
     return checks_report("simulated");

@@ -25,7 +25,7 @@ extern "C" {
 
 /* A file of another major version is rejected; of a later minor one, what is new is skipped. */
 #define EITS_MODEL_MAJOR          1
-#define EITS_MODEL_MINOR          5
+#define EITS_MODEL_MINOR          6
 #define EITS_MODEL_ALIGNMENT      16
 #define EITS_MAX_RANK             1024
 #define EITS_MAX_PIXELS           65535
@@ -190,7 +190,10 @@ typedef struct eits_model {
     float noise_gain;
     uint64_t protocol_hash;
     const uint8_t *protocol; /* n_rows x 4: I+, I-, V+, V- */
-    const eits_fold *fold;   /* n_folded */
+    /* n_rows each: the rows in the order that they are measured, and when each one is, from 0
+     * (section ORDR); NULL: as they stand */
+    const uint16_t *scan_order, *scan_place;
+    const eits_fold *fold; /* n_folded */
     /* n_folded: boundary voltage of the untouched skin as modelled, V */
     const float *v_ref;
     eits_matrix reduction;      /* P: rank x n_folded, whitened data y = P d; always f32 */

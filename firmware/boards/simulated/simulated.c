@@ -104,7 +104,9 @@ static bool choose_frame(sim_board *sim, uint64_t at_us)
         frame = scene->untouched + (number < scene->frames ? number : scene->frames - 1u);
     }
     scene->wanted = frame;
-    if (frame < scene->first || frame - scene->first >= scene->count)
+    scene->wanted_us = at_us;
+    if (frame < scene->first || frame - scene->first >= scene->count ||
+        (scene->once && scene->put_us != at_us))
         return false;
     const size_t place = (size_t)(frame - scene->first) * sim->instrument.engine.model.n_rows;
     scene->shown = scene->volts + place;
@@ -416,6 +418,28 @@ void sim_put(sim_board *sim, const float *volts, uint32_t first, uint32_t count)
     sim->scene.volts = volts;
     sim->scene.first = first;
     sim->scene.count = count;
+    sim->scene.once = false;
+}
+
+void sim_put_once(sim_board *sim, const float *volts, uint32_t first)
+{
+    sim_put(sim, volts, first, 1);
+    sim->scene.once = true;
+    sim->scene.put_us = sim->scene.wanted_us;
+}
+
+double sim_wanted_s(const sim_board *sim)
+{
+    const sim_scene *scene = &sim->scene;
+    return scene->begun ? (double)(scene->wanted_us - scene->began_us) / 1e6 : 0;
+}
+
+void sim_row_delays(const sim_board *sim, uint32_t *delays_us)
+{
+    const fw_scan *scan = &sim->instrument.scan;
+    memset(delays_us, 0, sim->instrument.engine.model.n_rows * sizeof *delays_us);
+    for (uint32_t position = 0; position < fw_scan_next_rows(scan); ++position)
+        delays_us[fw_scan_row_at(scan, position)] = position * scan->slot_us;
 }
 
 uint32_t sim_frame_wanted(const sim_board *sim)

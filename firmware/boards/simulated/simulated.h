@@ -23,7 +23,10 @@
 typedef struct sim_scene {
     const float *volts; /* count x n_rows, amplitudes in V: frames first, first + 1, ... */
     uint32_t first, count;
-    uint32_t wanted; /* the frame that the last scan showed, or that is missing */
+    bool once;          /* they are of the scan that began at put_us only */
+    uint64_t put_us;    /* of the board's clock */
+    uint32_t wanted;    /* the frame that the last scan showed, or that is missing */
+    uint64_t wanted_us; /* when that scan begins */
     uint32_t untouched, frames;
     double rate_hz;
     bool begun, begins_with_scan; /* time 0 is when the next scan begins */
@@ -112,8 +115,14 @@ void sim_show(sim_board *sim, float largest_v, uint32_t untouched, uint32_t fram
  * used until the next call. */
 void sim_put(sim_board *sim, const float *volts, uint32_t first, uint32_t count);
 
-/* Which frame sim_scan_frame misses. */
+/* One frame, first, that is shown only in the scan that begins when sim_wanted_s says. */
+void sim_put_once(sim_board *sim, const float *volts, uint32_t first);
+
+/* Which frame sim_scan_frame misses; when its scan begins, in s after the scene's time 0 (before
+ * that 0); and how long after that each row is measured, n_rows us, 0 for those left out. */
 uint32_t sim_frame_wanted(const sim_board *sim);
+double sim_wanted_s(const sim_board *sim);
+void sim_row_delays(const sim_board *sim, uint32_t *delays_us);
 
 /* Let the scene begin with the next scan. Until then the untouched frames are shown over and over,
  * from the first on when a tare begins; then the frame of the scene that is nearest to the

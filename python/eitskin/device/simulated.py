@@ -196,7 +196,16 @@ class SimBoard(HostBoard):
         self._lib.sim_show(self._sim, largest_v, scene.quiet_frames, scene.frames, scene.rate_hz)
 
     def _put(self, frame: int) -> None:
-        """The frames around number ``frame`` of all, as far as they are known."""
+        """The frames around number ``frame`` of all, as far as they are known; where touches move,
+        that one with its rows as they will be when this scan comes to them."""
+        scene = self.frames.scene
+        if self._rows.moves and frame >= scene.quiet_frames:
+            delays_us = np.zeros(self._rows.scene.protocol.n_rows, np.uint32)
+            self._lib.sim_row_delays(self._sim, self._pointer(delays_us, "uint32_t *"))
+            times_s = self._lib.sim_wanted_s(self._sim) + 1e-6 * delays_us
+            self._volts = np.ascontiguousarray(self._rows.scan(frame, times_s), np.float32)
+            self._lib.sim_put_once(self._sim, self._pointer(self._volts, "float *"), frame)
+            return
         first, volts = self._rows.around(frame)
         self._volts = np.ascontiguousarray(volts, np.float32)
         self._lib.sim_put(self._sim, self._pointer(self._volts, "float *"), first, len(volts))

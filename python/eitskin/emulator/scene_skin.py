@@ -29,4 +29,5 @@ def skin_of(scene: Scene, protocol: Protocol) -> AnalogSkin:
         )
     rows = BoardFrames(scene, DONE_BY_THE_BOARD).rows(protocol)
     quiet_v = rows.part(range(min(scene.quiet_frames, MAX_QUIET)))
-    return AnalogSkin(protocol, quiet_v, RecordedRows(rows), scene.rate_hz)
+    recorded = RecordedRows(rows)
+    return AnalogSkin(protocol, quiet_v, recorded, scene.rate_hz, recorded if rows.moves else None)

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from eitskin.errors import EitskinError, FileError, FrameError
 from eitskin.fileio import parse_json, write_beside
-from eitskin.skin.protocol import Protocol, table
+from eitskin.frames.paths import NAMES as PATH_FIELDS
+from eitskin.frames.paths import Paths
+from eitskin.skin.protocol import Protocol, in_order, table
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -41,7 +43,8 @@ REQUIRED = (
     "frame_name",
     "meta",
 )
-OPTIONAL = ("time_s", *TOUCH_FIELDS, "truth_mask", "truth_conductivity_s_per_m")
+OPTIONAL = ("time_s", "row_time_s", *TOUCH_FIELDS, "truth_mask", "truth_conductivity_s_per_m")
+OTHER = ("drive_order", *PATH_FIELDS)  # optional, and no field of that name
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +55,15 @@ class Frames:
         and w columns.
     ``voltage_v`` (n, m) and ``reference_voltage_v`` (k, m), or (m,) which becomes (1, m), in volts.
     ``frame_name`` n names ("0", "1", ... where none are given); ``time_s`` (n,) seconds from any
-    start. Truth, where known: ``touch_frame`` (t,) index of the touch's frame, ``touch_xy_mm`` (t,
-    2) in the skin's coordinates, ``touch_radius_mm`` (t,), ``touch_strength`` (t,) relative
+    start; ``row_time_s`` (m,) when each row was measured after that, where it is known. Truth,
+    where known, is of the end of a frame's scan (a snapshot's of its time): ``touch_frame`` (t,)
+    index of the touch's frame, ``touch_xy_mm`` (t, 2) in the skin's coordinates,
+    ``touch_radius_mm`` (t,), ``touch_strength`` (t,) relative
     conductivity change inside the touch (NaN: unknown), ``touch_sign`` (t,) +1 more conductive, -1
     less (from the strength where not given); ``truth_mask`` (n, h, w) +1/-1/0 over
     ``truth_mask_extent_mm`` (xmin, ymin, xmax, ymax); ``truth_conductivity_s_per_m`` (n, h, w)
-    float32 on the same raster, NaN outside the skin. ``meta`` says how the frames were made (JSON
-    values only).
+    float32 on the same raster, NaN outside the skin; ``paths`` at any instant. ``meta`` says how
+    the frames were made (JSON values only).
 
     Raises:
         FrameError: a shape disagrees, or a value is not finite (unless ``allow_nonfinite``, for
@@ -70,6 +75,7 @@ class Frames:
     reference_voltage_v: FloatArray
     frame_name: tuple[str, ...] = ()
     time_s: FloatArray | None = None
+    row_time_s: FloatArray | None = None
     touch_frame: IntArray | None = None
     touch_xy_mm: FloatArray | None = None
     touch_radius_mm: FloatArray | None = None
@@ -78,6 +84,7 @@ class Frames:
     truth_mask: NDArray[np.int8] | None = None
     truth_mask_extent_mm: tuple[float, float, float, float] | None = None
     truth_conductivity_s_per_m: NDArray[np.float32] | None = None
+    paths: Paths | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
     allow_nonfinite: bool = False
 
@@ -101,6 +108,10 @@ class Frames:
         self._set("frame_name", names)
         if self.time_s is not None:
             self._set("time_s", _shaped(_floats(self.time_s, "time_s"), (n,), "time_s"))
+        if self.row_time_s is not None:
+            row_time_s = _shaped(_floats(self.row_time_s, "row_time_s"), (channels,), "row_time_s")
+            _refuse_nonfinite(row_time_s[None], "row_time_s")
+            self._set("row_time_s", row_time_s)
         self._check_touches(n)
         self._check_mask(n)
 
@@ -230,16 +241,12 @@ def save_frames(path: str | Path, frames: Frames) -> None:
         "frame_name": np.array(frames.frame_name, dtype=np.str_),
         "meta": np.array(json.dumps(dict(frames.meta), sort_keys=True, allow_nan=False)),
     }
-    for name in (
-        "time_s",
-        *TOUCH_FIELDS,
-        "truth_mask",
-        "truth_mask_extent_mm",
-        "truth_conductivity_s_per_m",
-    ):
-        value = getattr(frames, name)
-        if value is not None:
-            fields[name] = np.asarray(value)
+    if frames.protocol.drive_order:
+        fields["drive_order"] = np.array(frames.protocol.drive_order, dtype=np.int64)
+    optional = {name: getattr(frames, name) for name in (*OPTIONAL, "truth_mask_extent_mm")}
+    if frames.paths is not None:
+        optional |= vars(frames.paths)
+    fields |= {name: np.asarray(value) for name, value in optional.items() if value is not None}
     with write_beside(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **fields)
 
@@ -259,7 +266,7 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
             f" {Path(path).with_suffix('.npz')}  with the options that  eitskin doctor {where} "
             " finds"
         )
-    arrays = read_npz(path, "frames file", (*REQUIRED, *OPTIONAL, *HEAD))
+    arrays = read_npz(path, "frames file", (*REQUIRED, *OPTIONAL, *OTHER, *HEAD))
     if "format" not in arrays or str(arrays["format"]) != FORMAT:
         raise FrameError(
             f"{where}: not an eitskin frames file (its arrays:"
@@ -342,7 +349,7 @@ def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Fram
     for name in REQUIRED:
         if name not in arrays:
             raise FrameError(f"the field {name!r} is missing; make the file again")
-    unknown = sorted(set(arrays) - {*REQUIRED, *OPTIONAL, *HEAD})
+    unknown = sorted(set(arrays) - {*REQUIRED, *OPTIONAL, *OTHER, *HEAD})
     if unknown:
         raise FrameError(
             f"unknown field {unknown[0]!r}; docs/reference/frames-format.md lists the fields"
@@ -354,16 +361,19 @@ def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Fram
     if not isinstance(meta, dict):
         raise FrameError("the field 'meta' is not a JSON object; make the file again")
     extent = arrays.get("truth_mask_extent_mm")
+    given = [name for name in PATH_FIELDS if name in arrays]
+    if given and len(given) < len(PATH_FIELDS):
+        raise FrameError(f"{given[0]} without the other path fields; paths need all five")
+    protocol = table(
+        int(arrays["n_electrodes"]), arrays["drive_measure"].tolist(), float(arrays["current_a"])
+    )
     return Frames(
-        protocol=table(
-            int(arrays["n_electrodes"]),
-            arrays["drive_measure"].tolist(),
-            float(arrays["current_a"]),
-        ),
+        protocol=in_order(protocol, arrays.get("drive_order", np.zeros(0, np.int64)).tolist()),
         voltage_v=arrays["voltage_v"],
         reference_voltage_v=arrays["reference_voltage_v"],
         frame_name=tuple(str(name) for name in np.atleast_1d(arrays["frame_name"])),
         truth_mask_extent_mm=None if extent is None else tuple(extent.tolist()),
+        paths=Paths(*(arrays[name] for name in PATH_FIELDS)) if given else None,
         meta=meta,
         allow_nonfinite=allow_nonfinite,
         **{name: arrays.get(name) for name in OPTIONAL},

@@ -27,7 +27,7 @@ from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 5
+MAJOR, MINOR = 1, 6
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
@@ -87,6 +87,9 @@ def encode_model(model: Model) -> bytes:
         sections["WHIT"] = model.row_form.encode()
     if model.precision is not None:
         sections["PREC"] = model.precision.astype("<f4").tobytes()
+    if model.protocol.drive_order:
+        order = np.concatenate([model.protocol.scan_rows, model.protocol.scan_places])
+        sections["ORDR"] = order.astype("<u2").tobytes()
     if model.model_errors is not None:
         sections["UNCE"] = model.model_errors.encode()
     if stored.scale is not None:
@@ -152,7 +155,8 @@ def _assemble(sections: Sections, protocol_hash: int, taught: bool) -> bytes:
         bodies.append(_padded(content))
         offset += len(bodies[-1])
     body = b"".join(entries + bodies)
-    minor = MINOR if taught else MINOR - 1 if "UNCE" in sections else MINOR - 2
+    newest = ("ORDR" in sections, taught, "UNCE" in sections, True)
+    minor = MINOR - newest.index(True)
     tail = HEADER.pack(MAGIC, MAJOR, minor, offset, 0, len(sections), 0, protocol_hash)[16:]
     crc = zlib.crc32(tail + body)
     return HEADER.pack(MAGIC, MAJOR, minor, offset, crc, len(sections), 0, protocol_hash) + body
@@ -216,7 +220,7 @@ def _split(blob: bytes, where: str) -> Sections:
             raise ModelError(
                 f"{where}: section {name!r} is misplaced or repeated; build the model again"
             )
-        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE", "PREC"):
+        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE", "PREC", "ORDR"):
             if flags & REQUIRED_FLAG:
                 raise ModelError(
                     f"{where}: needs section {name!r}, which this eitskin does not know; upgrade"
@@ -393,6 +397,24 @@ def _read_precision(sections: Sections, d: _Dims, where: str) -> npt.NDArray[np.
     return values
 
 
+def _read_order(sections: Sections, table: npt.NDArray[np.uint8], where: str) -> tuple[int, ...]:
+    """The order of drives; () as they stand."""
+    if "ORDR" not in sections:
+        return ()
+    if len(sections["ORDR"]) != 4 * len(table):
+        _refuse(where, "section 'ORDR' of a size that its rows do not ask for")
+    rows, places = np.frombuffer(sections["ORDR"], dtype="<u2").reshape(2, -1).astype(np.int64)
+    starts = np.flatnonzero(np.r_[True, (table[1:, :2] != table[:-1, :2]).any(axis=1)])
+    drives = np.searchsorted(starts, rows[np.isin(rows, starts)])
+    runs = np.split(np.arange(len(table)), starts[1:])
+    whole = np.array_equal(np.sort(drives), np.arange(len(starts))) and np.array_equal(
+        rows, np.concatenate([runs[k] for k in drives])
+    )
+    if not whole or not np.array_equal(places, np.argsort(rows)):
+        _refuse(where, "an order in section 'ORDR' that does not have each drive once, whole")
+    return tuple(drives.tolist())
+
+
 def _read_meta(content: bytes, where: str) -> dict[str, Any]:
     try:
         meta = parse_json(content.decode("utf-8"))
@@ -408,7 +430,9 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
     d = _read_dims(sections["DIMS"], where)
     _check_sizes(sections, d, where)
     table = np.frombuffer(sections["PROT"], dtype="u1").reshape(d.n_rows, 4)
-    protocol = Protocol(d.n_electrodes, table, _short(d.current_a))
+    protocol = Protocol(
+        d.n_electrodes, table, _short(d.current_a), _read_order(sections, table, where)
+    )
     if protocol.hash != protocol_hash:
         _refuse(where, "a protocol table that does not fit its hash")
     name = STORAGES[d.storage]

@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.scene.description import Scene
-from eitskin.skin.protocol import Protocol, table
+from eitskin.skin.protocol import Protocol, in_order, table
 
 FloatArray = npt.NDArray[np.float64]
 
 WHOLE_FRAMES = 512  # a scene of no more frames, quiet ones included, is simulated at once
 WINDOW_FRAMES = 64  # of a longer one: so many are compiled together, and made one at a time
+SAME_S = 1e-7  # rows so near to a frame's own are its own
 HEADROOM = 2.0  # of a longer one's range over its first quiet frames: touches may raise voltages
 
 
@@ -25,7 +26,7 @@ class BoardFrames:
     def __init__(self, scene: Scene, without: Collection[str] = ()) -> None:
         effects = {name: one for name, one in scene.effects.items() if name not in without}
         self.scene = replace(scene, effects=effects)
-        self._rows: dict[int, SceneRows] = {}
+        self._rows: dict[tuple[int, tuple[int, ...]], SceneRows] = {}
 
     def rows(self, protocol: Protocol) -> SceneRows:
         """The frames in the rows of ``protocol``. Electrodes that it does not name stay unused.
@@ -34,13 +35,15 @@ class BoardFrames:
             ProtocolError: the scene's skin has fewer electrodes than the protocol names.
             ConfigError, MissingExtraError: the scene cannot be simulated.
         """
-        if protocol.hash not in self._rows:
+        key, own = (protocol.hash, protocol.drive_order), self.scene.protocol
+        if key not in self._rows:
             scene = self.scene
-            if scene.protocol.hash != protocol.hash:
+            if key != (own.hash, own.drive_order):
                 rows, electrodes = protocol.drive_measure.tolist(), scene.skin.electrodes.count
-                scene = replace(scene, protocol=table(electrodes, rows, protocol.current_a))
-            self._rows[protocol.hash] = SceneRows(scene)
-        return self._rows[protocol.hash]
+                made = table(electrodes, rows, protocol.current_a)
+                scene = replace(scene, protocol=in_order(made, protocol.drive_order))
+            self._rows[key] = SceneRows(scene)
+        return self._rows[key]
 
     def voltage_v(self, protocol: Protocol) -> FloatArray:
         """All of them, (n, m) in V: the scene's quiet frames, then its own. Raises as ``rows``."""
@@ -65,6 +68,11 @@ class SceneRows:
         self._window = range(0)
         whole = scene.n_frames <= WHOLE_FRAMES
         self._size = scene.n_frames if whole else WINDOW_FRAMES
+        self.moves = not scene.frozen and any(
+            track.moves or np.isfinite(track.keyframes[0].t_s) or not track.hold
+            for track in scene.touches
+        )
+        """Whether touches change while they are scanned: each scan has rows of its own."""
         first = self.part(range(scene.n_frames if whole else min(scene.quiet_frames, self._size)))
         largest = float(np.abs(np.asarray(first, np.float32)).max(initial=0))
         self.largest_v = largest if whole else HEADROOM * largest
@@ -73,10 +81,24 @@ class SceneRows:
 
     def around(self, frame: int) -> tuple[int, FloatArray]:
         """Frames (k, m) among which is number ``frame``, and the number of the first of them: of a
-        long scene only this one, since each takes its time."""
+        long scene only this one, since each takes its time; where touches move only quiet ones."""
         if self._size == self.scene.n_frames:
-            return 0, self.part(range(self._size))
+            return 0, self.part(range(self.scene.quiet_frames if self.moves else self._size))
         return frame, self.part(range(frame, frame + 1))
+
+    def scan(self, frame: int, row_times_s: FloatArray) -> FloatArray:
+        """Recorded frame number ``frame`` (m,), quiet ones counted, with rows at ``row_times_s``
+        (m,) after the scene's time 0; after the last frame's scan all stays as it is."""
+        scene, recorded = self.scene, frame - self.scene.quiet_frames
+        nominal = recorded / scene.rate_hz + scene.row_delays_s
+        made = self.part(range(frame, frame + 1))[0]
+        if not self.moves or np.abs(row_times_s - nominal).max() < SAME_S:
+            return np.asarray(made)
+        end_s = (scene.frames - 1) / scene.rate_hz + scene.scan_s
+        before = self._maker.work.solves
+        made = self._maker.frame(frame, np.minimum(row_times_s, end_s))
+        self.solves += self._maker.work.solves - before
+        return made
 
     def part(self, frames: range) -> FloatArray:
         """``frames`` (k, m) in V."""
@@ -108,6 +130,17 @@ class RecordedRows:
 
     def __len__(self) -> int:
         return self._rows.scene.frames
+
+    def at(self, frame: int, time_s: float) -> FloatArray:
+        """Frame number ``frame`` (m,) with all rows as they are ``time_s`` after time 0."""
+        rows = self._rows
+        instants_s = np.full(rows.scene.protocol.n_rows, time_s)
+        return rows.scan(rows.scene.quiet_frames + frame, instants_s)
+
+    @property
+    def moves(self) -> bool:
+        """Whether a row depends on when it is read, and not on its frame alone."""
+        return self._rows.moves
 
     def __getitem__(self, frame: int) -> FloatArray:
         number = self._rows.scene.quiet_frames + frame

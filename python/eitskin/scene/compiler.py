@@ -102,9 +102,6 @@ class States:
         """The states of ``frame``'s rows at their instants (m,)."""
         if frame < self._scene.quiet_frames:
             return self._same(self.of(frame, ()), len(times_s))
-        if (times_s == times_s[0]).all():
-            touches = self.motion.touches_at(float(times_s[0]))
-            return self._same(self.of(frame, touches), len(times_s))
         mix, touches_of = self.motion.at(times_s), self.motion.states
         number = {k: self.of(frame, touches_of[k]) for k in used_in(mix)}
         every = np.zeros(len(touches_of), np.int64)
@@ -217,9 +214,9 @@ def prepare_scene(
     return Prepared(scene, skin, steps, parameters, phase, mesh_cache, work, factors)
 
 
-def compile_frames(prepared: Prepared, frames: range, *, roam: bool = False) -> Compiled:
-    """Compile only ``frames`` of a prepared scene, of all frames, quiet ones first; ``roam``: rows
-    may be asked for at any instant up to a period around them. Raises as ``compile_scene``."""
+def compile_frames(prepared: Prepared, frames: range) -> Compiled:
+    """Compile only ``frames`` of a prepared scene, of all frames, quiet ones first. Raises as
+    ``compile_scene``."""
     scene, skin, steps = prepared.scene, prepared.skin, prepared.steps
     phase, mesh_cache, work = prepared.phase, prepared.mesh_cache, prepared.work
     table = States(scene, mesh_cache.cover(skin, scene.elements), steps, frames)
@@ -230,8 +227,7 @@ def compile_frames(prepared: Prepared, frames: range, *, roam: bool = False) -> 
     )
     pairs = tuple(dict.fromkeys((i, j) for state in states for i, j, _ in state.contacts.bridges))
     model.patterns = with_bridges(model.patterns, pairs)
-    spare = _spare(scene, table, frames) if roam else []
-    method, reach, counted = _choose_method(scene, model, states, steps, spare)
+    method, reach, counted = _choose_method(scene, model, states, steps)
     known = {}
     as_described = prepared.as_described
     base_factors = prepared.base_factors if method == "update" and as_described else None
@@ -362,15 +358,6 @@ def _states_of_frames(
     return state_of_frame, mixes
 
 
-def _spare(scene: Scene, states: States, frames: range) -> list[Change]:
-    """Of all states that rows around ``frames`` may have."""
-    start, stop = (number - scene.quiet_frames for number in (frames.start, frames.stop))
-    if scene.frozen or stop <= 0:
-        return []
-    start_s, stop_s = max(start - 1, 0) / scene.rate_hz, (stop + 1) / scene.rate_hz
-    return [states.change(touches) for touches in states.motion.between(start_s, stop_s)]
-
-
 def contact_key(contacts: Contacts) -> tuple[bytes, bytes, tuple[tuple[int, int, float], ...]]:
     """Equal for equal contacts."""
     return contacts.impedance_ohm_m2.tobytes(), contacts.detached.tobytes(), contacts.bridges
@@ -415,14 +402,10 @@ def _check_contacts(contacts: Contacts, count: int, where: str) -> None:
 
 
 def _choose_method(
-    scene: Scene,
-    model: ForwardModel,
-    states: Sequence[State],
-    steps: Sequence[Step],
-    spare: Sequence[Change],
+    scene: Scene, model: ForwardModel, states: Sequence[State], steps: Sequence[Step]
 ) -> tuple[str, IntArray, UpdateCost | None]:
-    """How to solve, the unknowns that touches and ``spare`` reach (for the update), and the count
-    that decided it."""
+    """How to solve, the unknowns that touches reach (for the update), and the count that decided
+    it."""
     nothing = np.zeros(0, np.int64)
     varying = [
         step.name
@@ -443,8 +426,7 @@ def _choose_method(
     reach = np.unique(np.concatenate([*under, nothing]))
     counted = count_costs(model, shunted, np.array([len(one) for one in under]), len(reach))
     if scene.solver == "update" or counted.cheaper == "update":
-        more = [touched_unknowns(model, shunted, change.elements) for change in spare]
-        return "update", np.unique(np.concatenate([reach, *more])), counted
+        return "update", reach, counted
     return "factorise", nothing, counted
 
 

@@ -138,8 +138,8 @@ class Scene:
     @property
     def row_delays_s(self) -> FloatArray:
         """Each row's instant (m,) after the beginning of the scan; 0 where ``frozen``."""
-        rows = self.protocol.n_rows
-        return np.asarray(0.0 if self.frozen else self.scan_s / rows) * np.arange(rows)
+        row_s = 0.0 if self.frozen else self.scan_s / self.protocol.n_rows
+        return np.asarray(row_s * self.protocol.scan_places)
 
     @property
     def truth_delay_s(self) -> float:

@@ -118,9 +118,9 @@ class Update:
     """One factorisation of the untouched skin, then a low-rank update for each call; background and
     contacts stay.
 
-    ``reach`` (u,) are all unknowns that any state touches (``touched_unknowns``), so that storage
-    is known beforehand; ``base_factors`` are those of the untouched skin's matrix, where they are
-    known.
+    ``reach`` (u,) are all unknowns that a state is known to touch (``touched_unknowns``), so that
+    storage is known beforehand; a state that touches others costs the columns again.
+    ``base_factors`` are those of the untouched skin's matrix, where they are known.
     """
 
     def __init__(
@@ -152,6 +152,9 @@ class Update:
         unknowns, dense = _dense_change(
             self.model, self._system, stiffness, change.elements, values
         )
+        if not np.isin(unknowns, self.reach).all():
+            self.reach = np.union1d(self.reach, unknowns)
+            self._solve_base()
         self._solve_columns(unknowns)
         place = np.searchsorted(self.reach, unknowns)
         g = self._columns[place][:, place].T
@@ -176,6 +179,12 @@ class Update:
             self.work.complex_factorisations += int(self.phase is not None)
         self._dtype = np.result_type(self._base_values, impedance)
         self._stiffness = element_stiffness(model)
+        self._solve_base()
+        self._ready = True
+
+    def _solve_base(self) -> None:
+        """The untouched skin's potentials on what is reached, and no column."""
+        model, system = self.model, self._system
         electrodes = system.unknown[model.mesh.n_nodes :]
         self._kept = np.concatenate([self.reach, np.minimum(electrodes, system.size - 1)])
         self._grounded = electrodes == system.size
@@ -184,7 +193,6 @@ class Update:
         self._base_touched, self._base_electrodes = base[: len(self.reach)], base[len(self.reach) :]
         self._columns = np.zeros((len(self.reach), len(self._kept)), self._dtype)
         self._known = np.zeros(len(self.reach), np.bool_)
-        self._ready = True
 
     def _column(self, load: AnyArray) -> AnyArray:
         """One solve, kept on the unknowns that matter. One at a time: the same bits whatever is

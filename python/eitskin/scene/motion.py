@@ -93,15 +93,6 @@ class Motion:
                 part[k] = 0.0
         return Mix(lower, upper, part)
 
-    def between(self, start_s: float, end_s: float) -> list[Touches]:
-        """All states that instants from ``start_s`` to ``end_s`` may need."""
-        first, last = np.searchsorted(self._breaks, [start_s - SAME_S, end_s + SAME_S])
-        return [
-            self.states[self._state(number, place)]
-            for number in range(int(first), int(last) + 1)
-            for place in range(len(self._leg(number).state_s))
-        ]
-
     def _in_leg(self, number: int, times_s: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         leg = self._leg(number)
         last = len(leg.state_s) - 1

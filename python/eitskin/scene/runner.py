@@ -65,6 +65,7 @@ class FrameMaker:
         self._times = compiled.times_s()
         states = compiled.states
         self._readings = {k: self._read(v, states[k]) for k, v in compiled.known.items()}
+        self._last: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros(0))
 
     def reading(self, number: int) -> TrueVoltages:
         """State ``number``'s voltages before excitation, front end and converter."""
@@ -95,8 +96,17 @@ class FrameMaker:
         Raises:
             ConfigError: a voltage is not finite.
         """
+        mix = None if row_times_s is None else self.compiled.table.mix(frame, row_times_s)
+        if mix is None or not mix.still:
+            return self._made(frame, self._true(frame, mix))
+        key = frame, int(mix.lower[0])
+        if key != self._last[0]:
+            self._last = key, self._made(frame, self.reading(key[1]))
+        return self._last[1]
+
+    def _made(self, frame: int, reading: TrueVoltages) -> FloatArray:
+        """A frame of true voltages, through what stands between them and the recorded ones."""
         scene, place = self.compiled.scene, frame - self.compiled.frames.start
-        reading = self._true(frame, row_times_s)
         v, time_s = reading.v, float(self._times[place])
         for function in self.compiled.functions:
             v = function(v, reading.loads, time_s, frame)  # type: ignore[arg-type]
@@ -109,16 +119,11 @@ class FrameMaker:
             )
         return np.asarray(v, dtype=np.float64)
 
-    def _true(self, frame: int, row_times_s: FloatArray | None) -> TrueVoltages:
+    def _true(self, frame: int, mix: Mix | None) -> TrueVoltages:
         place = frame - self.compiled.frames.start
-        if row_times_s is not None:
-            mix = self.compiled.table.mix(frame, row_times_s)
-        elif place in self.compiled.mixes:
-            mix = self.compiled.mixes[place]
-        else:
+        mix = self.compiled.mixes.get(place) if mix is None else mix
+        if mix is None:
             return self.reading(int(self.compiled.state_of_frame[place]))
-        if mix.still:
-            return self.reading(int(mix.lower[0]))
         return blend({k: self.reading(k) for k in used_in(mix)}, mix)
 
 
@@ -212,6 +217,7 @@ def run(
         voltage_v=done.voltage_v[scene.quiet_frames :],
         reference_voltage_v=done.voltage_v[: scene.quiet_frames],
         time_s=scene.times_s(),
+        row_time_s=scene.row_delays_s if compiled.mixes else None,
         meta=meta_of(compiled, done),
         **truth_fields(truth),
     )

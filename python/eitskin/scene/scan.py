@@ -18,8 +18,8 @@ IntArray = npt.NDArray[np.int64]
 def row_delays_s(session: EffectSession) -> FloatArray:
     """When each row (m,) is read, in s after its frame's time: rows follow each other evenly over
     the frame."""
-    rows = session.protocol.n_rows
-    return np.asarray(np.arange(rows) / (rows * session.rate_hz))
+    protocol = session.protocol
+    return np.asarray(protocol.scan_places / (protocol.n_rows * session.rate_hz))
 
 
 def channels(protocol: Protocol) -> tuple[IntArray, IntArray]:
@@ -36,12 +36,13 @@ def switched(protocol: Protocol) -> npt.NDArray[np.bool_]:
 
     The scan is periodic: the last row comes before the first.
     """
-    rows = protocol.drive_measure
-    return np.asarray(rows != np.roll(rows, 1, axis=0))
+    rows = protocol.drive_measure[protocol.scan_rows]
+    return np.asarray(rows != np.roll(rows, 1, axis=0))[protocol.scan_places]
 
 
 def settled_from_the_row_before(target: npt.NDArray[Any], left: float) -> npt.NDArray[Any]:
-    """What a first-order settling leaves in each row (m,) of a periodic scan.
+    """What a first-order settling leaves in each row (m,) of a periodic scan, in the order that
+    they are measured.
 
     Row k starts from what row k - 1 reached, and ``left`` (0 to below 1) of the distance to
     ``target[k]`` remains: y_k = target_k + left (y_{k-1} - target_k), row 0 coming after the last

@@ -12,14 +12,18 @@ import numpy.typing as npt
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.fem.sensitivity import element_to_pixel
+from eitskin.frames.paths import Paths
 from eitskin.scene.compiler import Compiled, State, background_of
+from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import touched
+from eitskin.scene.laws import ShortCircuit
 from eitskin.scene.random_touches import TrueTouch
-from eitskin.scene.touch_path import touches_at
+from eitskin.scene.touch_path import sample, touches_at
 
 FloatArray = npt.NDArray[np.float64]
 
 MAX_CELLS = 500_000_000
+LAW_PIECES = 16  # straight lines between two keyframes, for a law that bends
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +39,7 @@ class Truth:
     truth_mask: npt.NDArray[np.int8] | None
     truth_mask_extent_mm: tuple[float, float, float, float] | None
     truth_conductivity_s_per_m: npt.NDArray[np.float32] | None
+    paths: Paths | None
 
 
 def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
@@ -60,7 +65,30 @@ def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
         truth_mask=masks,
         truth_mask_extent_mm=extent,
         truth_conductivity_s_per_m=conductivity,
+        paths=_paths(compiled.scene) if compiled.mixes else None,
     )
+
+
+def _paths(scene: Scene) -> Paths | None:
+    """The ways of all touches from the first frame's beginning to the last one's end."""
+    end_s, points = scene.frames / scene.rate_hz, []
+    for number, track in enumerate(scene.touches):
+        keys = track.keyframes
+        times = [np.clip(key.t_s, 0, end_s) for key in keys]
+        times += [end_s] if track.hold else []
+        if len(set(times)) < 2:
+            continue
+        pieces = 1 if isinstance(track.law, ShortCircuit) else LAW_PIECES
+        bounds = np.unique(times)
+        fine = np.arange(pieces * (len(bounds) - 1) + 1) / pieces
+        at = np.interp(fine, np.arange(len(bounds)), bounds)
+        ways = sample(track, at)
+        own = [np.full(len(at), number), at, ways.x_mm, ways.y_mm]
+        points.append(np.column_stack([*own, ways.radius_mm, ways.contrast - 1.0]))
+    if not points:
+        return None
+    flat = np.concatenate(points)
+    return Paths(flat[:, 0].astype(np.int64), flat[:, 1], flat[:, 2:4], flat[:, 4], flat[:, 5])
 
 
 def _states_at_truth(compiled: Compiled) -> tuple[npt.NDArray[np.int64], list[State]]:

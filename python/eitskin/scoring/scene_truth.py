@@ -24,8 +24,9 @@ LOOKED_FOR = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 
 class SceneTruth:
     """The touches of ``scene`` at the board's times; ``sign`` is which changes the board looks for.
-    A simulated board shows the scene's frame that is nearest to the beginning of a scan, an
-    emulated one (``held``) the last that has begun by then. With ``loop`` the scene begins again
+    They are those of the end of a frame's scan. Of a frozen scene a simulated board shows the frame
+    that is nearest to the beginning of a scan, an emulated one (``held``) the last that has begun
+    by then. With ``loop`` the scene begins again
     at its end: a simulated board's with the next scan, an emulated one's at once.
     """
 
@@ -53,17 +54,18 @@ class SceneTruth:
         return self._began_us
 
     def touches(self, time_us: int) -> tuple[TrueTouch, ...]:
-        """What was there when the scan of a frame began at ``time_us``."""
+        """What a frame shows whose scan began at ``time_us``."""
         if self._began_us is None:
             self._began_us = time_us
         if self._loop:
             self._begin_again(time_us)
-        frame = min(self._frame(time_us), self.scene.frames - 1)
-        return tuple(
-            t
-            for t in touches_at(self._samples, frame)
-            if int(np.sign(t.contrast - 1)) in self._wanted
-        )
+        scene, last = self.scene, self.scene.frames - 1
+        if scene.frozen:
+            there = touches_at(self._samples, min(self._frame(time_us), last))
+        else:
+            time_s = min(self._elapsed_s(time_us), last / scene.rate_hz) + scene.truth_delay_s
+            there = touches_at(scene.samples_at(np.array([time_s])), 0)
+        return tuple(t for t in there if int(np.sign(t.contrast - 1)) in self._wanted)
 
     def over(self, time_us: int) -> bool:
         """Whether the scene has ended when the scan of a frame begins at ``time_us``."""
@@ -82,8 +84,10 @@ class SceneTruth:
             self._began_us += round(1e6 * loops * scene.frames / scene.rate_hz)
 
     def _frame(self, time_us: int) -> int:
-        elapsed_s = ((time_us - (self._began_us or 0)) % WRAP_US) / 1e6
-        return int(elapsed_s * self.scene.rate_hz + self._ahead)
+        return int(self._elapsed_s(time_us) * self.scene.rate_hz + self._ahead)
+
+    def _elapsed_s(self, time_us: int) -> float:
+        return float((time_us - (self._began_us or 0)) % WRAP_US) / 1e6
 
     def matching(self, true: Sequence[TrueTouch], found_mm: npt.ArrayLike) -> Matching:
         """Which of the found places (k, 2) in mm is which true touch; within 10 mm on the paper's

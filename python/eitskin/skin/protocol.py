@@ -3,14 +3,18 @@
 Electrodes are numbered from 0. A row is [I+, I-, V+, V-]: the current enters at I+ and leaves at
 I-, and the boundary voltage is phi(V+) - phi(V-). By reciprocity row [V+, V-, I+, I-] has the same
 voltage; swapping a pair flips its sign.
+
+Rows of one drive that stand together are a drive. Drives are measured in the order of
+``drive_order``, the rows of each as they stand; it changes when a row is measured, not its place in
+a frame.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from math import isfinite
+from dataclasses import dataclass, replace
+from math import gcd, isfinite
 from typing import Any
 
 import numpy as np
@@ -44,16 +48,18 @@ class Reciprocity:
 
 @dataclass(frozen=True, eq=False)
 class Protocol:
-    """A scan of m rows (m, 4) [I+, I-, V+, V-] with one drive current.
+    """A scan of m rows (m, 4) [I+, I-, V+, V-] with one drive current. ``drive_order`` numbers the
+    drives as they are measured; () is as they stand.
 
     Raises:
         ProtocolError: no rows, too many, an electrode that does not exist, a pair of one electrode,
-            or a bad current.
+            a bad current, or an order that does not have each drive once.
     """
 
     n_electrodes: int
     drive_measure: TableArray
     current_a: float = DEFAULT_CURRENT_A
+    drive_order: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if not MIN_COUNT <= self.n_electrodes <= MAX_COUNT:
@@ -66,6 +72,32 @@ class Protocol:
         object.__setattr__(
             self, "drive_measure", _checked_rows(self.drive_measure, self.n_electrodes)
         )
+        order, drives = tuple(int(k) for k in self.drive_order), len(self.drive_starts)
+        if order and sorted(order) != list(range(drives)):
+            raise ProtocolError(
+                f"protocol: the order must have each drive once, 0 to {drives - 1}, not"
+                f" {list(order)[:8]}{' ...' if len(order) > 8 else ''}"
+            )
+        object.__setattr__(self, "drive_order", () if order == tuple(range(drives)) else order)
+
+    @property
+    def drive_starts(self) -> IntArray:
+        """The first row of each drive (d,)."""
+        pairs = self.drive_measure[:, :2]
+        return np.flatnonzero(np.r_[True, (pairs[1:] != pairs[:-1]).any(axis=1)])
+
+    @property
+    def scan_rows(self) -> IntArray:
+        """The rows (m,) in the order that they are measured."""
+        if not self.drive_order:
+            return np.arange(self.n_rows)
+        runs = np.split(np.arange(self.n_rows), self.drive_starts[1:])
+        return np.concatenate([runs[k] for k in self.drive_order])
+
+    @property
+    def scan_places(self) -> IntArray:
+        """When each row (m,) is measured: 0 is first."""
+        return np.argsort(self.scan_rows)
 
     @property
     def n_rows(self) -> int:
@@ -74,8 +106,8 @@ class Protocol:
 
     @property
     def hash(self) -> int:
-        """FNV-1a, 64 bits, over u16le n_electrodes, u16le m, then the rows' bytes. The current does
-        not enter."""
+        """FNV-1a, 64 bits, over u16le n_electrodes, u16le m, then the rows' bytes. The current and
+        the order do not enter."""
         value = 0xCBF29CE484222325
         for byte in (
             struct.pack("<HH", self.n_electrodes, self.n_rows) + self.drive_measure.tobytes()
@@ -174,6 +206,26 @@ def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> 
     return protocol
 
 
+def in_order(protocol: Protocol, order: str | Iterable[int]) -> Protocol:
+    """``protocol`` with its drives measured in ``order``: their numbers; or "by k", drive k j
+    modulo their count at place j.
+
+    Raises:
+        ProtocolError: it does not have each drive once.
+    """
+    if isinstance(order, str):
+        drives = len(protocol.drive_starts)
+        word, _, number = order.partition(" ")
+        step = int(number) if word == "by" and number.isdecimal() and number.isascii() else 0
+        if step < 1 or gcd(step, drives) != 1:
+            raise ProtocolError(
+                f'protocol: order = "{order}" does not have each of {drives} drives once; use "by'
+                ' K", K a whole number without a divisor that they have, or a list of all drives'
+            )
+        order = [step * k % drives for k in range(drives)]
+    return replace(protocol, drive_order=tuple(order))
+
+
 def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where: str) -> Protocol:
     """The protocol in a parsed TOML table; ``where`` names its source in errors. An empty table is
     adjacent.
@@ -182,7 +234,7 @@ def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where:
         ConfigError: an unknown key, a wrong type, or a key that does not go with the kind.
         ProtocolError: the protocol cannot be.
     """
-    check_keys(toml_table, ("kind", "skip", "table", "current_a"), where)
+    check_keys(toml_table, ("kind", "skip", "table", "current_a", "order"), where)
     kind = choice(toml_table, "kind", "adjacent", KINDS, where)
     for key in ("skip", "table"):
         if key in toml_table and kind != key:
@@ -192,31 +244,38 @@ def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where:
     )
     try:
         if kind == "adjacent":
-            return adjacent(n_electrodes, current_a)
-        if kind == "opposite":
-            return opposite(n_electrodes, current_a)
-        if kind == "skip":
-            return skip(
-                n_electrodes,
-                integer(toml_table, "skip", None, where, low=0, high=MAX_COUNT),
-                current_a,
-            )
-        return table(n_electrodes, _rows_of_table(toml_table, where), current_a)
+            made = adjacent(n_electrodes, current_a)
+        elif kind == "opposite":
+            made = opposite(n_electrodes, current_a)
+        elif kind == "skip":
+            skipped = integer(toml_table, "skip", None, where, low=0, high=MAX_COUNT)
+            made = skip(n_electrodes, skipped, current_a)
+        else:
+            made = table(n_electrodes, _rows_of_table(toml_table, where), current_a)
+        order = toml_table.get("order")
+        return made if order is None else in_order(made, _checked_order(order, where))
     except ProtocolError as error:
         raise ProtocolError(f"{where}: {error}") from None
+
+
+def _checked_order(order: Any, where: str) -> str | list[int]:
+    if isinstance(order, str) or (
+        isinstance(order, list) and order and all(type(one) is int for one in order)
+    ):
+        return order
+    raise ConfigError(f'{where}: order must be "by 7" or a list of all drives, not {order!r}')
 
 
 def protocol_to_table(protocol: Protocol) -> dict[str, Any]:
     """The table from which ``protocol_from_table`` makes one with the same rows, by a kind's name
     if it can."""
+    rest: dict[str, Any] = {"current_a": protocol.current_a}
+    if protocol.drive_order:
+        rest["order"] = list(protocol.drive_order)
     for name, made in _named(protocol.n_electrodes):
         if np.array_equal(made.drive_measure, protocol.drive_measure):
-            return {**name, "current_a": protocol.current_a}
-    return {
-        "kind": "table",
-        "table": protocol.drive_measure.tolist(),
-        "current_a": protocol.current_a,
-    }
+            return {**name, **rest}
+    return {"kind": "table", "table": protocol.drive_measure.tolist(), **rest}
 
 
 def _named(n: int) -> Iterable[tuple[dict[str, Any], Protocol]]:

@@ -10,9 +10,10 @@ import pytest
 
 from eitskin.errors import EitskinError, FileError, FrameError
 from eitskin.frames.frames import FORMAT, Frames, load_frames, save_frames
-from eitskin.skin.protocol import adjacent
+from eitskin.frames.paths import Paths
+from eitskin.skin.protocol import adjacent, in_order
 
-PROTOCOL = adjacent(8, current_a=2e-3)
+PROTOCOL = in_order(adjacent(8, current_a=2e-3), "by 3")
 CHANNELS = 40
 
 
@@ -28,6 +29,9 @@ def make_frames(**changes: Any) -> Frames:
         "truth_mask": rng.integers(-1, 2, size=(3, 4, 6)).astype(np.int8),
         "truth_mask_extent_mm": (-97.0, -97.0, 97.0, 97.0),
         "meta": {"source": "seed 1", "options": {"snr_db": 60.0}},
+        "row_time_s": 1e-4 * PROTOCOL.scan_places,
+        "paths": Paths(np.array([0, 0, 1, 1, 1]), np.array([0.0, 0.2, 0.1, 0.2, 0.3]),
+                       np.arange(10.0).reshape(5, 2), np.full(5, 8.0), np.ones(5)),
     }  # fmt: skip
     return Frames(**(fields | changes))
 
@@ -38,7 +42,7 @@ def test_saved_frames_come_back_equal(tmp_path: Path) -> None:
     back = load_frames(tmp_path / "f.npz")
     same = (
         "voltage_v", "reference_voltage_v", "time_s", "touch_frame", "touch_xy_mm",
-        "touch_radius_mm", "truth_mask",
+        "touch_radius_mm", "truth_mask", "row_time_s",
     )  # fmt: skip
     for name in same:
         assert np.array_equal(getattr(back, name), getattr(frames, name)), name
@@ -51,6 +55,10 @@ def test_saved_frames_come_back_equal(tmp_path: Path) -> None:
     assert back.meta == frames.meta
     assert (back.protocol.hash, back.protocol.current_a) == (PROTOCOL.hash, 2e-3)
     assert back.touches_in(2).tolist() == [1, 2] and back.touches_in(1).tolist() == []
+    assert back.protocol.drive_order == PROTOCOL.drive_order == (0, 3, 6, 1, 4, 7, 2, 5)
+    assert back.paths is not None
+    for time_s, places in ((0.05, [[0.5, 1.5]]), (0.15, [[1.5, 2.5], [5.0, 6.0]]), (0.31, [])):
+        assert back.paths.at(time_s)[0].tolist() == places
 
 
 def test_equal_frames_give_equal_bytes(tmp_path: Path) -> None:
@@ -90,6 +98,8 @@ def test_one_reference_frame_becomes_a_row_and_names_are_counted() -> None:
         ({"reference_voltage_v": np.zeros((0, CHANNELS))}, "at least one quiet frame"),
         ({"frame_name": ("a",)}, "1 names for 3 frames"),
         ({"time_s": np.zeros(2)}, "time_s has shape"),
+        ({"row_time_s": np.zeros(2)}, "row_time_s has shape"),
+        ({"row_time_s": np.full(CHANNELS, np.nan)}, "row_time_s: frame 0, channel 0 is nan"),
         ({"touch_frame": np.array([0, 3, 1])}, "there are 0 to 2"),
         ({"touch_frame": np.array([0.5, 1, 1])}, "whole numbers"),
         ({"touch_frame": None}, "touch_xy_mm without touch_frame"),
@@ -134,6 +144,10 @@ def rewritten(path: Path, **changes: Any) -> Path:
         ({"current_a": np.array("abc")}, "wrong type|current"),
         ({"voltage_v": np.array(["a"])}, "real numbers"),
         ({"touch_frame": np.array([0, 9, 1])}, "there are 0 to 2"),
+        ({"drive_order": np.arange(7)}, "each drive once"),
+        ({"path_time_s": None}, "path_touch without the other path fields"),
+        ({"path_time_s": np.zeros(5)}, "path_time_s within a touch"),
+        ({"path_radius_mm": np.full(5, np.nan)}, "path_radius_mm must be finite"),
     ],
 )  # fmt: skip
 def test_wrong_files_are_refused_in_one_line_naming_the_file(

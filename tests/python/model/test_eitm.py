@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from eitskin.errors import EitskinError, FileError, ModelError
 from eitskin.model import eitm
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.eitm import decode_model, encode_model, load_model, save_model
-from eitskin.skin.protocol import table
+from eitskin.skin.protocol import in_order, table
 from small_models import DATA_KINDS, STORAGES, prebuilt, small, small_blob, small_model, tiny_blob
 
 ITEM = {"f32": "<f4", "f16": "<f2", "i16": "<i2", "i8": "i1"}
@@ -60,6 +60,26 @@ def test_round_trip(storage: str, data_kind: str) -> None:
     assert first.defaults == again.defaults
     assert first.defaults.lambda_rel == 0.03  # not 0.029999999329
     assert first.meta == again.meta
+
+
+def test_the_order_of_drives_is_kept_and_only_whole_ones_are_read() -> None:
+    made = replace(prebuilt()[0], protocol=in_order(prebuilt()[0].protocol, "by 7"))
+    blob = encode_model(made)
+    assert struct.unpack_from("<2H", blob, 4) == (1, 6)
+    again = decode_model(blob, "x")
+    assert again.protocol.drive_order == made.protocol.drive_order
+    assert encode_model(again) == blob
+    at, size, flags = sections_of(blob)["ORDR"]
+    assert (size, flags) == (4 * 208, 0)
+    words = np.frombuffer(blob, "<u2", 2 * 208, at).reshape(2, 208)
+    assert np.array_equal(words, [made.protocol.scan_rows, made.protocol.scan_places])
+    assert CoreEngine(blob).self_test() == 0
+    for place, value in ((0, 208), (0, 91), (208, 1), (415, 900)):
+        broken = bytearray(blob)
+        struct.pack_into("<H", broken, at + 2 * place, value)
+        assert "'ORDR'" in refusal(sealed(broken))
+        with pytest.raises(EitskinError):
+            CoreEngine(sealed(broken))
 
 
 def test_header_as_documented() -> None:

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 from tests.python.scene.scene_helpers import moving_scene, still_scene
 
+from eitskin.device.bank import BANK_BYTES, bank_bytes
+from eitskin.device.client import Device
+from eitskin.device.simulated import SimBoard, SimTransport
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import RawFrame
+from eitskin.emulator.clocktime import TICKS_PER_S
+from eitskin.emulator.scene_skin import skin_of
 from eitskin.errors import ConfigError
+from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import Scene, load_scene
 from eitskin.scene.laws import ShortCircuit
@@ -17,6 +25,8 @@ from eitskin.scene.motion import Motion
 from eitskin.scene.runner import FrameMaker, run, simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.touch_path import Keyframe, TouchTrack
+from eitskin.skin.protocol import adjacent, in_order, table
+from small_models import prebuilt
 
 RATE_HZ = 1e4 / 208  # scans of 100 us a row, one behind the other
 
@@ -52,7 +62,75 @@ def test_each_row_of_a_sudden_press_has_its_own_instant(mesh_cache: MeshCache) -
     expected = np.array([full[0], full[0], full[2], full[0], full[0]])
     expected[1, 60:], expected[3, :21] = full[2, 60:], full[2, :21]
     assert np.array_equal(v, expected)
-    assert run(compile_scene(scene)).touch_frame.tolist() == [1, 2]  # type: ignore[union-attr]
+    frames = run(compile_scene(scene))
+    assert frames.touch_frame is not None and frames.paths is not None
+    assert frames.touch_frame.tolist() == [1, 2]
+    assert frames.row_time_s is not None and frames.row_time_s[59:61] == pytest.approx(
+        [59e-4, 6e-3]
+    )
+    assert [len(frames.paths.at((208 + row) * row_s)[0]) for row in (59, 60)] == [0, 1]
+
+
+def test_rows_are_measured_in_the_protocols_order(mesh_cache: MeshCache) -> None:
+    """A touch that comes after three drives, 0, 7 and 14, is in the rows of the others; charge and
+    settling go from row to row as they are measured."""
+    track = press(3 * 13 * 1e-4 - 5e-5, 0, 9.0)
+    by_7 = in_order(adjacent(16), "by 7")
+    v = run(compile_scene(scene_of(track, protocol=by_7), mesh_cache=mesh_cache)).voltage_v
+    still = np.repeat(~np.isin(np.arange(16), (0, 7, 14)), 13)
+    assert np.array_equal(v[0] == v[1], still)
+    effects = {"charge_injection": {}, "mux": {}}
+    both = [
+        simulate_frames(
+            compile_scene(scene_of(press(-1, 0, 9), protocol=one, effects=effects))
+        ).voltage_v[0]
+        for one in (by_7, table(16, by_7.drive_measure[by_7.scan_rows]))
+    ]
+    assert np.array_equal(both[0][by_7.scan_rows], both[1])
+
+
+@pytest.mark.parametrize(
+    ("period_us", "check_every", "scan", "place"),
+    [(50_000, 1, 1, 1), (20_800, 1, 2, 85), (0, 0, 4, 85)],
+    ids=["as the scene", "faster", "half scans"],
+)
+def test_a_simulated_board_measures_each_row_at_its_slot(
+    period_us: int, check_every: int, scan: int, place: int
+) -> None:
+    """A touch comes 50.05 ms after the scene began: before place ``place`` of scan ``scan``."""
+    model, blob = prebuilt()
+    scene = scene_of(press(0.05005, 0, 9), frames=6, rate_hz=20.0, quiet_frames=4)
+    board = SimBoard(BoardFrames(scene), [bank_bytes(blob, 1), bytes([255]) * BANK_BYTES])
+    with Device(SimTransport("test", board)) as device:
+        device.scan(check_every=check_every, frame_period_us=period_us)
+        device.tare(4)
+        device.start_scene()
+        items = list(device.stream(Stream.RAW))
+    v = np.array([item.voltage_v for item in items if isinstance(item, RawFrame)])
+    fold = model.protocol.reciprocal_pairs()
+    order = np.setdiff1d(np.arange(208), [] if check_every else fold.second)
+    clear = np.abs(v[scan + 1] - v[0])[order] > 1e-4
+    assert 20 < clear.sum() < len(order)
+    changed = np.abs(v[: scan + 2] - v[0])[:, order] > 1e-4
+    after = np.arange(len(order)) >= place
+    assert not changed[:scan].any()
+    assert np.array_equal(changed[scan], clear & after) and clear[:place].any()
+
+
+def test_the_emulated_skin_follows_the_clock_row_by_row() -> None:
+    protocol = adjacent(16)
+    scene = scene_of(press(0.0611, 0, 9), frames=8, rate_hz=20.0)
+    skin = skin_of(scene, protocol)
+    skin.begin(0)
+    rows = [tuple(int(k) for k in row) for row in protocol.drive_measure]
+    scans = [
+        [skin.amplitude_v(round((start_s + 1e-4 * k) * TICKS_PER_S), row)
+         for k, row in enumerate(rows)]
+        for start_s in (0.03, 0.0511, 0.08)
+    ]  # fmt: skip
+    assert np.array_equal(scans[0][:], BoardFrames(scene).voltage_v(protocol)[2])
+    assert np.array_equal(scans[1][:100], scans[0][:100])
+    assert np.array_equal(scans[1][100:], scans[2][100:]) and scans[1][100] != scans[0][100]
 
 
 @pytest.mark.parametrize(
@@ -131,8 +209,6 @@ def test_states_are_those_at_the_keyframes_and_steps_between() -> None:
     assert counts == [0, 0, 1, 1, 1, 2, 2, 2, 1]
     assert np.flatnonzero(mix.part).tolist() == [2]
     assert not mix.still and motion.at(np.array([0.15, 0.19])).still
-    states = motion.between(0.0, 1.0)
-    assert {len(one) for one in states} == {0, 1, 2} and set(states) >= set(motion.states)
 
 
 def test_truth_is_that_of_the_end_of_the_scan() -> None:

@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eitskin.errors import ProtocolError
+from eitskin.errors import ConfigError, ProtocolError
 from eitskin.skin.protocol import (
     Protocol,
     adjacent,
+    in_order,
     opposite,
     protocol_from_table,
     protocol_to_table,
@@ -87,6 +88,11 @@ def test_opposite_and_skip() -> None:
         (lambda: table(16, [[0, 1, 2, 3], [2, 3, 0, 1], [1, 0, 2, 3]]), r"rows 0, 1, 2 \(from 0\)"),
         (lambda: Protocol(16, adjacent(16).drive_measure, 0.0), "current_a"),
         (lambda: Protocol(16, adjacent(16).drive_measure, float("nan")), "current_a"),
+        (lambda: in_order(adjacent(16), "by 4"), 'order = "by 4" does not have each of 16 drives'),
+        (lambda: in_order(adjacent(16), "by x"), 'use "by K"'),
+        (lambda: in_order(adjacent(16), [0, 1, 2]), "each drive once, 0 to 15"),
+        (lambda: in_order(adjacent(4), [0, 1, 2, 2]), "each drive once, 0 to 3"),
+        (lambda: protocol_from_table({"order": "by 2"}, 8, "x"), "x: protocol: order"),
     ],
 )  # fmt: skip
 def test_refused(make: Any, message: str) -> None:
@@ -162,6 +168,7 @@ def test_reciprocity_of_shuffled_and_flipped_tables(n: int, seed: int) -> None:
         (adjacent(5, 2e-3), {"kind": "adjacent"}),
         (opposite(8), {"kind": "opposite"}),
         (skip(16, 3), {"kind": "skip", "skip": 3}),
+        (in_order(adjacent(8), "by 3"), {"kind": "adjacent", "order": [0, 3, 6, 1, 4, 7, 2, 5]}),
         (table(6, [[0, 1, 2, 3], [3, 2, 5, 4]]),
          {"kind": "table", "table": [[0, 1, 2, 3], [3, 2, 5, 4]]}),
     ],
@@ -173,3 +180,20 @@ def test_table_round_trip(protocol: Protocol, kind: dict[str, Any]) -> None:
     assert again.hash == protocol.hash
     assert np.array_equal(again.drive_measure, protocol.drive_measure)
     assert again.current_a == protocol.current_a
+    assert again.drive_order == protocol.drive_order
+
+
+def test_an_order_changes_when_a_row_is_measured_and_nothing_else() -> None:
+    plain = adjacent(16)
+    by_7 = protocol_from_table({"order": "by 7"}, 16, "x")
+    assert by_7.drive_order[:4] == (0, 7, 14, 5) and plain.drive_order == ()
+    assert by_7.scan_rows[12:15].tolist() == [12, 91, 92]
+    assert by_7.scan_places[91:93].tolist() == [13, 14]
+    assert np.array_equal(by_7.scan_rows[by_7.scan_places], np.arange(208))
+    assert by_7.hash == plain.hash and np.array_equal(by_7.drive_measure, plain.drive_measure)
+    assert in_order(plain, range(16)).drive_order == ()
+    lone = in_order(table(6, [[0, 1, 2, 3], [3, 2, 5, 4], [3, 2, 0, 1]]), [1, 0])
+    assert lone.scan_rows.tolist() == [1, 2, 0]
+    for wrong in (7, [], ["a"], [True]):
+        with pytest.raises(ConfigError, match='order must be "by 7" or a list'):
+            protocol_from_table({"order": wrong}, 16, "x")

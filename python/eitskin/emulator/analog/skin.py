@@ -4,9 +4,9 @@ joined, from a scene's frames.
 Until the scene begins the quiet frames are shown, one a scan, over and over; ``restart_quiet``
 begins with the first again. Then frame floor(t rate_hz) is shown, t the board's time since the
 scene began, and the last one is held. A frame is one scan: which frame it is, is decided when a
-scan begins (a row that comes before the one before it). A frame's own course in time, its noise and
-front-end effects are the scene's; the scene's ``adc`` effect is left out, since the emulated
-converter does that.
+scan begins (a row that comes before the one before it); where touches move, each row is that of the
+time at which it is switched to. A frame's noise and front-end effects are the scene's; the scene's
+``adc`` effect is left out, since the emulated converter does that.
 
 Electrodes that are no row of the scene's protocol, nor one with pairs exchanged or turned round,
 give 0 V (counted in ``unknown_rows``); so does a pair that is not joined.
@@ -34,14 +34,28 @@ class Rows(TypingProtocol):
     def __getitem__(self, frame: int, /) -> FloatArray: ...
 
 
+class Moving(Rows, TypingProtocol):
+    """Frames that depend on when their rows are read."""
+
+    def at(self, frame: int, time_s: float) -> FloatArray:
+        """All rows (m,) as they are ``time_s`` after the scene began."""
+        ...
+
+
 class AnalogSkin:
     """``quiet_v`` (q, m) and ``frames_v`` (n rows of m): amplitudes in V, in the rows of
-    ``protocol``, for its current."""
+    ``protocol``, for its current; ``moving`` are ``frames_v`` where touches move while they are
+    scanned."""
 
     def __init__(
-        self, protocol: Protocol, quiet_v: FloatArray, frames_v: Rows, rate_hz: float
+        self,
+        protocol: Protocol,
+        quiet_v: FloatArray,
+        frames_v: Rows,
+        rate_hz: float,
+        moving: Moving | None = None,
     ) -> None:
-        self.protocol = protocol
+        self.protocol, self._moving = protocol, moving
         self.quiet_v, self.frames_v, self.rate_hz = quiet_v, frames_v, rate_hz
         self.rows = rows_of(protocol)
         self.unknown_rows: Counter[Joined] = Counter()
@@ -50,6 +64,7 @@ class AnalogSkin:
         self._row = len(protocol.drive_measure)
         self._shown: FloatArray = quiet_v[0]
         self._quiet_next = 0
+        self._frame = -1  # of the scene, shown in this scan; -1 is a quiet one
 
     @property
     def began(self) -> bool:
@@ -86,15 +101,24 @@ class AnalogSkin:
         if row < self._row or len(self._shown) == 1:
             self._next_frame(at)
         self._row = row
+        if self._moving is not None and self._frame >= 0:
+            self._shown = self._moving.at(self._frame, self._time_s(at))
         return sign * float(self._shown[row])
+
+    def _time_s(self, at: int) -> float:
+        """From the scene's beginning to ``at``."""
+        assert self._began is not None
+        return (at - self._began) / TICKS_PER_S
 
     def _next_frame(self, at: int) -> None:
         self.scans += 1
         if self._began is None or at < self._began:
             self._shown = self.quiet_v[self._quiet_next % len(self.quiet_v)]
             self._quiet_next += 1
+            self._frame = -1
         else:
-            self._shown = self.frames_v[min(self.frame_number(at), len(self.frames_v) - 1)]
+            self._frame = min(self.frame_number(at), len(self.frames_v) - 1)
+            self._shown = self.frames_v[self._frame]
 
 
 def rows_of(protocol: Protocol) -> dict[tuple[int, int, int, int], tuple[int, int]]:

@@ -72,9 +72,10 @@ def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Divides, then settles from the row before."""
     gains = dividers(parameters, session)
     left = unsettled(parameters)
+    order, places = session.protocol.scan_rows, session.protocol.scan_places
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
-        return settled_from_the_row_before(v * gains, left)
+        return np.asarray(settled_from_the_row_before((v * gains)[order], left)[places])
 
     note = (
         f"{parameters.on_resistance_ohm:g} ohm a switch; {100 * left:.3g} % of the row before is"
