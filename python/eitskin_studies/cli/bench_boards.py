@@ -59,6 +59,21 @@ def run_board(options: argparse.Namespace) -> int:
     return show(options, result, bench_board.as_text(result), filling, "board-cost")
 
 
+def add_energy(what: Any) -> None:
+    """``bench energy``."""
+    parser = what.add_parser("energy", help="energy a frame, estimated from data sheets")
+    add_page_option(parser, "board-cost")
+    parser.set_defaults(run=run_energy)
+
+
+def run_energy(options: argparse.Namespace) -> int:
+    """Estimate what a frame takes from the supply."""
+    from eitskin_studies.benchmarks import energy
+
+    result = energy.run()
+    return show(options, result, energy.as_text(result), energy.for_page(result), "board-cost")
+
+
 def add_view(what: Any) -> None:
     """``bench view``."""
     parser = what.add_parser(

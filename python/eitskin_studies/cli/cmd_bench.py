@@ -1,5 +1,5 @@
 """``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes,
-boards, kernels, growth, batches; what diagnostics are worth, and gestures."""
+boards, energy, kernels, growth, batches; what diagnostics are worth, and gestures."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ def add_parser(subparsers: Any) -> None:
     bench_frames.add_solve(what)
     bench_making.add_jacobian(what)
     bench_boards.add_board(what)
+    bench_boards.add_energy(what)
     bench_frames.add_kernels(what)
     bench_frames.add_growth(what)
     bench_boards.add_view(what)

@@ -41,6 +41,7 @@ EXPERIMENTS = {
     "deformation": (
         "a skin stretched and bent, by the flat one's model, before and after a fresh tare"
     ),
+    "paper": "weights placed one after another from the most sensitive place (Fig. 12)",
     "levers": (
         "what was tried to do better, each for itself: what helps for its MACs, and what does not"
     ),

@@ -18,8 +18,8 @@ from eitskin_studies.experiments.experiment import (
     plain,
     workspace_in,
 )
-from eitskin_studies.experiments.force import anywhere, detection, scenes
-from eitskin_studies.experiments.force.law import LOADS_G, NOMINAL, drawn_laws
+from eitskin_studies.experiments.force import anywhere, detection, scenes, sheet
+from eitskin_studies.experiments.force.law import GEL_LIMIT_KPA, LOADS_G, NOMINAL, SHEET, drawn_laws
 from eitskin_studies.experiments.force.readouts import (
     PEAK,
     READOUTS,
@@ -81,6 +81,9 @@ def test_every_table_has_its_place_on_the_page(
         "by-load",
         "over-snr",
         "detection",
+        "sheet-slopes",
+        "smallest",
+        "reach",
     ]
     assert set(outcome.pictures) == {"curves.png", "skin.png", "detection.png"}
     fills_its_page(outcome, "force", tmp_path)
@@ -117,7 +120,33 @@ def test_less_noise_shows_less_load(done: tuple[Path, ExperimentOutcome, int]) -
         assert share < upper <= 1 and one.quiet == 80
 
 
+def test_under_the_sheet_the_peak_rises_outwards_and_means_see_less(
+    done: tuple[Path, ExperimentOutcome, int],
+) -> None:
+    slopes, smallest, reach = done[1].tables[5:]
+    rising = {row[0]: row[-2] for row in slopes.rows}
+    assert rising[PEAK] == "yes" and len(smallest.rows) == 6
+    least = {
+        (one["contact"], one["snr_db"], one["mean_of"]): detection.Detection.from_dict(
+            {name: value for name, value in one.items() if name not in ("contact", "mean_of")}
+        )
+        for one in done[1].data["sheet"]["least"]
+    }
+    for contact in ("sheet", "tip"):
+        single, second = (least[contact, 50.0, n].threshold(0)[0] for n in (1, sheet.SECOND))
+        assert second < 0.6 * single
+    assert len(reach.rows) == len(sheet.MEANS)
+
+
 # ---- pieces ----
+
+
+def test_the_sheet_presses_with_what_the_papers_gel_stands() -> None:
+    assert SHEET.pressure_kpa(200) == pytest.approx(5.16, abs=0.01)
+    assert SHEET.pressure_kpa(scenes.SHEET_G[1]) < GEL_LIMIT_KPA < NOMINAL.pressure_kpa(50)
+    same = 50 * NOMINAL.pressure_kpa(50) / SHEET.pressure_kpa(50)
+    assert SHEET.contrast(same) == pytest.approx(NOMINAL.contrast(50))
+    assert SHEET.radius_mm(50) == SHEET.radius_mm(200) and "1.3 to 5.2 kPa" in sheet.pressures()
 
 
 def test_the_law_is_what_the_page_says() -> None:

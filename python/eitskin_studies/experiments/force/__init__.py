@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
-from eitskin_studies.experiments.force import anywhere, curves, detection, scenes
+from eitskin_studies.experiments.force import anywhere, curves, detection, scenes, sheet
 from eitskin_studies.experiments.force.law import NOMINAL, drawn_laws
 from eitskin_studies.experiments.force.readouts import (
     READOUTS,
@@ -86,10 +86,11 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             )
         )
 
+    under_sheet = sheet.measured(workspace, solver, instruments, light, found)
     both = (SNR_DB, AVERAGED_DB)
     tables = (
         curves.table_of(drawn), anywhere.table_of(judged, both), anywhere.by_load(judged, both),
-        anywhere.over_snr(judged, SNRS_DB), detection.table_of(found),
+        anywhere.over_snr(judged, SNRS_DB), detection.table_of(found), *under_sheet.tables(),
     )  # fmt: skip
     data = {
         "slopes": {
@@ -100,6 +101,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             {"reading": name, "snr_db": snr, **one.as_dict()} for (name, snr), one in judged.items()
         ],
         "detection": [one.as_dict() for one in found],
+        "sheet": under_sheet.as_dict(),
     }
     touch = judged[TOUCH, AVERAGED_DB]
     return ExperimentOutcome(
@@ -110,7 +112,10 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             "skin.png": lambda path: pictures.draw_skin(path, skin, places, judged, AVERAGED_DB),
             "detection.png": lambda path: pictures.draw_detection(path, found),
         },
-        {"sets": _sets(workspace, tuned, reported, laws, reps, touch)},
+        {
+            "sets": _sets(workspace, tuned, reported, laws, reps, touch),
+            "pressures": sheet.pressures(),
+        },
     )
 
 

@@ -67,6 +67,13 @@ class Detection:
         low, high = np.quantile(drawn, [0.025, 0.975], method="nearest")
         return least_load(self.loads_g, hits / tries), float(low), float(high)
 
+    def threshold_text(self, radius: int) -> str:
+        """As words."""
+        load, low, high = self.threshold(radius)
+        if load == float("inf"):
+            return f"more than {grams_text(self.loads_g[-1])} g"
+        return f"{grams_text(load)} g ({grams_text(low)} to {grams_text(high)})"
+
     def false_share(self) -> tuple[float, float]:
         """False alarms a quiet frame, and the upper 95 % bound (Clopper and Pearson, Biometrika 26,
         1934)."""
@@ -94,25 +101,34 @@ def least_load(loads_g: FloatArray, share: FloatArray) -> float:
 
 
 def detect(
-    instruments: Instruments, light: PressSet, snr_db: float, reps: int, quiet_frames: int
+    instruments: Instruments,
+    light: PressSet,
+    snr_db: float,
+    reps: int,
+    quiet_frames: int,
+    mean_of: int = 1,
 ) -> Detection:
-    """``reps`` frames of each press; quiet frames after several tares."""
+    """``reps`` frames of each press; quiet frames after several tares. With ``mean_of`` each frame,
+    also of the tare, is the mean of so many."""
     session, seed = light.session, light.session.touches.seed
     how, exact = converter_for(snr_db), session.exact_quiet_v
     span_v = how.adc_headroom * float(np.abs(exact).max())
     lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
     converter = noise_deviation_v(exact, snr_db), lsb_v, span_v, seed
+
+    def measured(exact_v: FloatArray, name: str) -> FloatArray:
+        frames, _ = measure(np.repeat(exact_v, mean_of, axis=0), *converter, name)
+        return frames.reshape(len(exact_v), mean_of, -1).mean(axis=1)
+
     false, looked, each = 0, 0, -(-quiet_frames // TARES)
     for tare in range(TARES):
-        quiet, _ = measure(np.tile(exact, (QUIET, 1)), *converter, f"force tare {tare} {snr_db:g}")
+        quiet = measured(np.tile(exact, (QUIET, 1)), f"force tare {tare} {snr_db:g}")
         batch = instruments.batch("difference", quiet)
-        still, _ = measure(np.tile(exact, (each, 1)), *converter, f"force still {tare} {snr_db:g}")
+        still = measured(np.tile(exact, (each, 1)), f"force still {tare} {snr_db:g}")
         results = list(batch.each(still))
         false += sum(isinstance(r, Reconstruction) and len(r.touches) > 0 for r in results)
         looked += len(results)
-    frames, _ = measure(
-        np.repeat(session.exact_v, reps, axis=0), *converter, f"force light {snr_db:g}"
-    )
+    frames = measured(np.repeat(session.exact_v, reps, axis=0), f"force light {snr_db:g}")
     loads = np.unique(light.grams)
     hits, tries = np.zeros((2, len(RADIUS_SHARES), len(loads)))
     for k, result in enumerate(batch.each(frames)):
@@ -127,7 +143,8 @@ def detect(
     return Detection(snr_db, loads, hits, tries, false, looked)
 
 
-def _grams(value: float) -> str:
+def grams_text(value: float) -> str:
+    """With two digits."""
     return "none" if value == float("inf") else f"{value:.2g}" if value < 10 else f"{value:.0f}"
 
 
@@ -137,13 +154,7 @@ def table_of(found: list[Detection]) -> Table:
     for one in found:
         cells = []
         for radius in range(len(RADIUS_SHARES)):
-            load, low, high = one.threshold(radius)
-            most = _grams(one.loads_g[-1])
-            cells.append(
-                f"more than {most} g"
-                if load == float("inf")
-                else f"{_grams(load)} g ({_grams(low)} to {_grams(high)})"
-            )
+            cells.append(one.threshold_text(radius))
         share, upper = one.false_share()
         rows.append(
             (

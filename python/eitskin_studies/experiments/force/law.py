@@ -6,6 +6,8 @@ the piezoresistive law.
   section 4.2). Hydrogels of skins have moduli of tens of kPa. The sheet, 12 mm, is no half-space
   beside contacts of 8 mm: that goes into the deviation of the modulus.
 - Contrast: ``scene.laws.Piezoresistive``, 1 + c (1 - exp(-s grams / c)).
+- Under a metal sheet the contact's area stays, and the contrast is what the round tip's 50 g make
+  of the same pressure.
 
 Parameters are uncertain by relative standard deviations (log-normal), which say how far real gels
 and tips may be from this one.
@@ -49,6 +51,11 @@ class PressLaw:
         law = Piezoresistive(self.sensitivity_per_gram, 1 + self.saturation)
         return float(law.contrast_at(np.array(grams)))
 
+    def pressure_kpa(self, grams: float) -> float:
+        """The mean over the contact."""
+        area_m2 = np.pi * (1e-3 * self.radius_mm(grams)) ** 2
+        return float(1e-3 * grams * NEWTONS_PER_GRAM / area_m2)
+
     def touch(self, grams: float, place_mm: npt.ArrayLike) -> TrueTouch:
         """The disc that a weight makes at a place."""
         x, y = np.asarray(place_mm, dtype=np.float64)
@@ -56,6 +63,27 @@ class PressLaw:
 
 
 NOMINAL = PressLaw()
+
+
+@dataclass(frozen=True)
+class SheetLaw(PressLaw):
+    """A weight on a round metal sheet, as in the paper; of 11 mm, so that 200 g stay below what the
+    paper's gel stands."""
+
+    sheet_mm: float = 11.0
+
+    def radius_mm(self, grams: float) -> float:
+        """The sheet's."""
+        return self.sheet_mm
+
+    def contrast(self, grams: float) -> float:
+        """That of a round tip's 50 g, by pressure."""
+        tip = LOADS_G[0] * self.pressure_kpa(grams) / NOMINAL.pressure_kpa(LOADS_G[0])
+        return super().contrast(tip)
+
+
+SHEET = SheetLaw()
+GEL_LIMIT_KPA = 5.41  # the paper's gel
 
 
 def drawn_laws(seed: int, count: int) -> tuple[PressLaw, ...]:

@@ -28,6 +28,8 @@ ANGLES_DEG = (
 )  # at different distances from electrodes, which are 22.5 degrees apart
 OUTERMOST = 0.87  # of the radius: weights are put no nearer to the rim
 LIGHT_G = (0.4, 120.0)  # least and greatest of the light loads
+SHEET_SHARES = (0.0, 0.28, 0.56, 0.84)  # at equal distances from the centre to the boundary
+SHEET_G = (2.0, 209.0)  # under the sheet; the greatest presses with what the gel stands
 AT_ONCE = 20
 
 
@@ -101,21 +103,23 @@ def solved(
 
 
 def radius_places(
-    radius_mm: float, angles: Sequence[float]
+    radius_mm: float, angles: Sequence[float], shares: Sequence[float] = RADIUS_SHARES
 ) -> list[tuple[tuple[float, float], int]]:
     """Places at the four radii with the radius's number; the centre once."""
     return [
         (at_radius(share, angle, radius_mm), number)
-        for number, share in enumerate(RADIUS_SHARES)
+        for number, share in enumerate(shares)
         for angle in (angles if share > 0 else angles[:1])
     ]
 
 
-def curve_rows(radius_mm: float) -> list[tuple[float, tuple[float, float], int, int]]:
+def curve_rows(
+    radius_mm: float, shares: Sequence[float] = RADIUS_SHARES
+) -> list[tuple[float, tuple[float, float], int, int]]:
     """Each of the paper's loads at the four radii, at three angles."""
     return [
         (grams, place, 0, number)
-        for place, number in radius_places(radius_mm, ANGLES_DEG)
+        for place, number in radius_places(radius_mm, ANGLES_DEG, shares)
         for grams in LOADS_G
     ]
 
@@ -138,12 +142,12 @@ def spread_rows(places: FloatArray) -> list[tuple[float, tuple[float, float], in
     ]
 
 
-def light_loads(count: int) -> list[float]:
-    """A ladder of ``count`` light loads, g, by equal factors."""
-    return [float(grams) for grams in np.geomspace(*LIGHT_G, count)]
-
-
-def light_rows(radius_mm: float, count: int) -> list[tuple[float, tuple[float, float], int, int]]:
-    """The ladder at the four radii, at two angles."""
-    places = radius_places(radius_mm, ANGLES_DEG[:2])
-    return [(grams, place, 0, number) for place, number in places for grams in light_loads(count)]
+def light_rows(
+    radius_mm: float,
+    count: int,
+    shares: Sequence[float] = RADIUS_SHARES,
+    loads_g: tuple[float, float] = LIGHT_G,
+) -> list[tuple[float, tuple[float, float], int, int]]:
+    """A ladder of ``count`` loads by equal factors at the four radii, at two angles."""
+    places, ladder = radius_places(radius_mm, ANGLES_DEG[:2], shares), np.geomspace(*loads_g, count)
+    return [(float(grams), place, 0, number) for place, number in places for grams in ladder]
