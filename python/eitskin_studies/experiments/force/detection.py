@@ -118,7 +118,7 @@ def detect(
 
     def measured(exact_v: FloatArray, name: str) -> FloatArray:
         frames, _ = measure(np.repeat(exact_v, mean_of, axis=0), *converter, name)
-        return frames.reshape(len(exact_v), mean_of, -1).mean(axis=1)
+        return np.asarray(frames.reshape(len(exact_v), mean_of, -1).mean(axis=1))
 
     false, looked, each = 0, 0, -(-quiet_frames // TARES)
     for tare in range(TARES):

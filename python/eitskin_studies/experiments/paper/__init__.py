@@ -16,7 +16,7 @@ from eitskin.scoring.matching import match
 from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.baselines import PlainFista, gauss_newton
-from eitskin_studies.compare.families import setup_for
+from eitskin_studies.compare.families import Method, setup_for
 from eitskin_studies.experiments.experiment import (
     MODEL_ELEMENTS,
     ExperimentOutcome,
@@ -58,7 +58,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             sessions[name, k] = solver.session(drawn, workspace.progress)
     core = Reconstructor(model, blob=blob)
     setup = setup_for(skin, model.protocol, elements=MODEL_ELEMENTS)
-    classical = {
+    classical: dict[str, tuple[Method, float]] = {
         "Gauss-Newton": (gauss_newton(setup.jacobian, GAUSS_NEWTON[0]), GAUSS_NEWTON[1]),
         "plain FISTA 300": (PlainFista(setup.jacobian, 300, FISTA[0], False), FISTA[1]),
     }
