@@ -339,6 +339,8 @@ static fw_answer on_settings(fw_instrument *instrument, const void *payload, siz
     (void)size;
     memcpy(&c, payload, sizeof c);
     const uint32_t all = EITS_SETTING_KEEP_DRIVE | EITS_SETTING_LOCKED | EITS_SETTING_SENSE;
+    if (c.current_limit_ua_rms == EITS_LIMIT_KEPT)
+        c.current_limit_ua_rms = instrument->kept.current_limit_ua_rms;
     if (outside(&bad, offsetof(eits_command_settings, settings), c.settings, 0, all) ||
         outside(&bad, offsetof(eits_command_settings, current_limit_ua_rms), c.current_limit_ua_rms,
                 0, MAX_UA_RMS))

@@ -193,6 +193,8 @@ static void test_cuts(void)
 static void test_limit(void)
 {
     start_unheard();
+    CHECK_EQUAL(set(0, EITS_LIMIT_KEPT).status, EITS_REPLY_OK);
+    CHECK_EQUAL(fw_kept_load(&b.board.board.store).current_limit_ua_rms, 0);
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 437); /* 1.25 times 350 */
     b.board.current_ua = 500;
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
@@ -217,7 +219,8 @@ static void test_limit(void)
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_TRIPPED);
     CHECK_EQUAL(set(EITS_SETTING_KEEP_DRIVE | EITS_SETTING_SENSE, 400).status, EITS_REPLY_OK);
     CHECK(!drives());
-    CHECK_EQUAL(set(EITS_SETTING_SENSE, 400).status, EITS_REPLY_OK);
+    CHECK_EQUAL(set(EITS_SETTING_SENSE, EITS_LIMIT_KEPT).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 400);
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
     b.board.current_ua = 350;
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);

@@ -18,6 +18,8 @@ extern "C" {
 /* The first byte of every packet; a packet of another version is rejected. */
 #define EITS_LINK_VERSION     6u
 #define EITS_LINK_MAX_PAYLOAD 16384u
+/* Of SETTINGS: the limit stays as it is. */
+#define EITS_LIMIT_KEPT       0xFFFFFFFFu
 
 /* Below 0x80 from the board, from there on to it. */
 typedef enum eits_packet_type {
@@ -655,7 +657,7 @@ typedef struct eits_command_settings {
     uint32_t request;
     /* bits of eits_setting */
     uint32_t settings;
-    /* at most 10,000; 0: 1.25 times what the source gives */
+    /* at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: as it is */
     uint32_t current_limit_ua_rms;
 } eits_command_settings;
 

@@ -53,14 +53,13 @@ def run(options: argparse.Namespace) -> int:
         for bit, on, off, _ in pairs:
             wanted = (wanted | bit) if on else (wanted & ~bit) if off else wanted
         if wanted != info.settings or options.limit_ua is not None:
-            limit_ua = info.current_limit_ua_rms if options.limit_ua is None else options.limit_ua
-            info = device.settings(wanted, limit_ua)
+            info = device.settings(wanted, options.limit_ua)
         url = device.transport.url
     facts = {"settings": info.setting_names, "current_limit_ua_rms": info.current_limit_ua_rms}
     if options.json:
         print(json.dumps({"device": url, **facts}, indent=2))
     else:
-        limit = f"{info.current_limit_ua_rms} uA rms"
+        limit = f"{info.current_limit_ua_rms} uA rms" if info.current_limit_ua_rms else "none"
         print_table({"device": url, "settings": ", ".join(info.setting_names) or "none",
                      "limit": limit})  # fmt: skip
     return 0

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
         info, url = device.board, device.transport.url
         replays = device.transport.replays
         stats = None if replays else device.stats(reset=options.reset_statistics)
-        hashes = {} if replays else device.hashes().as_dict()
+        hashes = device.hashes().as_dict()
     if options.json:
         counted = None if stats is None else stats.as_dict()
         print(

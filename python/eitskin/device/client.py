@@ -10,6 +10,7 @@ from pathlib import Path
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.core.results import Options, check_options
 from eitskin.device.exchange import ANSWER_S, CommandExchange, Streamed
+from eitskin.device.link import Noted
 from eitskin.device.streaming import stream
 from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
@@ -127,20 +128,25 @@ class Device(CommandExchange):
         self.command(commands.SelfTest(), 10.0)
 
     def hashes(self) -> BoardHashes:
-        """SHA-256 of the model in use and of the program, as the board's flash has them."""
+        """SHA-256 of the model in use and of the program, as the board's flash has them; of a
+        recording as they were."""
+        if isinstance(self.transport, Noted):
+            return self.transport.hashes
         answer = self.ask(commands.GetHashes(), 2 * ANSWER_S)
         assert isinstance(answer, BoardHashes)
         return answer
 
-    def settings(self, settings: Setting, current_limit_ua_rms: int = 0) -> BoardInfo:
+    def settings(self, settings: Setting, current_limit_ua_rms: int | None = None) -> BoardInfo:
         """Give the board all of its owner's settings, which it keeps in flash; the current stops.
-        The limit counts where a sense resistor is fitted; 0: 1.25 times what the source gives.
+        The limit counts where a sense resistor is fitted; 0: 1.25 times what the source gives,
+        None: as it is.
 
         Raises:
             UsageError: the limit does not fit.
             DeviceError: the board is locked and nobody holds its button, or keeps no settings.
         """
-        self.command(commands.Settings(int(settings), current_limit_ua_rms), 10.0)
+        limit = commands.LIMIT_KEPT if current_limit_ua_rms is None else current_limit_ua_rms
+        self.command(commands.Settings(int(settings), limit), 10.0)
         return self.info()
 
     def clear_faults(self) -> None:

@@ -161,6 +161,11 @@ class CommandExchange:
             f"{self.transport.name}: ten thousand packets and none of use; is it an eitskin board?"
         )
 
+    @property
+    def keeps(self) -> bool:
+        """Something came while a command waited for its answer, and was not fetched yet."""
+        return bool(self._inbox)
+
     def drop_kept(self) -> None:
         """Forget the frames that came while commands waited for their answers; faults and events
         stay."""

@@ -13,6 +13,7 @@ from typing import Protocol, runtime_checkable
 from eitskin.device.transport import Transport
 from eitskin.device.wire.codec import Decoder, LinkCounters, Packet, encode
 from eitskin.device.wire.link_table import Keepalive, PacketType
+from eitskin.device.wire.packets import BoardHashes
 from eitskin.errors import DeviceError, EitskinError
 
 FRAME_PACKETS = frozenset((PacketType.RAW, PacketType.IMAGE, PacketType.TOUCHES, PacketType.EVENTS))
@@ -40,6 +41,15 @@ class Telling(Protocol):
 
     def take_events(self) -> list[LinkEvent]:
         """Those since the last call."""
+
+
+@runtime_checkable
+class Noted(Protocol):
+    """A transport that knows what its board said once."""
+
+    @property
+    def hashes(self) -> BoardHashes:
+        """Of model and program."""
 
 
 @runtime_checkable

@@ -121,6 +121,8 @@ def _is_over(device: CommandExchange, progress: _Progress, every: int, silent: i
     it."""
     before = device.board
     now = device.info()
+    if device.keeps:
+        return False  # it came while INFO was waited for
     if device.link.ended:
         return True
     if now.streaming == 0:
@@ -129,7 +131,7 @@ def _is_over(device: CommandExchange, progress: _Progress, every: int, silent: i
             and now.tared == before.tared
             and device.counters.restarts == progress.restarts
         )
-        if progress.wanted and same and now.drive not in (Drive.SILENT, Drive.TRIPPED):
+        if progress.wanted and same and now.drive == Drive.ON:
             return True  # it has sent all that was asked for, and some of it was lost
         _resume(device, progress, every)
     elif silent >= SILENCES:

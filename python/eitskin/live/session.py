@@ -37,7 +37,7 @@ from eitskin.device.live import (
 from eitskin.device.open import open_device
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.timing import Pacer, Slowness, WaitingClock, split_timing
-from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.device.wire.packets import Fault
 from eitskin.errors import EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice
@@ -51,6 +51,10 @@ if TYPE_CHECKING:
     from eitskin.tuning.front import Target
 
 TARE_FRAMES = 16
+KEPT_ON = (
+    "the board's owner has set keep-drive: current flows on when this program ends;  eitskin board"
+    " --no-keep-drive  changes that"
+)
 KINDS = ("raw", "image", "touches", "events")
 Item: TypeAlias = LiveFrame | Fault | LinkEvent
 Say: TypeAlias = Callable[[str], None]
@@ -331,6 +335,8 @@ class Session:
         how = self.settings
         if self.replays:
             return
+        if self.device.board.settings & Setting.KEEP_DRIVE:
+            self._say(KEPT_ON)
         self._look_on()
         self.solver = set_up(self.device, *self._scan_and_solver(), self.known)
         if how.record is not None:

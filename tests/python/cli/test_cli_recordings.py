@@ -3,6 +3,7 @@ bit."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
@@ -24,6 +25,7 @@ from board_on_a_port import behind_a_port
 from eitskin.cli.main import main
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import PacketType
+from eitskin.model.prebuilt import load_prebuilt
 from fresh_python import MAIN, run_python, without
 
 Done = Callable[..., str]
@@ -94,7 +96,10 @@ def test_a_recording_is_a_device_too(done: Done, run: Path) -> None:
         for command in (("stream", "-v", "--device", f"file:{run}"), ("replay", "-v", run))
     )
     assert shown == replayed and ", off by " in shown
-    assert json.loads(done("info", "--device", f"file:{run}", "--json"))["statistics"] is None
+    facts = json.loads(done("info", "--device", f"file:{run}", "--json"))
+    sha256 = hashlib.sha256(load_prebuilt()[1]).hexdigest()
+    assert facts["statistics"] is None and facts["sha256"] == {"model": sha256, "firmware": None}
+    assert sha256 in done("info", "--device", f"file:{run}")
     assert (
         json.loads(done("doctor", "--device", f"file:{run}", "--json"))["measured"]["quiet_frames"]
         == 16

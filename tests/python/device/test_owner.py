@@ -6,9 +6,12 @@ import hashlib
 
 import pytest
 
+from eitskin.cli.main import main
+from eitskin.device.client import Device
 from eitskin.device.open import open_device
-from eitskin.device.wire.link_table import Drive, Setting
+from eitskin.device.wire.link_table import LIMIT_KEPT, Drive, Setting, Settings
 from eitskin.errors import DeviceError
+from eitskin.live.session import KEPT_ON, Session, SessionSettings
 from eitskin.model.prebuilt import load_prebuilt
 
 
@@ -28,3 +31,37 @@ def test_current_begins_with_a_tare_and_hashes_are_the_files() -> None:
         device.tare(4)
         assert device.info().drive == Drive.ON
         assert device.hashes().model == hashlib.sha256(load_prebuilt()[1]).digest()
+
+
+def test_a_limit_that_is_not_named_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+
+    def opened(options: object) -> Device:
+        device = open_device("sim:two_touch")
+        command = device.command
+        device.command = lambda one, timeout_s: given.append(one) or command(one, timeout_s)  # type: ignore[assignment,func-returns-value]
+        return device
+
+    monkeypatch.setattr("eitskin.cli.cmd_board.open_named", opened)
+    assert main(["board", "--lock"]) == 0
+    assert given == [Settings(int(Setting.LOCKED), LIMIT_KEPT)]
+    with open_device("sim:two_touch") as device:
+        assert device.settings(Setting.SENSE, 400).current_limit_ua_rms == 400
+        assert device.settings(Setting(0)).current_limit_ua_rms == 400
+        assert device.settings(Setting(0), 0).current_limit_ua_rms == 0  # of a source of none
+
+
+def test_whoever_follows_a_board_hears_that_current_flows_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def opened(*url: object, **how: object) -> Device:
+        device = open_device("sim:two_touch")
+        device.settings(Setting.KEEP_DRIVE)
+        return device
+
+    for opening, told in ((open_device, []), (opened, [KEPT_ON])):
+        said: list[str] = []
+        monkeypatch.setattr("eitskin.live.session.open_device", opening)
+        with Session("sim:two_touch", SessionSettings(frames=1), say=said.append) as session:
+            session.start()
+        assert said == told

@@ -12,6 +12,7 @@ import sys
 import textwrap
 import time
 import zlib
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from device_helpers import FRAMES, QUIET, Damaging, same, sim_board, sim_device
 
 from eitskin.device.client import Device
 from eitskin.device.open import open_device
-from eitskin.device.recordings.recording import Recorder, frames_of, read_head
+from eitskin.device.recordings.recording import FileTransport, Recorder, frames_of, read_head
 from eitskin.device.simulated import SimTransport
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream, StreamCommand
@@ -90,7 +91,15 @@ def test_the_head_says_where_it_comes_from(tmp_path: Path) -> None:
     assert head == {
         "format": "eits", "version": 1, "eitskin": head["eitskin"], "url": "sim:test",
         "model_crc": f"{zlib.crc32(load_prebuilt()[1]):08x}",
+        "sha256": {"model": sha256(load_prebuilt()[1]).hexdigest(), "firmware": None},
     }  # fmt: skip
+    for noted in (None, 7, {}, {"model": "0x" + "1" * 62, "firmware": [1]}):
+        head = json.dumps({"format": "eits", "version": 1, "sha256": noted}).encode()
+        (tmp_path / "odd.eits").write_bytes(encode(PacketType.RECORDING, 0, head))
+        assert FileTransport(tmp_path / "odd.eits").hashes.as_dict() == {
+            "model": None,
+            "firmware": None,
+        }
     assert (tmp_path / "run.eits").read_bytes()[0] == 0
 
 

@@ -7,6 +7,7 @@ docs/reference/link-protocol.md, "Recordings", specifies the file.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -17,6 +18,7 @@ from eitskin.core.results import Options, check_options
 from eitskin.device.recordings.new_file import RecordingFile
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import LINK_VERSION, PacketType, Stream
+from eitskin.device.wire.packets import BoardHashes
 from eitskin.device.wire.payloads import pack
 from eitskin.errors import DeviceError, EitskinError, FileError
 from eitskin.fileio import parse_json
@@ -60,6 +62,7 @@ class Recorder:
             "eitskin": __version__,
             "url": device.transport.url,
             "model_crc": f"{info.model_crc:08x}",
+            "sha256": device.hashes().as_dict(),
         }
         first = encode(PacketType.RECORDING, 0, json.dumps(head).encode())
         self._file = RecordingFile(self.path, first, overwrite=overwrite)
@@ -113,6 +116,7 @@ class FileTransport:
     def __init__(self, path: str | Path) -> None:
         self.url, self.name = f"file:{path}", str(path)
         self.head = read_head(path)
+        self.hashes = _noted_hashes(self.head.get("sha256"))
         self._file = Path(path).open("rb")  # noqa: SIM115 -- open as long as the device is
         self.ended = False
 
@@ -192,6 +196,16 @@ def read_head(path: str | Path) -> dict[str, Any]:
             " upgrade eitskin"
         )
     return head
+
+
+def _noted_hashes(noted: Any) -> BoardHashes:
+    """What the head says, zero where it says nothing that can be."""
+    values = []
+    for name in ("model", "firmware"):
+        text = str(noted.get(name)) if isinstance(noted, dict) else ""
+        known = re.fullmatch("[0-9a-f]{64}", text) is not None
+        values.append(bytes.fromhex(text) if known else bytes(32))
+    return BoardHashes(0, *values)
 
 
 def frames_of(path: str | Path, model: Path | None = None) -> Frames:

@@ -12,6 +12,7 @@ from eitskin.device.wire.layout import Command, Layout, Payload
 
 LINK_VERSION = 6
 LINK_MAX_PAYLOAD = 16384
+LIMIT_KEPT = 4294967295
 FAULT_RAISE_FRAMES = 3
 FAULT_CLEAR_FRAMES = 8
 # eits_stage: Stages that are timed.
@@ -969,7 +970,7 @@ class Settings(Command):
     )
     # bits of eits_setting
     settings: int
-    # at most 10,000; 0: 1.25 times what the source gives
+    # at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: as it is
     current_limit_ua_rms: int
 
 
