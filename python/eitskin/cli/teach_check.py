@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import TARE_FRAMES, add_device, say
+from eitskin.cli.device_options import TARE_FRAMES, add_device
 
 if TYPE_CHECKING:
     import numpy as np
@@ -46,6 +46,7 @@ def add_parser(actions: Any) -> None:
         nargs="?",
     )
     add_device(parser, model=False)
+    option(parser, "--firmware BIN", "of an emulated board (default: the prebuilt one)", Path)
     parser.set_defaults(run=run)
 
 
@@ -90,18 +91,12 @@ def _holds_presses(path: Path) -> bool:
 def _of_board(options: argparse.Namespace) -> tuple[np.ndarray, Protocol]:
     import numpy as np
 
+    from eitskin.cli.teach_record import raw_session
     from eitskin.device.known_model import scanned_protocol
     from eitskin.device.live import LiveFrame
-    from eitskin.device.settings import ScanSettings
-    from eitskin.device.wire.link_table import Stream
     from eitskin.errors import DeviceError
-    from eitskin.live.session import Session, SessionSettings
 
-    settings = SessionSettings(
-        mode=Stream.RAW, every=1, frames=TARE_FRAMES, model=options.model,
-        scan=ScanSettings(check_every=1),
-    )  # fmt: skip
-    with Session(options.device, settings, say=say) as session:
+    with raw_session(options, options.model, TARE_FRAMES) as session:
         protocol = scanned_protocol(session.device.board, session.known, session.name)
         frames = [
             item.raw.voltage_v

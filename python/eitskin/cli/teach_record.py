@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from eitskin.teaching.plan import Plan
 
     TimedFrames = Iterator[tuple[np.ndarray, float]]
+
+PACE_US = 25_000  # a frame: a hold of twelve is .3 s
 
 
 def add_parser(actions: Any) -> None:
@@ -97,17 +100,34 @@ def _in_time(frames: Frames) -> TimedFrames:
 
 def _before_a_board(options: argparse.Namespace, plan: Plan, text: str) -> int:
     from eitskin.device.known_model import scanned_protocol
+
+    with raw_session(options, options.model) as session:
+        protocol = scanned_protocol(session.device.board, session.known, session.name)
+        return _guide(options, plan, text, protocol, _live(session))
+
+
+@contextmanager
+def raw_session(
+    options: argparse.Namespace, model: Path | None, frames: int = 0
+) -> Iterator[Session]:
+    """A board that sends every row of every frame, no faster than a person presses; one that is
+    given its frames, or a recording, sends what it has."""
+    from dataclasses import replace
+
     from eitskin.device.settings import ScanSettings
     from eitskin.device.wire.link_table import Stream
     from eitskin.live.session import Session, SessionSettings
 
     settings = SessionSettings(
-        mode=Stream.RAW, every=1, model=options.model, firmware=options.firmware,
-        scan=ScanSettings(check_every=1),
-    )  # fmt: skip
+        mode=Stream.RAW, every=1, frames=frames, model=model, firmware=options.firmware
+    )
     with Session(options.device, settings, say=say) as session:
-        protocol = scanned_protocol(session.device.board, session.known, session.name)
-        return _guide(options, plan, text, protocol, _live(session))
+        board = session.device.board
+        if not (board.frames_given or session.replays):
+            slow = board.n_rows * board.slot_us >= PACE_US
+            scan = ScanSettings(check_every=1, frame_period_us=0 if slow else PACE_US)
+            session.settings = replace(settings, scan=scan)
+        yield session
 
 
 def _live(session: Session) -> TimedFrames:

@@ -1,5 +1,5 @@
 """A scene in which a finger presses where a plan says, one press after another, at the pace of a
-person: to try teaching without a skin."""
+quick person: to try teaching without a skin."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from pathlib import Path
 from eitskin.skin.skin import Skin
 from eitskin.teaching.plan import Plan
 
-REST_S, PRESS_S = 1.2, 1.2
+REST_S, PRESS_S = 0.45, 0.6
 RATE_HZ = 40.0
 RADIUS_PER_SIZE = 0.04
 
 
 def practice_scene(skin: Skin, path: Path, plan: Plan) -> str:
-    """The scene's TOML for ``skin``, whose description is the file ``path``: insulating presses,
-    since a probe that conducts would make other changes than most do."""
+    """The scene's TOML for ``skin``, whose description is the file ``path``."""
     low_x, low_y, high_x, high_y = skin.outline.bounding_box_mm
     radius = RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
     period = REST_S + PRESS_S

@@ -2,14 +2,13 @@
 kernel, solved together.
 
 y_c = a o s_c(places) + noise of variance lambda, a the presses' amplitudes, each row over its own
-rms; s_c about ``prior``, 0 where nothing is known before. A = a a' o K + lambda I is factored once;
-each row's own term is of rank one (Sherman and Morrison). Leaving a press out costs nothing more:
-its residual is A^-1 (y - a o prior) / diag(A^-1).
+rms; s_c is about 0, or with ``about_own`` about its own-row feature. A = a a' o K + lambda I is
+factored once; each row's own term is of rank one (Sherman and Morrison). Leaving a press out costs
+nothing more: its residual is A^-1 (y - a o mean) / diag(A^-1).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +17,6 @@ import numpy.typing as npt
 from eitskin.teaching.kernel import Kernel
 
 FloatArray = npt.NDArray[np.float64]
-# the answers (k, m) expected at places (k, 2) mm
-Prior = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +36,14 @@ class Process:
     own_gain: FloatArray
     weight: FloatArray
     log_likelihood: float
-    prior: Prior | None = None
+    about_own: bool = False
 
     def mean(self, q_mm: FloatArray) -> FloatArray:
         """s (k, m) of a press of amplitude 1 at each of ``q_mm`` (k, 2)."""
         jq = self.kernel.features(q_mm)
         shared, own = self._at(q_mm, jq)
         total = (self.amplitude[:, None] * self._own_data() * self.weight).sum(axis=0)
-        expected = 0.0 if self.prior is None else self.prior(q_mm)
+        expected = jq if self.about_own else 0.0
         return np.asarray(expected + shared @ self.weight + own * total)
 
     def left_out(self) -> FloatArray:
@@ -86,10 +83,10 @@ def condition(
     place_mm: FloatArray,
     amplitude: FloatArray,
     data: FloatArray,
-    prior: Prior | None = None,
+    about_own: bool = False,
 ) -> Process:
     """The processes after presses at ``place_mm`` (n, 2) of ``amplitude`` (n,) with ``data``
-    (n, m), about ``prior`` where one is given."""
+    (n, m), about the own-row feature or 0."""
     from scipy.linalg import cho_factor, cho_solve
 
     count = len(place_mm)
@@ -108,7 +105,7 @@ def condition(
     )
     own_solved = inverse @ own
     own_gain = 1 + np.sum(own * own_solved, axis=0)
-    new = data if prior is None else data - amplitude[:, None] * prior(place_mm)
+    new = data - amplitude[:, None] * j if about_own else data
     solved = inverse @ new
     weight = solved - own_solved * (np.sum(own * solved, axis=0) / own_gain)
     fit = np.maximum(np.sum(new * weight, axis=0), 1e-300)
@@ -118,5 +115,5 @@ def condition(
     )
     return Process(
         kernel, place_mm, amplitude, data, j, common_unit, own_unit, inverse, own_solved, own_gain,
-        weight, likelihood, prior,
+        weight, likelihood, about_own,
     )  # fmt: skip

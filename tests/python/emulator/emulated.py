@@ -48,6 +48,13 @@ def connect(board: EmulatedBoard) -> Device:
     return Device(transport)
 
 
+def restarted(device: Device) -> Device:
+    """The same board after it lost its power, and the host that connects again."""
+    board = board_of(device)
+    board.lose_power()
+    return connect(board)
+
+
 def hang(board: EmulatedBoard, code: bytes) -> None:
     """Let the processor execute ``code`` at the end of RAM, where the program has nothing."""
     at = board.memories.ram

@@ -14,15 +14,8 @@ from eitskin.device.wire.packets import Fault, SolvedTouches
 from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin.emulator.memory import RAM
 from eitskin.model.prebuilt import load_prebuilt
-from emulated import board_of, clean, connect, hang, power_up
+from emulated import clean, connect, hang, power_up, restarted
 from small_models import small_blob
-
-
-def restarted(device: Device) -> Device:
-    """The same board after it lost its power, and the host that connects again."""
-    board = board_of(device)
-    board.lose_power()
-    return connect(board)
 
 
 def test_a_model_over_the_wire(image: bytes) -> None:

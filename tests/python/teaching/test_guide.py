@@ -25,7 +25,7 @@ SKIN = """
 name = "small"
 diameter_mm = 100.0
 thickness_mm = 5.0
-conductivity_s_per_m = 0.02
+conductivity_s_per_m = 0.1
 [electrodes]
 count = 8
 width_mm = 5.0
@@ -129,23 +129,34 @@ def test_a_plan_that_is_none(text: str, said: str, tmp_path: Path) -> None:
         load_plan(tmp_path / "plan.csv")
 
 
-def test_a_session_before_a_simulated_board(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Plan, practice, record, fit, as a person would."""
-    skin, plan, scene, presses, model = (
+@pytest.mark.parametrize("kind", ["sim", "emu"])
+def test_a_whole_session(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Plan, practise 20 presses, fit, check, then touch with the taught model, as a person would;
+    the board's images are this host's."""
+    skin, plan, scene, presses, physics, model, run = (
         str(tmp_path / name)
-        for name in ("skin.toml", "plan.csv", "scene.toml", "presses.npz", "taught.eitm")
-    )
+        for name in ("skin.toml", "plan.csv", "scene.toml", "presses.npz", "physics.eitm",
+                     "taught.eitm", "run.eits")
+    )  # fmt: skip
+
+    def done(*arguments: str) -> str:
+        capsys.readouterr()
+        assert main(list(arguments)) == 0
+        return capsys.readouterr().out
+
     Path(skin).write_text(SKIN)
-    assert main(["model", "build", skin, "--samples", "0", "-o", str(tmp_path / "m.eitm")]) == 0
-    assert main(["teach", "plan", skin, "-n", "12", "-o", plan, "--practice", scene,
-                 "--picture", str(tmp_path / "template.pdf")]) == 0  # fmt: skip
+    done("model", "build", skin, "--samples", "0", "-o", physics)
+    done("teach", "plan", skin, "-n", "20", "-o", plan, "--practice", scene, "--picture",
+         str(tmp_path / "template.pdf"))  # fmt: skip
     assert (tmp_path / "template.pdf").read_bytes()[:5] == b"%PDF-"
-    device = ["--device", f"sim:{scene}", "--model", str(tmp_path / "m.eitm")]
-    assert main(["teach", "record", "--plan", plan, "-o", presses, "--skin", skin, *device]) == 0
-    assert "all places are done" in capsys.readouterr().out
+    device = f"{kind}:{scene}"
+    said = done("teach", "record", "--plan", plan, "-o", presses, "--skin", skin,
+                "--device", device, "--model", physics)  # fmt: skip
+    assert said.count("good; lift") == 20 and "all places are done" in said
     assert np.allclose(load_presses(presses).place_mm, load_plan(plan).place_mm)
-    assert main(["teach", "fit", presses, "-o", model, "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
-    assert report["presses"] == 12
+    report = json.loads(done("teach", "fit", presses, "-o", model, "--json"))
+    assert report["presses"] == 20 and report["error_mm"]["held_out_median"] < 3
+    assert ": fits (" in done("teach", "check", model, "--device", device)
+    done("record", "--device", device, "--model", model, "-o", run, "--frames", "30")
+    facts = json.loads(done("replay", run, "--model", model, "--check", "--json"))
+    assert facts["same_bits"] and facts["images"] == facts["touches"] == 30
