@@ -65,7 +65,7 @@ class FrameMaker:
         self._times = compiled.times_s()
         states = compiled.states
         self._readings = {k: self._read(v, states[k]) for k, v in compiled.known.items()}
-        self._last: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros(0))
+        self._still: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros(0))
 
     def reading(self, number: int) -> TrueVoltages:
         """State ``number``'s voltages before excitation, front end and converter."""
@@ -100,9 +100,9 @@ class FrameMaker:
         if mix is None or not mix.still:
             return self._made(frame, self._true(frame, mix))
         key = frame, int(mix.lower[0])
-        if key != self._last[0]:
-            self._last = key, self._made(frame, self.reading(key[1]))
-        return self._last[1]
+        if key != self._still[0]:
+            self._still = key, self._made(frame, self.reading(key[1]))
+        return self._still[1]
 
     def _made(self, frame: int, reading: TrueVoltages) -> FloatArray:
         """A frame of true voltages, through what stands between them and the recorded ones."""
