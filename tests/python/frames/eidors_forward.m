@@ -34,6 +34,11 @@ end
 files = argv();
 load(files{1});
 assert(strcmp(fmdl.type, 'fwd_model') && strcmp(vi.type, 'data') && strcmp(img.type, 'image'));
+% what valid_fwd_model asks for
+numbers = {'nodes', 'elems', 'gnd_node', 'normalize_measurements', 'boundary'};
+words = {'name', 'type', 'solve', 'system_mat', 'jacobian'};
+assert(all(cellfun(@(f) isnumeric(fmdl.(f)), numbers)) && all(cellfun(@(f) ischar(fmdl.(f)), words)));
+assert(isstruct(fmdl.electrode) && numel(fieldnames(fmdl.stimulation)) == 3);
 background = img_bkgnd.elem_data;
 vh.meas = solve_forward(fmdl, background);
 % the Jacobian's column of one element, and what an image of ours answers by it
