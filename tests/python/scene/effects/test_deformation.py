@@ -103,6 +103,20 @@ def test_the_tare_is_the_flat_skins_unless_it_begins_before() -> None:
     assert np.array_equal(always[4], late[4]) and not np.array_equal(always[0], flat[0])
 
 
+def test_a_scene_is_solved_on_the_deformed_sheet_and_contacts() -> None:
+    content = {
+        "scene": {"frames": 1, "quiet_frames": 1, "elements": 800},
+        "effects": {
+            "stretch": {"strain": 0.3, "at_s": -1000.0},
+            "contact_impedance": {"mean_ohm_m2": 0.02},
+        },
+    }
+    compiled = compile_scene(scene_from_table(content, "test", Path()))
+    how, z_ohm_m2 = stretched(1.3, 1.3**-0.5, 0), np.full(16, 0.02)
+    direct = deformed(compiled.model, how).voltages(0.01 * how.thickness, z_ohm_m2 / how.thickness)
+    assert np.allclose(simulate_frames(compiled).voltage_v, direct, rtol=1e-12, atol=0)
+
+
 def test_effects_meet() -> None:
     """A bend is the stretch that it says, also beside another and with a phase; frames of a creep
     differ."""
