@@ -9,7 +9,7 @@ import webbrowser
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
@@ -24,6 +24,9 @@ from eitskin.cli.device_options import (
     whole,
 )
 from eitskin.errors import FileError, UsageError
+
+if TYPE_CHECKING:
+    from eitskin.page.teacher import Teacher
 
 PORT = 8470
 
@@ -57,6 +60,16 @@ def add_parser(subparsers: Any) -> None:
         parser, "--token WORD", "that commands need (default: drawn at the start, in the address)"
     )
     option(parser, "--folder FOLDER", "where the page's recordings go", Path, default=Path())
+    option(
+        parser, "--teach PLAN.csv", "guide through presses of  teach plan  beside the skin", Path
+    )
+    option(
+        parser,
+        "--presses PRESSES.npz",
+        "where those go, and go on (default: presses.npz in --folder); the model goes beside them",
+        Path,
+    )
+    option(parser, "--skin SKIN.toml", "of --teach (default: that of the board's model)", Path)
     add_outputs(parser)
     add_zones(parser)
     option(parser, "--overwrite", "write over files that exist, of --to")
@@ -84,7 +97,8 @@ def run(options: argparse.Namespace) -> int:
         raise FileError(f"--folder {options.folder}: no such folder; make it, or name another")
     options.frames = None
     timed = options.device.partition(":")[0] in TIMED
-    mode = read_mode(options.mode or ("raw,image,touches" if timed else "image,touches"))
+    usual = "raw,image,touches" if timed else "image,touches"
+    mode = read_mode(options.mode or (usual if options.teach is None else "raw,touches"))
     settings = replace(session_settings(options, mode), quiet_frames=True)
     token = options.token or secrets.token_urlsafe(16)
     server = PageServer(
@@ -97,6 +111,7 @@ def run(options: argparse.Namespace) -> int:
         folder=options.folder,
         say=say,
         outputs=partial(opened_outputs, options) if options.to else None,
+        teacher=_teacher(options),
     )
     address = f"{server.address}#token={token}"
     print(f"open {address}", flush=True)
@@ -104,6 +119,23 @@ def run(options: argparse.Namespace) -> int:
         webbrowser.open(address)
     server.serve()
     return 0
+
+
+def _teacher(options: argparse.Namespace) -> Teacher | None:
+    from eitskin.fileio import read_bytes, refuse_unwritable
+    from eitskin.page.teacher import Teacher
+    from eitskin.skin.skin import load_skin
+    from eitskin.teaching.plan import load_plan
+
+    if options.teach is None:
+        return None
+    presses = options.presses or options.folder / "presses.npz"
+    refuse_unwritable(presses)
+    skin, text = None, ""
+    if options.skin is not None:
+        skin = load_skin(options.skin)[0]
+        text = read_bytes(options.skin, "skin description", 1_000_000).decode("utf-8")
+    return Teacher(load_plan(options.teach), presses, skin, text)
 
 
 def _this_machine(host: str) -> bool:

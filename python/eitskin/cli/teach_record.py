@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     TimedFrames = Iterator[tuple[np.ndarray, float]]
 
-PACE_US = 25_000  # a frame: a hold of twelve is .3 s
-
 
 def add_parser(actions: Any) -> None:
     """Add ``record``."""
@@ -110,23 +108,19 @@ def _before_a_board(options: argparse.Namespace, plan: Plan, text: str) -> int:
 def raw_session(
     options: argparse.Namespace, model: Path | None, frames: int = 0
 ) -> Iterator[Session]:
-    """A board that sends every row of every frame, no faster than a person presses; one that is
-    given its frames, or a recording, sends what it has."""
+    """A board that sends frames for the guide; ``frames`` of them, 0 for all."""
     from dataclasses import replace
 
-    from eitskin.device.settings import ScanSettings
     from eitskin.device.wire.link_table import Stream
     from eitskin.live.session import Session, SessionSettings
+    from eitskin.teaching.guide import scan_of_presses
 
     settings = SessionSettings(
         mode=Stream.RAW, every=1, frames=frames, model=model, firmware=options.firmware
     )
     with Session(options.device, settings, say=say) as session:
-        board = session.device.board
-        if not (board.frames_given or session.replays):
-            slow = board.n_rows * board.slot_us >= PACE_US
-            scan = ScanSettings(check_every=1, frame_period_us=0 if slow else PACE_US)
-            session.settings = replace(settings, scan=scan)
+        scan = scan_of_presses(session.device.board, session.replays)
+        session.settings = replace(settings, scan=scan)
         yield session
 
 

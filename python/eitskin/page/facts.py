@@ -15,7 +15,8 @@ rest    UTF-8: the frame's message (message.schema.json) without the two above
 ======  ==========================================================
 
 All else is text, a JSON object with a ``type``: to the page ``setup``, ``state``, ``notice``,
-``page`` and ``answer``; from it ``hello``, ``drawn`` and ``do``. docs/guide/live-view.md.
+``page``, ``teach`` and ``answer``; from it ``hello``, ``drawn`` and ``do``
+(docs/guide/live-view.md).
 """
 
 from __future__ import annotations

@@ -23,11 +23,12 @@ from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import PacketType, Stream
 from eitskin.device.wire.packets import RawFrame
 from eitskin.device.wire.payloads import MalformedPacket, parse
-from eitskin.errors import DeviceError, UsageError
+from eitskin.errors import DeviceError, EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice
 from eitskin.live.session import KINDS, TARE_FRAMES, Session, SessionSettings
 
 if TYPE_CHECKING:
+    from eitskin.page.teacher import Teacher
     from eitskin.sinks.outputs import Outputs
 
 FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
@@ -65,7 +66,8 @@ class PageSession(Session):
 
 class Follower:
     """Opens ``url`` and gives what comes to ``on_frame`` and ``on_news``, in its own thread, until
-    ``stop``; ``outputs`` opens the sinks of a session, ``folder`` is where recordings go.
+    ``stop``; ``outputs`` opens the sinks of a session, ``folder`` is where recordings go,
+    ``teacher`` guides presses.
 
     ``state``: "starting", "live", "unplugged", "ended" (the scene or the recording is over),
     "failed" (``text`` says why).
@@ -81,7 +83,11 @@ class Follower:
         on_frame: Callable[[Frame], None],
         on_news: Callable[[str, dict[str, Any]], None],
         outputs: Callable[[Session], Outputs] | None = None,
+        teacher: Teacher | None = None,
     ) -> None:
+        self.teacher = teacher
+        if teacher is not None:
+            teacher.on_event = lambda facts: on_news("teach", facts)
         self._url, self.settings, self._speed, self.folder = url, settings, speed, folder
         self._on_frame, self._on_news, self._outputs = on_frame, on_news, outputs
         self.session: PageSession | None = None
@@ -134,6 +140,8 @@ class Follower:
             speed=self._speed,
         )
         with session, nullcontext() if self._outputs is None else self._outputs(session) as outputs:
+            if self.teacher is not None:
+                self.teacher.begin(session)
             session.start()
             self.session = self.last = session
             self._set("live", "")
@@ -149,6 +157,8 @@ class Follower:
                     else:
                         self.frames += 1
                         self._on_frame(item)
+                        if self.teacher is not None:
+                            self.teacher.take(item)
             finally:
                 frames.close()
                 self.settings = replace(session.settings, record=None)
@@ -253,6 +263,33 @@ class Follower:
             return f"model {device.board.model_crc:08x} is in use, and the reference is taken"
 
         return self._changed(session, action)
+
+    def teach(self, what: str) -> Future[str] | str:
+        """ "back" or "skip"; or "fit": a thread of its own makes the model, which goes to the board.
+
+        Raises:
+            UsageError: nothing is taught here.
+        """
+        teacher = self.teacher
+        if teacher is None:
+            raise UsageError("teach: start  eitskin view --teach PLAN.csv")
+        if what != "fit":
+            return teacher.go(what)
+        answer: Future[str] = Future()
+
+        def run() -> None:
+            try:
+                blob, text = teacher.fit()
+                try:
+                    text += f"; {self.upload(blob).result()}"
+                except EitskinError as error:
+                    text += f"; the board has it not: {error}"
+                answer.set_result(text)
+            except BaseException as error:
+                answer.set_exception(error)
+
+        threading.Thread(target=run, name="eitskin teach", daemon=True).start()
+        return answer
 
     def record(self, on: bool) -> Future[str]:
         """Begin or end a recording in the folder."""

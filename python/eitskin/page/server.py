@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from starlette.responses import Response
     from starlette.websockets import WebSocket
 
+    from eitskin.page.teacher import Teacher
     from eitskin.sinks.outputs import Outputs
 
 FILES = {
@@ -97,6 +98,7 @@ class PageServer:
         folder: Path = Path(),
         say: Callable[[str], None] = lambda text: None,
         outputs: Callable[[Session], Outputs] | None = None,
+        teacher: Teacher | None = None,
     ) -> None:
         _, self._uvicorn = load_server()
         self._listening, self._token, self._remote = listening, token, remote
@@ -115,6 +117,7 @@ class PageServer:
             on_frame=self._frame,
             on_news=self._news,
             outputs=outputs,
+            teacher=teacher,
         )
 
     @property
@@ -294,6 +297,8 @@ class PageServer:
         self.hub.pages.add(page)
         page.tell(text_of("state", state=self.follower.state, text=self.follower.text))
         self._tell_setup(page)
+        if self.follower.teacher is not None:
+            page.tell(text_of("teach", **self.follower.teacher.facts()))
         if self._newest is not None:
             data = frame_bytes(self._frames, self._newest)
             page.offer(Outgoing(self._frames, data, time.monotonic_ns()))
@@ -371,6 +376,8 @@ class PageServer:
             return follower.mode([str(kind) for kind in value])
         if what == "sign" and value in ("increase", "decrease", "both"):
             return follower.solver(sign=value)
+        if what == "teach" and value in ("back", "skip", "fit"):
+            return follower.teach(value)
         if what == "iterations" and isinstance(value, int) and 1 <= value <= 1_000_000:
             return follower.solver(iterations=value)
         raise UsageError(f"{what}: {value!r} cannot be")

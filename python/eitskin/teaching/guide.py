@@ -15,18 +15,24 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.device.settings import ScanSettings
 from eitskin.errors import FrameError, UsageError
 from eitskin.skin.protocol import Protocol
 from eitskin.teaching.plan import Plan
 from eitskin.teaching.presses import Presses, joined, load_presses, save_presses
 
+if TYPE_CHECKING:
+    from eitskin.device.wire.packets import BoardInfo
+
 FloatArray = npt.NDArray[np.float64]
 
 SAME_PLACE_MM = 0.02
+PACE_US = 25_000  # a frame: a hold of twelve is .3 s
 
 
 class Step(Enum):
@@ -294,6 +300,15 @@ class PressFile:
 
 def _known(values: FloatArray) -> FloatArray | None:
     return None if np.isnan(values).all() else values
+
+
+def scan_of_presses(board: BoardInfo, replays: bool) -> ScanSettings:
+    """Every row of every frame, no faster than a person presses; a board that is given its frames,
+    or a recording, sends what it has."""
+    if board.frames_given or replays:
+        return ScanSettings()
+    slow = board.n_rows * board.slot_us >= PACE_US
+    return ScanSettings(check_every=1, frame_period_us=0 if slow else PACE_US)
 
 
 def guide_presses(

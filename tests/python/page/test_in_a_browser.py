@@ -20,9 +20,14 @@ from eitskin.device.wire.link_table import Stream
 from eitskin.live.session import Session, SessionSettings
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.page.server import PageServer
+from eitskin.page.teacher import Teacher
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import load_scene
 from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.teaching.plan import plan_places
+from eitskin.teaching.practice import practice_scene
+from eitskin.teaching.presses import load_presses
 
 PLACES = [(-40.0, 10.0), (30.0, -20.0)]
 NEAR_MM = 3.0
@@ -152,6 +157,30 @@ def test_gestures_and_zones(page: Page) -> None:
         page.open(server)
         until(lambda: "tap" in page.text("gestures") and "middle" in page.text("gestures"))
         assert "far" not in page.text("gestures")
+
+
+def test_teaching_press_by_press(page: Page, tmp_path: Path) -> None:
+    """A finger presses where the plan says; the presses become a model that the board then has."""
+    skin, scene, presses = paper_skin(), tmp_path / "practice.toml", tmp_path / "presses.npz"
+    plan = plan_places(skin, adjacent(16), 6)
+    text = practice_scene(skin, Path("none"), plan)
+    scene.write_text(text.replace('skin = "none"\n', ""), encoding="utf-8")
+    teacher = Teacher(plan, presses)
+    with serving(f"sim:{scene}?loop=1", Stream.RAW, teacher=teacher, speed=3.0) as server:
+        page.open(server)
+        until(lambda: "hold still" in page.text("teach-text"))
+        until(lambda: page.text("teach-text") == "all places are done")
+        assert page.text("teach-count") == "6 of 6 presses"
+        taken = load_presses(presses)
+        assert np.abs(taken.place_mm - plan.place_mm).max() < 0.01
+        page.click("teach-fit")
+        answer = page.answer()
+        assert answer.startswith("presses.eitm: 6 presses") and "is in use" in answer
+        known = server.follower.live().known
+        assert known is not None and known.model.precision is not None
+        page.click("teach-back")
+        assert page.answer() == "place 6 again; leave the skin untouched"
+        until(lambda: page.text("teach-count").startswith("5 of 6 presses"))
 
 
 def test_pause_step_play_and_speed(live: Page, server: PageServer) -> None:

@@ -110,6 +110,7 @@ export class SkinDrawing {
     context.stroke(outline);
     this.drawZones(context, options.zones, options.pressed);
     this.drawElectrodes(context, options.health);
+    if (options.teach) this.drawPlaces(context, options.teach);
     if (!frame) return;
     if (options.trails) this.drawTrails(context, frame.message.time_s);
     if (options.truth) for (const touch of frame.message.true || []) this.drawTrue(context, touch);
@@ -132,6 +133,24 @@ export class SkinDrawing {
     context.imageSmoothingEnabled = true;
     context.drawImage(this.pixels, this.x(x0), this.y(y0 + high), wide * this.scale, high * this.scale);
     context.restore();
+  }
+
+  // Where to press: done ones filled, the next one a ring with its number.
+  drawPlaces(context, { places_mm, done, number, step }) {
+    places_mm.forEach(([x, y], k) => {
+      const now = k === number && step !== "done", there = done.includes(k);
+      context.beginPath();
+      context.arc(this.x(x), this.y(y), now ? 13 : there ? 5 : 3, 0, 2 * Math.PI);
+      context.fillStyle = context.strokeStyle = now ? this.colours.accent : there ? this.colours.good : this.colours.soft;
+      context.lineWidth = 3;
+      context[now ? "stroke" : "fill"]();
+    });
+    if (step === "done") return;
+    context.font = "600 13px system-ui, sans-serif";
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.fillStyle = this.colours.accent;
+    context.fillText(String(number + 1), this.x(places_mm[number][0]), this.y(places_mm[number][1]));
   }
 
   drawZones(context, zones, pressed) {

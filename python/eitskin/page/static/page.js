@@ -12,7 +12,7 @@ const skin = new SkinDrawing($("skin"));
 const volts = new VoltsDrawing($("volts"));
 const page = {
   socket: null, setup: null, frame: null, asked: false, times: [], health: {}, dropped: 0, skipped: 0,
-  wordsAt: 0, words: "", gestures: [], pressed: new Set(), state: "",
+  wordsAt: 0, words: "", gestures: [], pressed: new Set(), state: "", teach: null,
 };
 const token = new URLSearchParams(location.hash.slice(1)).get("token");
 
@@ -79,6 +79,7 @@ function take(message) {
   if (message.type === "state") return setState(message.state, message.text);
   if (message.type === "answer") return answer(message);
   if (message.type === "notice") return note(message);
+  if (message.type === "teach") return showTeach(message);
   if (message.type === "page") {
     page.dropped = message.dropped + message.skipped;
     $("n-latency").textContent = message.latency_ms === null ? "–" : `${message.latency_ms.toFixed(0)} ms`;
@@ -123,6 +124,7 @@ function takeSetup(setup) {
   if (!may) answer({ ok: true, text: "Looking on: buttons need the address that eitskin view printed." });
   showElectrodes({}, setup.electrodes);
   showPlay();
+  showTeachButtons();
   soon();
 }
 
@@ -144,6 +146,25 @@ function note({ kind, text, time_s }) {
   item.append(what, text);
   $("log").prepend(item);
   while ($("log").children.length > SHOWN_LOG) $("log").lastChild.remove();
+}
+
+function showTeach(teach) {
+  page.teach = teach;
+  const count = teach.places_mm.length, at = teach.places_mm[teach.number];
+  $("teach").hidden = false;
+  $("teach").dataset.step = teach.step;
+  $("teach-text").textContent = teach.text;
+  $("teach-count").textContent = `${teach.done.length} of ${count} presses` +
+    (at ? `; now place ${teach.number + 1} at ${at[0].toFixed(1)}, ${at[1].toFixed(1)} mm` : "");
+  showTeachButtons();
+  soon();
+}
+
+function showTeachButtons() {
+  const { teach, setup } = page, may = Boolean(teach && setup && setup.may_command);
+  $("teach-back").disabled = !may || !teach.done.length;
+  $("teach-skip").disabled = !may || teach.step === "done";
+  $("teach-fit").disabled = !may || teach.done.length < 5;
 }
 
 function cell(text) {
@@ -211,7 +232,7 @@ function rate() {
 function draw() {
   const { frame, setup } = page;
   skin.draw(frame, { health: page.health, trails: $("trails").checked, truth: $("truth").checked,
-    zones: setup ? setup.zones : [], pressed: page.pressed });
+    zones: setup ? setup.zones : [], pressed: page.pressed, teach: page.teach });
   if (!frame || !setup) return;
   const { message } = frame, { info } = message, touches = message.touches || [];
   $("volts").ariaLabel = volts.draw(frame.volts, setup.reference_v);
@@ -256,6 +277,7 @@ $("tare").addEventListener("click", () => ask("tare"));
 $("record").addEventListener("click", () => ask("record", $("record").getAttribute("aria-pressed") !== "true"));
 $("play").addEventListener("click", playOrPause);
 $("step").addEventListener("click", () => ask("step"));
+for (const what of ["back", "skip", "fit"]) $(`teach-${what}`).addEventListener("click", () => ask("teach", what));
 $("speed").addEventListener("change", () => ask("speed", $("speed").value));
 $("sign").addEventListener("change", () => ask("sign", $("sign").value));
 $("iterations").addEventListener("change", () => ask("iterations", Number($("iterations").value)));
@@ -278,7 +300,7 @@ addEventListener("resize", soon);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", soon);
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|BUTTON)$/.test(event.target.tagName)) return;
-  const button = { t: "tare", r: "record", " ": "play", ".": "step" }[event.key.toLowerCase()];
+  const button = { t: "tare", r: "record", " ": "play", ".": "step", b: "teach-back", s: "teach-skip", f: "teach-fit" }[event.key.toLowerCase()];
   if (!button || $(button).disabled || $(button).hidden) return;
   event.preventDefault();
   $(button).click();

@@ -1,0 +1,117 @@
+"""Teaching in the page: the guide of ``eitskin teach record`` fed with the frames that the page
+follows, the same file of presses, and the fit."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.device.known_model import scanned_protocol
+from eitskin.errors import UsageError
+from eitskin.live.frame import Frame
+from eitskin.live.session import Session
+from eitskin.teaching.guide import GuideEvent, PressFile, PressGuide, Step, scan_of_presses
+
+if TYPE_CHECKING:
+    from eitskin.skin.skin import Skin
+    from eitskin.teaching.plan import Plan
+
+
+class Teacher:
+    """Guides through ``plan`` into the file ``presses``; ``skin`` with its description's
+    ``text``, None and "" for that of the board's model. ``on_event`` gets the facts for pages
+    whenever something is new."""
+
+    def __init__(self, plan: Plan, presses: Path, skin: Skin | None = None, text: str = "") -> None:
+        self.plan, self.path, self._skin, self._text = plan, presses, skin, text
+        self.on_event: Callable[[dict[str, Any]], None] = lambda facts: None
+        self._guide: PressGuide | None = None
+        self._file: PressFile | None = None
+        self._said = Step.REST.value
+        self._lock = threading.Lock()
+
+    def begin(self, session: Session) -> None:
+        """Set the scan of a session that has not started, and go on where the file ends.
+
+        Raises:
+            FrameError: the file is of another protocol or plan.
+            DeviceError: which rows the board scans is not known.
+        """
+        board = session.device.board
+        session.settings = replace(session.settings, scan=scan_of_presses(board, session.replays))
+        protocol = scanned_protocol(board, session.known, session.name)
+        with self._lock:
+            self._file = PressFile(self.path, self.plan, protocol, self._text)
+            self._guide = PressGuide(self.plan, start=self._file.following)
+            if self._skin is None and session.known is not None:
+                self._skin = session.known.model.skin
+        self.on_event(self.facts())
+
+    def take(self, frame: Frame) -> None:
+        """The next frame."""
+        if frame.voltage_v is None:
+            return
+        with self._lock:
+            if self._guide is None or self._file is None:
+                return
+            event = self._guide.feed(frame.voltage_v, frame.time_s)
+            if event is None:
+                return
+            if event.accepted and self._guide.taken is not None:
+                self._file.add(event.number, *self._guide.taken)
+            self._said = event.text
+        self.on_event(self.facts())
+
+    def facts(self) -> dict[str, Any]:
+        """For pages: what to do now, where, and what is done."""
+        guide, file = self._guide, self._file
+        return {
+            "step": "rest" if guide is None else guide.step.name.lower(),
+            "text": self._said,
+            "number": 0 if guide is None else guide.number,
+            "done": [] if file is None else list(file.numbers),
+            "places_mm": self.plan.place_mm.round(2).tolist(),
+        }
+
+    def go(self, what: str) -> str:
+        """``back`` to the press before, or ``skip`` this place.
+
+        Raises:
+            UsageError: nothing is being taught yet.
+        """
+        with self._lock:
+            if self._guide is None or self._file is None:
+                raise UsageError("teach: the board is not there yet")
+            event: GuideEvent
+            if what == "back":
+                event = self._guide.back(self._file.back())
+            elif self._guide.step is Step.DONE:
+                raise UsageError("teach: all places are done")
+            else:
+                event = self._guide.skip()
+            self._said = event.text
+        self.on_event(self.facts())
+        return event.text
+
+    def fit(self) -> tuple[bytes, str]:
+        """The taught model's bytes, also in a file beside the presses, and what it is worth.
+
+        Raises:
+            EitskinError: the presses cannot teach.
+        """
+        from eitskin.model.eitm import encode_model, save_model
+        from eitskin.teaching.teach import teach
+
+        presses = None if self._file is None else self._file.presses
+        if presses is None:
+            raise UsageError("teach: no press is there yet")
+        taught = teach(presses, self._skin)
+        path = self.path.with_suffix(".eitm")
+        save_model(path, taught.model)
+        error = taught.report["error_mm"]["held_out_median"]
+        notes = "".join(f"; {note}" for note in taught.report["notes"])
+        text = f"{path.name}: {len(presses)} presses, {error:.1f} mm where held out{notes}"
+        return encode_model(taught.model), text
