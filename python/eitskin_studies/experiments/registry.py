@@ -42,6 +42,9 @@ EXPERIMENTS = {
         "a skin stretched and bent, by the flat one's model, before and after a fresh tare"
     ),
     "paper": "weights placed one after another from the most sensitive place (Fig. 12)",
+    "fast-path": (
+        "touches after each drive, while they land, move and lift: false ones, delay, error"
+    ),
     "levers": (
         "what was tried to do better, each for itself: what helps for its MACs, and what does not"
     ),

@@ -21,6 +21,7 @@ ROOMS = (
     "touch",
     "evidence",
     "api",
+    "fast",
 )
 # know nothing of contexts
 APART = {"link": ("base", "link"), "gesture": ("base", "gesture")}

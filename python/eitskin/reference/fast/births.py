@@ -1,0 +1,229 @@
+"""New touches by a matched filter over the drives that wait for an explanation: the numpy reference
+of csrc/src/fast/births.c.
+
+Each drive has a strength of its own, since a touch that lands grows from drive to drive; only the
+place is common (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.constants_table import (
+    FAST_ANSWERS,
+    FAST_APART_MM,
+    FAST_DAMPING,
+    FAST_MAX_STEP_MM,
+    FAST_PAIR_DRIVES,
+    FAST_PAIR_HELD,
+    FAST_SETTLED_MM,
+    FAST_SHORTER,
+    FAST_SINGULAR,
+    FAST_STARTS,
+    FAST_STEPS,
+)
+from eitskin.reference.fast.rows import Drive, RowModel
+from eitskin.reference.fast.tracks import lower_solve
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A drive that waits, by its place in the scan: its rows ``white`` (r,) with the factor L (r,
+    r) that whitened them, how many are in use, and whether it was news."""
+
+    drive: Drive
+    white: FloatArray
+    factor: FloatArray
+    rows: int
+    news: bool
+    number: int
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Touches at ``places`` (k, 2) mm as they explain j drives that wait.
+
+    Attributes:
+        strength: in each drive (j, k).
+        left: what they leave of each drive's chi^2 (j,).
+        score: what they explain of it.
+        own: what each does beside the other (k,).
+        h, b: the normal equations of moving them (2 k, 2 k) and (2 k,).
+        variance: of the strengths in the last drive (k,).
+    """
+
+    places: FloatArray
+    strength: FloatArray
+    left: FloatArray
+    score: float
+    own: FloatArray
+    h: FloatArray
+    b: FloatArray
+    variance: FloatArray
+
+
+def inverted(h: FloatArray) -> FloatArray | None:
+    """The inverse of a symmetric matrix (n, n); None where it is not well above zero."""
+    diagonal = np.diag(h)
+    if not (diagonal > 0).all():
+        return None
+    scale = 1 / np.sqrt(diagonal)
+    unit = h * np.outer(scale, scale)
+    factor = np.zeros_like(unit)
+    for i in range(len(unit)):
+        for j in range(i):
+            factor[i, j] = (unit[i, j] - factor[i, :j] @ factor[j, :j]) / factor[j, j]
+        square = unit[i, i] - factor[i, :i] @ factor[i, :i]
+        if not square > FAST_SINGULAR:
+            return None
+        factor[i, i] = np.sqrt(square)
+    half = lower_solve(factor, np.diag(scale))
+    return np.asarray(half.T @ half)
+
+
+def strengths(answers: FloatArray, white: FloatArray, sign: float) -> FloatArray:
+    """The least squares of ``white`` (r,) by ``answers`` (k, r), k one or two, none of the wrong
+    ``sign``, (k,)."""
+    gram, along = answers @ answers.T, np.maximum(sign * (answers @ white), 0.0)
+    alone = np.array([a / g if g > 0 else 0.0 for a, g in zip(along, np.diag(gram), strict=True)])
+    if len(answers) == 1:
+        return np.asarray(sign * alone)
+    cross, (first, second) = gram[0, 1], np.diag(gram)
+    det, toward = first * second - cross**2, sign * (answers @ white)
+    if det > FAST_SINGULAR * first * second:
+        both = np.array(
+            [second * toward[0] - cross * toward[1], first * toward[1] - cross * toward[0]]
+        )
+        if (both >= 0).all():
+            return np.asarray(sign * both / det)
+    alone[0 if alone[0] * along[0] < alone[1] * along[1] else 1] = 0.0
+    return np.asarray(sign * alone)
+
+
+class Births:
+    """Looks for touches in drives that wait. ``cells`` (n,) are the pixels that are tried first."""
+
+    def __init__(self, model: RowModel, cells: npt.NDArray[np.int64], sign: float) -> None:
+        self.model, self.cells, self.sign = model, cells, sign
+        self._kept: dict[int, FloatArray] = {}
+        self.begin()
+
+    def begin(self) -> None:
+        """A wait begins: nothing is in the map."""
+        self.score, self._last = np.zeros(len(self.cells)), np.zeros((0, 2))
+
+    def add(self, one: Held) -> None:
+        """A drive enters the map."""
+        self.score = self.score + self._explained_at_cells(one, np.zeros((0, 2)))
+
+    def one(self, held: list[Held]) -> list[Fit]:
+        """Fits of one touch from the map's greatest cells, the best first."""
+        fits = self._refined(held, self.score, np.zeros((0, 2)))
+        self._last = np.array([fit.places[0] for fit in fits]).reshape(-1, 2)
+        return fits
+
+    def two(self, held: list[Held], first: FloatArray) -> list[Fit]:
+        """Fits of a second touch beside one at ``first`` (1, 2), the best first."""
+        score = np.zeros(len(self.cells))
+        for one in held[-FAST_PAIR_DRIVES:]:
+            score = score + self._explained_at_cells(one, first)
+        return self._refined(held[-FAST_PAIR_HELD:], score, first)
+
+    def _refined(self, held: list[Held], score: FloatArray, places: FloatArray) -> list[Fit]:
+        starts = self._peaks(score, places)
+        for start in starts:  # where the last drive's search has come to
+            near = np.hypot(*(self._last - start).T) <= FAST_APART_MM
+            if not len(places) and near.any():
+                start[:] = self._last[int(np.argmax(near))]
+        fits = [self._refine(held, np.vstack([places, start])) for start in starts]
+        return sorted((fit for fit in fits if fit is not None), key=lambda fit: -fit.score)
+
+    def _at_cells(self, drive: Drive) -> FloatArray:
+        """Each row's answer at the cells (r, n)."""
+        first = int(drive.rows[0])
+        if first not in self._kept:
+            self._kept[first] = self.model.at_pixels(drive, self.cells).T
+        return self._kept[first]
+
+    def _explained_at_cells(self, one: Held, places: FloatArray) -> FloatArray:
+        """What a touch at each cell (n,) would explain of a drive's chi^2, beside those at
+        ``places`` (k, 2)."""
+        answer, white = lower_solve(one.factor, self._at_cells(one.drive)), one.white
+        for place in places:
+            known = lower_solve(one.factor, self.model.answer(one.drive, *place)[0][0])
+            energy = float(known @ known)
+            if energy > 0:
+                white = white - (known @ white) / energy * known
+                answer = answer - np.outer(known, known @ answer) / energy
+        along, energies = np.maximum(self.sign * (white @ answer), 0.0), (answer**2).sum(axis=0)
+        return np.where(energies > 0, along**2 / np.maximum(energies, 1e-300), 0.0)
+
+    def _peaks(self, score: FloatArray, places: FloatArray) -> FloatArray:
+        """The greatest cells, apart from each other and from ``places``, (c, 2) mm."""
+        score, centres = score.copy(), self.model.centres_mm[self.cells]
+        found = np.zeros((0, 2))
+        for place in places:
+            score[np.hypot(*(centres - place).T) <= FAST_APART_MM] = 0.0
+        while len(found) < FAST_STARTS and score.max() > 0:
+            best = centres[int(np.argmax(score))]
+            score[np.hypot(*(centres - best).T) <= FAST_APART_MM] = 0.0
+            found = np.vstack([found, best])
+        return found
+
+    def fit(self, held: list[Held], places: FloatArray) -> Fit | None:
+        """How ``places`` (k, 2) explain ``held``; None where one is off the skin."""
+        k, j = len(places), len(held)
+        strength, left, own = np.zeros((j, k)), np.zeros(j), np.zeros(k)
+        h, b, score, variance = np.zeros((2 * k, 2 * k)), np.zeros(2 * k), 0.0, np.zeros(k)
+        for n, one in enumerate(held):
+            seen = [self.model.answer(one.drive, *place) for place in places]
+            if not all(there for _, there in seen):
+                return None
+            answers = np.array([lower_solve(one.factor, raw.T).T for raw, _ in seen])
+            g, slopes = answers[:, 0], answers[:, 1:]
+            c = strengths(g, one.white, self.sign)
+            rest = one.white - c @ g
+            strength[n], left[n] = c, rest @ rest
+            score += float(one.white @ one.white) - left[n]
+            for i in range(k):
+                without = one.white.copy()
+                for other in range(k):
+                    if other != i:
+                        without -= strengths(g[[other]], one.white, self.sign)[0] * g[other]
+                own[i] += float(without @ without) - left[n]
+            jac, variance = (c[:, None, None] * slopes).reshape(2 * k, -1), np.zeros(k)
+            basis = np.zeros((0, len(rest)))
+            for i in np.flatnonzero(c).tolist():
+                free = g[i] - basis.T @ (basis @ g[i])
+                variance[i] = 1 / float(free @ free)
+                basis = np.vstack([basis, free * np.sqrt(variance[i])])
+            jac = jac - jac @ basis.T @ basis
+            h, b = h + jac @ jac.T, b + jac @ rest
+        return Fit(places, strength, left, score, own, h, b, variance)
+
+    def _refine(self, held: list[Held], places: FloatArray) -> Fit | None:
+        """Damped Gauss-Newton steps from ``places`` (k, 2), the fewer the more drives wait."""
+        fit, shorter = self.fit(held, places), 1.0
+        for _ in range(min(FAST_STEPS, max(1, FAST_ANSWERS // (len(held) * len(places)) - 1))):
+            if fit is None:
+                return None
+            damped = inverted(fit.h + FAST_DAMPING * np.diag(np.diag(fit.h)))
+            if damped is None:
+                return fit
+            step = shorter * (damped @ fit.b).reshape(-1, 2)
+            length = float(np.abs(step).max())
+            if length > FAST_MAX_STEP_MM:
+                step, length = step * (FAST_MAX_STEP_MM / length), FAST_MAX_STEP_MM
+            trial = self.fit(held, fit.places + step)
+            if trial is not None and trial.score > fit.score:
+                fit, shorter = trial, 1.0
+            else:
+                shorter *= FAST_SHORTER
+            if length < FAST_SETTLED_MM:
+                return fit
+        return fit

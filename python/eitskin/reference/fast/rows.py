@@ -1,0 +1,91 @@
+"""What a touch does to one drive's rows, from the model's fields: the numpy reference of
+csrc/src/fast/rows.c."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.constants_table import FAST_SOFT_RADIUS
+from eitskin.errors import UsageError
+from eitskin.model.model import Model
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Rows (r,) of a protocol that are measured while one pair of electrodes is driven."""
+
+    plus: int
+    minus: int
+    rows: IntArray
+
+
+def drives_of(model: Model) -> list[Drive]:
+    """The protocol's drives, in the order of their first rows."""
+    table = model.protocol.drive_measure.astype(np.int64)
+    pairs: dict[tuple[int, int], list[int]] = {}
+    for row, (plus, minus) in enumerate(table[:, :2].tolist()):
+        pairs.setdefault((plus, minus), []).append(row)
+    return [Drive(*pair, np.array(rows)) for pair, rows in pairs.items()]
+
+
+class RowModel:
+    """The answer of each row to a touch of strength 1 S/m mm^2, in the model's volts.
+
+    A row's datum changes by -volts strength mean(E_drive . E_measure), the mean over a soft disc:
+    each pixel's field counts (1 - d^2 / rho^2)^2 at a distance d below rho, so that the answer has
+    a derivative everywhere.
+
+    Raises:
+        UsageError: the model has no fields.
+    """
+
+    def __init__(self, model: Model) -> None:
+        if model.fields is None:
+            raise UsageError("fast path: the model has no fields (section FLDS); build it again")
+        electrodes, fields = model.protocol.n_electrodes, model.fields
+        columns = fields.columns[:, : 2 * electrodes].astype(np.float64)
+        self._x, self._y = columns[:, :electrodes], columns[:, electrodes:]
+        self._volts, self._table = fields.volts, model.protocol.drive_measure.astype(np.int64)
+        self.centres_mm = model.grid.centres_mm()
+        self._rho2 = (FAST_SOFT_RADIUS * model.defaults.touch_seed_radius_mm) ** 2
+
+    def answer(self, drive: Drive, x_mm: float, y_mm: float) -> tuple[FloatArray, bool]:
+        """The rows' answer to a touch there and its derivatives by x and y (3, r), V per S/m mm^2
+        and that per mm; and whether the place is on the skin."""
+        to_x, to_y = (self.centres_mm - (x_mm, y_mm)).T
+        left = 1 - (to_x**2 + to_y**2) / self._rho2
+        near = np.flatnonzero(left > 0)
+        if not len(near):
+            return np.zeros((3, len(drive.rows))), False
+        left, to_x, to_y = left[near], to_x[near], to_y[near]
+        weights = np.array([left**2, 4 / self._rho2 * left * to_x, 4 / self._rho2 * left * to_y])
+        sums = weights.sum(axis=1)
+        seen = weights @ self._products(drive, near) / sums[0]
+        seen[1:] -= sums[1:, None] / sums[0] * seen[0]
+        return self._over_rows(drive, seen), True
+
+    def at_pixels(self, drive: Drive, pixels: IntArray) -> FloatArray:
+        """The rows' answer to a touch no larger than each of ``pixels`` (k,), (k, r)."""
+        return self._over_rows(drive, self._products(drive, pixels))
+
+    def _products(self, drive: Drive, pixels: IntArray) -> FloatArray:
+        """E_drive . E of each electrode's current (k, L)."""
+        x, y = self._x[pixels], self._y[pixels]
+        along_x = x[:, drive.plus] - x[:, drive.minus]
+        along_y = y[:, drive.plus] - y[:, drive.minus]
+        return np.asarray(along_x[:, None] * x + along_y[:, None] * y)
+
+    def _over_rows(self, drive: Drive, seen: FloatArray) -> FloatArray:
+        measure = self._table[drive.rows, 2:]
+        return np.asarray(-self._volts * (seen[:, measure[:, 0]] - seen[:, measure[:, 1]]))
+
+    def on_skin(self, x_mm: float, y_mm: float) -> bool:
+        """Whether a pixel's centre is near enough to answer."""
+        to_x, to_y = (self.centres_mm - (x_mm, y_mm)).T
+        return bool((to_x**2 + to_y**2 < self._rho2).any())

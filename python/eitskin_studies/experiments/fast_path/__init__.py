@@ -1,0 +1,317 @@
+"""Touches that land, move and lift while rows are measured: what the fast path says after each
+drive."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
+from eitskin_studies.experiments.fast_path.scans import Outcome, Player, Scan, TrueInTime
+from eitskin_studies.experiments.fast_path.states import ELEMENTS, States, at_press, solve_states
+from eitskin_studies.experiments.multitouch.counts import share
+
+FloatArray = npt.NDArray[np.float64]
+
+TITLE = "Touches after each drive: false ones, delay and error, while they land, move and lift"
+BEFORE_S, HELD_S, AFTER_S = 0.06, 0.08, 0.06
+SWIPE_HELD_S = 0.04
+FAULT_S = 0.04  # a fault begins here, the press later
+FAULTED_PRESS_S, FAULTED_END_S = 0.15, 0.33
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: ``count`` scenes of states ``kind``."""
+
+    name: str
+    kind: str
+    count: int
+    make: Callable[[Player, States, int, np.random.Generator, float], Outcome]
+    snr_db: float = 60.0
+
+
+def rows() -> list[Row]:
+    """Those of the page."""
+    listed = [
+        Row(f"press, rise {rise_ms} ms", "presses", 400, partial(_press, rise_s=rise_ms / 1e3))
+        for rise_ms in (0, 30, 60, 120)
+    ]
+    listed += [
+        Row(
+            f"press, rise {rise_ms} ms, 40 dB",
+            "presses",
+            200,
+            partial(_press, rise_s=rise_ms / 1e3),
+            40.0,
+        )
+        for rise_ms in (0, 60)
+    ]
+    listed += [
+        Row(f"swipe at {speed} mm/s", "swipes", 60, partial(_swipe, speed_mm_per_s=float(speed)))
+        for speed in (200, 600, 1000)
+    ]
+    listed += [
+        Row(
+            f"two fingers at once, rise {rise_ms} ms",
+            "pairs",
+            200,
+            partial(_pair, rise_s=rise_ms / 1e3),
+        )
+        for rise_ms in (0, 30)
+    ]
+    listed.append(Row("a second finger 30 ms later", "pairs", 200, partial(_pair, later_s=0.03)))
+    listed.append(Row("quiet", "presses", 100, partial(_fault, spoil=_nothing, press=False)))
+    faults = {"glitches": _glitches, "electrode open": _open, "electrode noisy": _noisy,
+              "gain drifts by 0.5 %": _drift}  # fmt: skip
+    return listed + [
+        Row(f"{name}, then a press", "presses", 50, partial(_fault, spoil=spoil))
+        for name, spoil in faults.items()
+    ]
+
+
+def run(workspace: Workspace) -> ExperimentOutcome:
+    """All of it; what the workspace has kept is not computed again."""
+    settings = workspace.settings
+    model, blob = load_prebuilt()
+    solved: dict[str, States] = {}
+    listed = [(row, settings.count(row.count)) for row in rows()]
+    for kind in ("presses", "swipes", "pairs"):
+        most = max(count for row, count in listed if row.kind == kind)
+        solved[kind] = solve_states(model, kind, most, settings.seed, ELEMENTS)
+    found = []
+    for number, (row, count) in enumerate(workspace.progress(listed, "playing")):
+        outcomes = []
+        for k in range(count):
+            rng = np.random.default_rng([settings.seed, number, k])
+            v0 = solved[row.kind].v0[k]
+            sigma = float(np.sqrt(np.mean(v0**2))) / 10 ** (row.snr_db / 20)
+            player = Player(model, blob)
+            player.tare(v0, sigma, rng)
+            outcomes.append(row.make(player, solved[row.kind], k, rng, sigma))
+        found.append({"name": row.name, **_summary(outcomes)})
+    words = (
+        f"Seed {settings.seed}; discs of radius 8 mm, contrast 5, 60 dB unless said; frames from"
+        f" {ELEMENTS} elements, contacts spread by 30 %, a tare of 64 frames; 100 us a row, drives"
+        " by 7; the prebuilt model."
+    )
+    return ExperimentOutcome((_table(found),), {"rows": found}, {}, {"sets": words})
+
+
+# ---- scenes ----
+
+
+def _ramp(time_s: FloatArray, from_s: float, rise_s: float, to_s: float) -> FloatArray:
+    """0 to 1 from ``from_s`` on, and down again from ``to_s`` on."""
+    if rise_s == 0:
+        return ((time_s >= from_s) & (time_s < to_s)).astype(np.float64)
+    up, down = (time_s - from_s) / rise_s, 1 - (time_s - to_s) / rise_s
+    return np.clip(np.minimum(up, down), 0, 1)
+
+
+def _begin(player: Player, rng: np.random.Generator) -> float:
+    rows = player.path.model.protocol.n_rows
+    return BEFORE_S + 1e-4 * rows * float(rng.uniform())
+
+
+def _press(
+    player: Player, states: States, k: int, rng: np.random.Generator, sigma: float, *, rise_s: float
+) -> Outcome:
+    from_s = _begin(player, rng)
+    to_s = from_s + rise_s + HELD_S
+    scan = Scan.of(player.path, to_s + rise_s + AFTER_S)
+    press = _ramp(scan.time_s, from_s, rise_s, to_s)
+    volts = states.v0[k][scan.row] + at_press(states.change[k][0], press, scan.row)
+    place = states.places[k][0]
+    truth = [TrueInTime(from_s, to_s + rise_s, lambda _: place)]
+    return player.play(scan, volts + sigma * rng.standard_normal(len(volts)), truth)
+
+
+def _pair(
+    player: Player,
+    states: States,
+    k: int,
+    rng: np.random.Generator,
+    sigma: float,
+    *,
+    rise_s: float = 0.0,
+    later_s: float = 0.0,
+) -> Outcome:
+    from_s = _begin(player, rng)
+    to_s = from_s + rise_s + later_s + HELD_S
+    scan = Scan.of(player.path, to_s + rise_s + AFTER_S)
+    first, second = (_ramp(scan.time_s, from_s + late, rise_s, to_s) for late in (0.0, later_s))
+    one, other, both = states.change[k]
+    volts = states.v0[k][scan.row] + at_press(one, first, scan.row)
+    volts += at_press(other, second, scan.row)
+    volts += at_press(both - one - other, np.sqrt(first * second), scan.row)
+    here, there = states.places[k]
+    truth = [
+        TrueInTime(from_s, to_s + rise_s, lambda _: here),
+        TrueInTime(from_s + later_s, to_s + rise_s, lambda _: there),
+    ]
+    return player.play(scan, volts + sigma * rng.standard_normal(len(volts)), truth)
+
+
+def _swipe(
+    player: Player,
+    states: States,
+    k: int,
+    rng: np.random.Generator,
+    sigma: float,
+    *,
+    speed_mm_per_s: float,
+) -> Outcome:
+    places, change = states.places[k], states.change[k]
+    step_s = float(np.hypot(*(places[1] - places[0]))) / speed_mm_per_s
+    from_s = _begin(player, rng)
+    to_s = from_s + 2 * SWIPE_HELD_S + step_s * (len(places) - 1)
+
+    def along(time_s: npt.ArrayLike) -> FloatArray:
+        gone = (np.asarray(time_s) - from_s - SWIPE_HELD_S) / step_s
+        return np.clip(gone, 0, len(places) - 1 - 1e-9)
+
+    def place(time_s: float) -> FloatArray:
+        at = float(along(time_s))
+        low = int(at)
+        return np.asarray(places[low] + (at - low) * (places[low + 1] - places[low]))
+
+    scan = Scan.of(player.path, to_s + AFTER_S)
+    at = along(scan.time_s)
+    low = at.astype(np.int64)
+    moved = change[low, scan.row] + (at - low) * (change[low + 1, scan.row] - change[low, scan.row])
+    volts = states.v0[k][scan.row] + _ramp(scan.time_s, from_s, 0, to_s) * moved
+    volts += sigma * rng.standard_normal(len(volts))
+    return player.play(scan, volts, [TrueInTime(from_s, to_s, place)])
+
+
+Spoil = Callable[[FloatArray, Player, Scan, float, np.random.Generator], FloatArray]
+
+
+def _fault(
+    player: Player,
+    states: States,
+    k: int,
+    rng: np.random.Generator,
+    sigma: float,
+    *,
+    spoil: Spoil,
+    press: bool = True,
+) -> Outcome:
+    scan = Scan.of(player.path, FAULTED_END_S)
+    volts, truth = states.v0[k][scan.row], []
+    if press:
+        up = _ramp(scan.time_s, FAULTED_PRESS_S, 0.03, np.inf)
+        volts = volts + at_press(states.change[k][0], up, scan.row)
+        place = states.places[k][0]
+        truth = [TrueInTime(FAULTED_PRESS_S, np.inf, lambda _: place)]
+    volts = spoil(volts, player, scan, sigma, rng)
+    return player.play(scan, volts + sigma * rng.standard_normal(len(volts)), truth)
+
+
+def _nothing(volts: FloatArray, *_: Any) -> FloatArray:
+    return volts
+
+
+def _glitches(
+    volts: FloatArray, _: Player, scan: Scan, sigma: float, rng: np.random.Generator
+) -> FloatArray:
+    """One row of two frames."""
+    late = np.flatnonzero(scan.time_s > FAULT_S)
+    hit = rng.choice(late, len(volts) // 400, replace=False)
+    spoiled = volts.copy()
+    spoiled[hit] += float(np.abs(volts).max()) * rng.standard_normal(len(hit))
+    return spoiled
+
+
+def _with(player: Player, scan: Scan, rng: np.random.Generator) -> npt.NDArray[np.bool_]:
+    """Which rows (t, 2) drive, and measure, with an electrode that fails."""
+    table = player.path.model.protocol.drive_measure[scan.row] == rng.integers(
+        player.path.model.protocol.n_electrodes
+    )
+    late = scan.time_s[:, None] > FAULT_S
+    return np.asarray(table.reshape(-1, 2, 2).any(axis=2) & late)
+
+
+def _open(
+    volts: FloatArray, player: Player, scan: Scan, sigma: float, rng: np.random.Generator
+) -> FloatArray:
+    """No current flows by way of it, and it floats where it is measured."""
+    drives, measures = _with(player, scan, rng).T
+    floating = 0.3 * float(rng.uniform(-1, 1)) * float(np.abs(volts).max())
+    return np.where(drives, 0.0, np.where(measures, floating, volts))
+
+
+def _noisy(
+    volts: FloatArray, player: Player, scan: Scan, sigma: float, rng: np.random.Generator
+) -> FloatArray:
+    """Thirty times the noise."""
+    spoiled = _with(player, scan, rng)[:, 1]
+    return np.asarray(volts + 30 * sigma * spoiled * rng.standard_normal(len(volts)))
+
+
+def _drift(
+    volts: FloatArray, _: Player, scan: Scan, sigma: float, rng: np.random.Generator
+) -> FloatArray:
+    return np.asarray(volts * (1 + 0.005 * np.clip((scan.time_s - FAULT_S) / 0.1, 0, 1)))
+
+
+# ---- what came of it ----
+
+
+def _summary(outcomes: list[Outcome]) -> dict[str, Any]:
+    first = np.array([one for each in outcomes for one in each.first if one]).reshape(-1, 2)
+    fingers = sum(len(each.first) for each in outcomes)
+    steady = [float(np.median(one)) for each in outcomes for one in each.errors if one]
+    frames: Counter[str] = sum((each.frames for each in outcomes), Counter())
+    return {
+        "scenes": len(outcomes),
+        "drives": sum(len(each.told) for each in outcomes),
+        "with_false": sum(each.false > 0 for each in outcomes),
+        "false_drives": sum(each.false for each in outcomes),
+        "fingers": fingers,
+        "missed": fingers - len(first),
+        "first_ms": [1e3 * each for each in _quantiles(first[:, 0])],
+        "first_mm": _quantiles(first[:, 1]),
+        "steady_mm": _quantiles(steady),
+        "frames": dict(frames),
+    }
+
+
+def _quantiles(values: npt.ArrayLike) -> list[float]:
+    """Median and 95 % quantile."""
+    given = np.asarray(values, dtype=np.float64)
+    return [float(np.quantile(given, q)) for q in (0.5, 0.95)] if given.size else []
+
+
+def _two(values: Iterable[float], digits: int) -> str:
+    return ", ".join(f"{each:.{digits}f}" for each in values) or "-"
+
+
+def _table(found: list[dict[str, Any]]) -> Table:
+    lines = []
+    for one in found:
+        false, frames = share(one["with_false"], one["scenes"]), one["frames"]
+        count = max(1, frames["frames"])
+        lines.append(
+            (
+                one["name"], str(one["scenes"]),
+                f"{100 * false.mean:.1f} % ({100 * false.low:.1f} to {100 * false.high:.1f})",
+                f"{one['missed']} of {one['fingers']}", _two(one["first_ms"], 1),
+                _two(one["first_mm"], 2), _two(one["steady_mm"], 2),
+                f"{100 * frames.get('explained', 0) / count:.0f} %",
+                f"{100 * frames.get('same', 0) / count:.1f} %",
+                f"{100 * frames.get('named', 0) / count:.2f} %",
+            )
+        )  # fmt: skip
+    head = ("scene", "scenes", "with any false touch (95 %)", "fingers missed",
+            "first report, ms after contact: median, p95", "error then, mm", "error later, mm",
+            "frames explained", "of the same bits", "with a fault named")  # fmt: skip
+    return Table("rows", head, tuple(lines))

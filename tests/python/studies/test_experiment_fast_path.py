@@ -1,0 +1,25 @@
+"""The study of the fast path: it fills its page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from study_pages import fills_its_page
+
+from eitskin_studies.experiments import fast_path
+from eitskin_studies.experiments.experiment import ExperimentSettings, plain, workspace_in
+
+
+def test_it_fills_its_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = ("press, rise 30 ms", "swipe at 600 mm/s", "two fingers at once, rise 0 ms")
+    rows = [row for row in fast_path.rows() if row.name in chosen]
+    monkeypatch.setattr(fast_path, "ELEMENTS", 3500)
+    monkeypatch.setattr(fast_path, "rows", lambda: rows)
+    outcome = fast_path.run(workspace_in(tmp_path, ExperimentSettings(share=0.001), plain))
+    found = {one["name"]: one for one in outcome.data["rows"]}
+    assert tuple(found) == (chosen[0], chosen[1], chosen[2])
+    for one in found.values():
+        assert one["scenes"] == 2 and one["missed"] == one["with_false"] == 0
+        assert one["frames"]["explained"] < one["frames"]["frames"] <= one["drives"] / 16
+    fills_its_page(outcome, "fast-path", tmp_path)
