@@ -294,10 +294,14 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
 
 
 def read_npz(
-    path: str | Path, what: str, wanted: Collection[str] | None = None
+    path: str | Path,
+    what: str,
+    wanted: Collection[str] | None = None,
+    most_bytes: int = MAX_UNPACKED_BYTES,
 ) -> dict[str, NDArray[Any]]:
     """All arrays of an .npz, without pickle; ``what`` names its kind in errors. Arrays of objects
     are left out; those that are not ``wanted`` (None: all are) are not unpacked and come out empty.
+    At most ``most_bytes`` are unpacked.
 
     Raises:
         FileError: it cannot be read, is no .npz, or unpacks to far more than an .npz of numbers.
@@ -307,7 +311,7 @@ def read_npz(
             archive = np.load(stream, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise FileError(f"{path}: one bare array (.npy), not an .npz with named arrays")
-            _refuse_inflating(archive, str(path))
+            _refuse_inflating(archive, str(path), most_bytes)
             arrays = {}
             for name in archive.files:
                 if wanted is not None and name not in wanted:
@@ -331,15 +335,13 @@ def read_npz(
         ) from None
 
 
-def _refuse_inflating(archive: Any, where: str) -> None:
+def _refuse_inflating(archive: Any, where: str, most_bytes: int) -> None:
     members = archive.zip.infolist()
     packed = sum(one.compress_size for one in members)
     unpacked = sum(one.file_size for one in members)
     if len(members) > MAX_ARRAYS:
         raise FileError(f"{where}: {len(members)} arrays, over {MAX_ARRAYS}; keep those needed")
-    if unpacked > MAX_UNPACKED_BYTES or (
-        unpacked > INNOCENT_BYTES and unpacked > MAX_RATIO * packed
-    ):
+    if unpacked > most_bytes or (unpacked > INNOCENT_BYTES and unpacked > MAX_RATIO * packed):
         raise FileError(
             f"{where}: {packed} bytes would unpack to {unpacked}; split it into smaller files"
         )

@@ -19,6 +19,7 @@ from eitskin.skin.drawing_shapes import (
     MAX_SHAPES,
     DrawingReading,
     DrawnShape,
+    limited,
 )
 
 try:
@@ -48,11 +49,10 @@ def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         scale = reading.scale_mm or _scale_of(document, where)
         _refuse_copies(document, where)
         entities = list(ezdxf.disassemble.recursive_decompose(document.modelspace()))
-        return [
-            shape
-            for entity in entities
-            for shape in _shapes(entity, scale, reading.tolerance_mm / scale)
-        ]
+        tolerance = reading.tolerance_mm / scale
+        return limited(
+            (one for entity in entities for one in _shapes(entity, scale, tolerance)), where
+        )
     except EitskinError:
         raise
     except Exception as error:  # the reader meets damage with many kinds of errors

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from eitskin.errors import ConfigError
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -15,6 +17,7 @@ TOLERANCE_MM = 0.1
 MAX_SHAPES = 20_000
 MAX_DEPTH = 100  # groups or blocks within each other
 MAX_PIECES = 2_000
+MAX_POINTS = 30_000  # of all shapes, curves flattened
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,31 @@ class DrawingReading:
 
     scale_mm: float | None = None
     tolerance_mm: float = TOLERANCE_MM
+
+
+class TooManyPoints(Exception):
+    """Over ``MAX_POINTS``."""
+
+
+def limited(shapes: Iterable[DrawnShape], where: str) -> list[DrawnShape]:
+    """All of them.
+
+    Raises:
+        ConfigError: they have over ``MAX_POINTS`` points.
+    """
+    found, points = [], 0
+    try:
+        for one in shapes:
+            points += len(one.points_mm)
+            if points > MAX_POINTS:
+                raise TooManyPoints
+            found.append(one)
+    except TooManyPoints:
+        raise ConfigError(
+            f"{where}: over {MAX_POINTS} points, curves flattened; export the outline alone, or"
+            " simplify it"
+        ) from None
+    return found
 
 
 def flattened(

@@ -16,12 +16,15 @@ import numpy as np
 from eitskin.errors import ConfigError, EitskinError, missing_extra
 from eitskin.skin.drawing_shapes import (
     MAX_DEPTH,
+    MAX_POINTS,
     MAX_SHAPES,
     DrawingReading,
     DrawnShape,
+    TooManyPoints,
     arc_pieces,
     bezier_pieces,
     flattened,
+    limited,
 )
 
 try:
@@ -31,7 +34,12 @@ except ModuleNotFoundError as error:
 
 MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 MM_A_PIXEL = 25.4 / 96
-MAX_STYLE = 10_000  # characters of style sheets
+MAX_STYLE = 10_000  # characters of style sheets, and of styles
+WORKED = ("d", "points", "transform")  # attributes whose work grows with their words
+WORD = re.compile(r"[A-Za-z]|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+# A closing without a move after it: the parser looks back for where the path began.
+LOOSE, LOOSE_WORDS = re.compile(r"[zZ](?!\s*(?:[mM]|$))"), 400
+MAX_WORDS = 40_000
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
@@ -64,7 +72,7 @@ def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         root.attrib.pop(key, None)
     try:
         tree = svgelements.SVG.parse(io.BytesIO(ET.tostring(root)), reify=True, ppi=96.0)
-        return list(_shapes(tree, frozenset(), page, reading.tolerance_mm))
+        return limited(_shapes(tree, frozenset(), page, reading.tolerance_mm), where)
     except EitskinError:
         raise
     except (
@@ -120,9 +128,9 @@ def _length_mm(text: str | None) -> float | None:
 def _refuse_copies(root: ET.Element, where: str) -> None:
     """Refuse <use> in circles, and copies of copies that would never end."""
     by_id = {one.get("id"): one for one in root.iter() if one.get("id")}
-    counts: dict[int, int] = {}
+    counts: dict[int, tuple[int, int]] = {}  # elements, and words of their paths
 
-    def count(one: ET.Element, depth: int) -> int:
+    def count(one: ET.Element, depth: int) -> tuple[int, int]:
         if depth > MAX_DEPTH:
             raise ConfigError(
                 f"{where}: groups or copies within each other, over {MAX_DEPTH} deep; flatten the"
@@ -138,13 +146,26 @@ def _refuse_copies(root: ET.Element, where: str) -> None:
                 else None
             )
             own = [] if copied is None else [copied]
-            counts[id(one)] = 1 + sum(count(child, depth + 1) for child in [*one, *own])
+            words = sum(1 for key in WORKED for _ in WORD.finditer(one.get(key, "")))
+            words += LOOSE_WORDS * sum(1 for _ in LOOSE.finditer(one.get("d", "")))
+            below = [count(child, depth + 1) for child in [*one, *own]]
+            counts[id(one)] = (
+                1 + sum(elements for elements, _ in below),
+                words + sum(more for _, more in below),
+            )
         return counts[id(one)]
 
-    if count(root, 0) > MAX_SHAPES:
+    elements, words = count(root, 0)
+    if elements > MAX_SHAPES:
         raise ConfigError(f"{where}: over {MAX_SHAPES} elements; export the outline alone")
+    if words > MAX_WORDS:
+        raise ConfigError(
+            f"{where}: paths and transforms of over {MAX_WORDS} numbers and letters; export the"
+            " outline alone, or simplify it"
+        )
     sheets = [one for one in root.iter() if str(one.tag).rpartition("}")[2] == "style"]
-    if sum(len(one.text or "") for one in sheets) > MAX_STYLE:
+    styles = [one.text or "" for one in sheets] + [one.get("style", "") for one in root.iter()]
+    if sum(map(len, styles)) > MAX_STYLE * max(1, elements // 20):
         raise ConfigError(f"{where}: style sheets over {MAX_STYLE} characters; export plain SVG")
 
 
@@ -188,6 +209,8 @@ def _runs(path: Any, tolerance: float) -> Iterator[list[tuple[float, float]]]:
             run += flattened(_along(piece), pieces)
         elif piece.end is not None:
             run.append(_pair(piece.end))
+        if len(run) > MAX_POINTS:
+            raise TooManyPoints
     if len(run) > 1:
         yield run
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.errors import FrameError
-from eitskin.fileio import read_bytes, write_beside
+from eitskin.errors import EitskinError, FrameError
+from eitskin.fileio import write_beside
+from eitskin.frames.frames import read_npz
 from eitskin.skin.protocol import Protocol, table
 
 FloatArray = npt.NDArray[np.float64]
@@ -164,30 +164,17 @@ def load_presses(path: str | Path) -> Presses:
         FileError: it cannot be read.
         FrameError, ProtocolError: it holds something else; the text names the file.
     """
-    import io
-
-    content = read_bytes(path, "presses file")
+    wanted = (*ARRAYS, *OPTIONAL, *WORDS)
+    found = read_npz(path, "presses file", wanted, MAX_BYTES)
     try:
-        with zipfile.ZipFile(io.BytesIO(content)) as packed:
-            size = sum(one.file_size for one in packed.infolist())
-        if size > MAX_BYTES:
-            raise FrameError(
-                f"{path}: {size / 1e6:.0f} MB unpacked, over {MAX_BYTES / 1e6:g}; split it"
-            )
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            found = {
-                name: np.asarray(arrays[name])
-                for name in (*ARRAYS, *OPTIONAL, *WORDS)
-                if name in arrays.files
-            }
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError):
+        return _checked({name: one for name, one in found.items() if name in wanted})
+    except EitskinError as error:
+        raise type(error)(f"{path}: {error}") from None
+    except (ValueError, TypeError, OverflowError) as error:
         raise FrameError(
-            f"{path}: this is no file of presses (.npz); record one with  eitskin teach record"
+            f"{path}: an array has the wrong type ({error}); record a file with  eitskin teach"
+            " record"
         ) from None
-    try:
-        return _checked(found)
-    except FrameError as error:
-        raise FrameError(f"{path}: {error}") from None
 
 
 def _checked(found: dict[str, Any]) -> Presses:

@@ -20,6 +20,7 @@ from eitskin.frames.frames import MAX_RATIO, Frames, load_frames, read_npz, save
 from eitskin.skin.drawing import joined, read_drawing
 from eitskin.skin.drawing_shapes import DrawingReading, DrawnShape
 from eitskin.skin.protocol import adjacent
+from eitskin.teaching.presses import load_presses
 
 
 def refused(path: Path, kind: type[EitskinError], *words: str) -> None:
@@ -118,6 +119,42 @@ def test_style_sheets_of_comments(tmp_path: Path) -> None:
         f"<style>{'/*' * 50_000}</style><path d='M0 0h9v9z'/></svg>"
     )
     refused(path, ConfigError, "style sheets over 10000 characters")
+
+
+@pytest.mark.parametrize(
+    ("drawn", "words"),
+    [
+        ("<path d='M0 0%sz'/>" % ("A8 8 0 0 0 59 20" * 6000), "numbers and letters"),
+        ("<path transform='%s' d='M0 0h9v9z'/>" % ("rotate(1)" * 6000), "numbers and letters"),
+        ("<path d='M0 0%s'/>" % ("h1z" * 120), "numbers and letters"),
+        ("<path id='a' d='M0 0%sz'/>" % ("h1" * 100) + "<use href='#a'/>" * 300, "numbers and"),
+        ("<path d='M0 0%sz'/>" % ("c1e9 0 5e8 9e8 3 3" * 100), "over 30000 points"),
+        ("<circle cx='1' cy='1' r='1e9'/>" * 100, "over 30000 points"),
+        ("<path style='%s' d='M0 0h9v9z'/>" % ("a:b;" * 3000), "style sheets over 10000"),
+    ],
+)
+def test_paths_that_ask_for_much_work(tmp_path: Path, drawn: str, words: str) -> None:
+    path = tmp_path / "a.svg"
+    path.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm">{drawn}</svg>'
+    )
+    refused(path, ConfigError, words)
+
+
+def test_splines_of_a_million_points(tmp_path: Path) -> None:
+    document = ezdxf.new()
+    document.header["$INSUNITS"] = 6
+    for k in range(20):
+        document.modelspace().add_circle((k, 0), 1e3)
+    document.saveas(tmp_path / "a.dxf")
+    refused(tmp_path / "a.dxf", ConfigError, "over 30000 points")
+
+
+def test_presses_that_unpack_to_far_more(tmp_path: Path) -> None:
+    path = tmp_path / "presses.npz"
+    np.savez_compressed(path, untouched=np.zeros(60_000_000))
+    with pytest.raises(FileError, match="would unpack to 480000"):
+        load_presses(path)
 
 
 @pytest.mark.parametrize("drawn", [True, False])

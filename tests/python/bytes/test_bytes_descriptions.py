@@ -40,14 +40,14 @@ rate_hz = 20
 seed = 5
 elements = 400
 [[touch]]
-path = [{ t_s = 0, x_mm = 40, y_mm = 25, radius_mm = 5, contrast = 3 },
-        { t_s = 0.1, x_mm = 45, y_mm = 25, radius_mm = 6 }]
+path = [{ t_s = 0, x_mm = 40, y_mm = 25, radius_mm = 5, press = 0.3 },
+        { t_s = 0.1, x_mm = 45, y_mm = 25, radius_mm = 6, press = 1 }]
 hold = true
 [[touch]]
 x_mm = 80
 y_mm = 20
 radius_mm = 6.5
-contrast = 4
+press = 0.9
 from_s = 0.05
 to_s = 0.1
 [effects.noise]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eitskin.errors import FrameError
+from eitskin.errors import FileError, FrameError
 from eitskin.skin.protocol import opposite
 from eitskin.teaching.presses import Presses, joined, load_presses, save_presses
 
@@ -50,5 +50,5 @@ def test_what_cannot_be_presses_is_refused(tmp_path: Path) -> None:
         with pytest.raises(FrameError, match=words):
             load_presses(path)
     (tmp_path / "none.npz").write_bytes(b"PK no zip")
-    with pytest.raises(FrameError, match="no file of presses"):
+    with pytest.raises(FileError, match=r"not a readable \.npz presses file"):
         load_presses(tmp_path / "none.npz")

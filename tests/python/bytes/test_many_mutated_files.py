@@ -1,0 +1,30 @@
+"""Mutated files of every format: each read, or refused in a line, within 2 s and 500 MB, without a
+number that is not finite. ``mutated_files.py`` sets the limits, in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+SCRIPT = HERE / "mutated_files.py"
+
+
+@pytest.mark.parametrize("count", [40, 1000])
+def test_each_is_read_or_refused_soon(count: int) -> None:
+    done = subprocess.run(
+        [sys.executable, SCRIPT, str(count)], env={**os.environ, "PYTHONPATH": str(HERE.parent)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    told = json.loads(done.stdout)
+    print(told)
+    peak_mb = told.pop("peak_mb")
+    assert len(told) == 7 and peak_mb > 0
+    for name, one in told.items():
+        assert one["files"] == count and one["opened"] > 0, name  # damage that is not seen, too
