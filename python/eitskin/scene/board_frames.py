@@ -81,9 +81,11 @@ class SceneRows:
 
     def around(self, frame: int) -> tuple[int, FloatArray]:
         """Frames (k, m) among which is number ``frame``, and the number of the first of them: of a
-        long scene only this one, since each takes its time; where touches move only quiet ones."""
-        if self._size == self.scene.n_frames:
-            return 0, self.part(range(self.scene.quiet_frames if self.moves else self._size))
+        long scene only this one, since each takes its time; where touches move, the quiet ones or
+        this one, with its rows as in its own scan."""
+        quiet = self.scene.quiet_frames
+        if self._size == self.scene.n_frames and not (self.moves and frame >= quiet):
+            return 0, self.part(range(quiet if self.moves else self._size))
         return frame, self.part(range(frame, frame + 1))
 
     def scan(self, frame: int, row_times_s: FloatArray) -> FloatArray:
@@ -91,14 +93,14 @@ class SceneRows:
         (m,) after the scene's time 0; after the last frame's scan all stays as it is."""
         scene, recorded = self.scene, frame - self.scene.quiet_frames
         nominal = recorded / scene.rate_hz + scene.row_delays_s
-        made = self.part(range(frame, frame + 1))[0]
         if not self.moves or np.abs(row_times_s - nominal).max() < SAME_S:
-            return np.asarray(made)
+            return np.asarray(self.part(range(frame, frame + 1))[0])
+        self._open(frame)
         end_s = (scene.frames - 1) / scene.rate_hz + scene.scan_s
         before = self._maker.work.solves
-        made = self._maker.frame(frame, np.minimum(row_times_s, end_s))
+        volts = self._maker.frame(frame, np.minimum(row_times_s, end_s))
         self.solves += self._maker.work.solves - before
-        return made
+        return volts
 
     def part(self, frames: range) -> FloatArray:
         """``frames`` (k, m) in V."""
@@ -106,7 +108,8 @@ class SceneRows:
             return np.zeros((0, self.scene.protocol.n_rows))
         return np.array([self._frame(frame) for frame in frames])
 
-    def _frame(self, frame: int) -> FloatArray:
+    def _open(self, frame: int) -> None:
+        """Compile the window that ``frame`` is in, where it is another than before."""
         from eitskin.scene.compiler import compile_frames
         from eitskin.scene.runner import FrameMaker
 
@@ -115,6 +118,9 @@ class SceneRows:
             self._window = range(start, min(start + self._size, self.scene.n_frames))
             self._maker = FrameMaker(compile_frames(self._prepared, self._window))
             self._made: dict[int, FloatArray] = {}
+
+    def _frame(self, frame: int) -> FloatArray:
+        self._open(frame)
         if frame not in self._made:
             before = self._maker.work.solves
             self._made[frame] = self._maker.frame(frame)

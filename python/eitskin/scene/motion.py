@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.scene.random_touches import TrueTouch
-from eitskin.scene.touch_path import TouchTrack, touches_at
+from eitskin.scene.touch_path import TouchTrack, touches_at, touches_of
 from eitskin.scene.touch_path import sample as sample_track
 
 FloatArray = npt.NDArray[np.float64]
@@ -73,8 +73,7 @@ class Motion:
 
     def touches_at(self, time_s: float) -> Touches:
         """What is there at ``time_s``."""
-        at = np.array([time_s])
-        return touches_at([sample_track(track, at) for track in self._tracks], 0)
+        return touches_of(self._tracks, time_s)
 
     def at(self, times_s: FloatArray) -> Mix:
         """Between which states the instants (k,), ascending or not, lie."""

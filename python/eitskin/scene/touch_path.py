@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
+SLACK_S = 1e-9
 ALWAYS_S = (float("-inf"), float("inf"))
 
 
@@ -81,8 +82,7 @@ def sample(track: TouchTrack, times_s: FloatArray) -> TrackSamples:
     """``track`` at ``times_s`` (n,), ascending or not."""
     keys = track.keyframes
     start, end = keys[0].t_s, keys[-1].t_s
-    slack = 1e-9
-    there = (times_s >= start - slack) & (track.hold | (times_s <= end + slack))
+    there = (times_s >= start - SLACK_S) & (track.hold | (times_s <= end + SLACK_S))
     at = np.array([k.t_s for k in keys]) if len(keys) > 1 else np.zeros(1)
 
     def line(name: str) -> FloatArray:
@@ -92,6 +92,18 @@ def sample(track: TouchTrack, times_s: FloatArray) -> TrackSamples:
     there &= contrast != 1.0
     places = line("x_mm"), line("y_mm"), line("radius_mm")
     return TrackSamples(there, *places, contrast, track.shape)
+
+
+def touches_of(tracks: Sequence[TouchTrack], time_s: float) -> tuple[TrueTouch, ...]:
+    """The touches that are there at ``time_s``, in the tracks' order."""
+    at = np.array([time_s])
+    near = [
+        track
+        for track in tracks
+        if track.keyframes[0].t_s <= time_s + SLACK_S
+        and (track.hold or time_s <= track.keyframes[-1].t_s + SLACK_S)
+    ]
+    return touches_at([sample(track, at) for track in near], 0)
 
 
 def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[TrueTouch, ...]:

@@ -13,7 +13,7 @@ from eitskin.device.timing import split_timing
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.random_touches import TrueTouch
-from eitskin.scene.touch_path import touches_at
+from eitskin.scene.touch_path import touches_at, touches_of
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.skin.skin import size_to_paper
 
@@ -64,7 +64,7 @@ class SceneTruth:
             there = touches_at(self._samples, min(self._frame(time_us), last))
         else:
             time_s = min(self._elapsed_s(time_us), last / scene.rate_hz) + scene.truth_delay_s
-            there = touches_at(scene.samples_at(np.array([time_s])), 0)
+            there = touches_of(scene.touches, time_s)
         return tuple(t for t in there if int(np.sign(t.contrast - 1)) in self._wanted)
 
     def over(self, time_us: int) -> bool:

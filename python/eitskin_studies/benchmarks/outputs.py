@@ -86,7 +86,7 @@ def run(taps: int, seconds: float, load_s: float, seed: int) -> OutputTimes:
         board = _board(place, taps, seed)
         steady = place / "steady.toml"
         steady.write_text(_scene([(0.1, 1.0)], 1.2, RATE_HZ, seed), encoding="utf-8")
-        host = _host(steady)
+        host = host_times_ms(steady)
         sinks = {name: _sink(name, steady, seconds) for name in ("udp", "tuio")}
         load = _load(place, steady, load_s) if load_s else None
     parts = dict(zip(("scan", "solve", "link"), board.T, strict=True)) | {"host": host}
@@ -152,7 +152,7 @@ def _board(place: Path, taps: int, seed: int) -> FloatArray:
     return late[late[:, 0] < 1e6 * HELD_S] / 1e3
 
 
-def _host(scene: Path) -> FloatArray:
+def host_times_ms(scene: Path) -> FloatArray:
     """From bytes of a recording to frames, ms each."""
     run_file = scene.with_suffix(".eits")
     settings = SessionSettings(mode=Stream.TOUCHES, record=run_file)

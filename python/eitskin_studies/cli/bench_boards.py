@@ -138,3 +138,45 @@ def run_outputs(options: argparse.Namespace) -> int:
     )
     filling = bench_outputs.for_page(result, command)
     return show(options, result, bench_outputs.as_text(result), filling)
+
+
+def add_latency(what: Any) -> None:
+    """``bench latency``."""
+    parser = what.add_parser(
+        "latency",
+        help="from contact to report of presses that land and lift in the middle of scans",
+        description=(
+            "Press a simulated skin at random times and places, fast and slowly, while each row is"
+            " measured at its own instant; say when a press is first told of, how far off, and what"
+            " is told that is not there. Solve and link are an emulated board's."
+        ),
+    )
+    option(parser, "--presses", "of each rise, on the simulated board", default=200)
+    option(parser, "--emulated", "presses of the emulated board, about 10 s each", default=12)
+    option(parser, "--seed", "of presses and noise", default=1)
+    option(parser, "--order ORDER", 'again with drives in this order, such as "by 7"')
+    option(parser, "--picture FILE.png", "draw when presses were told of", Path)
+    add_page_option(parser, "latency")
+    parser.set_defaults(run=run_latency)
+
+
+def run_latency(options: argparse.Namespace) -> int:
+    """Time presses."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import latency
+    from eitskin_studies.pictures.latency_picture import draw_latency
+
+    check_within("--presses", options.presses, 1, 10_000)
+    check_within("--emulated", options.emulated, 0, 1000)
+    check_within("--seed", options.seed, 0, 2**31)
+    refuse_unwritable(options.page, options.picture)
+    order = options.order or ""
+    result = latency.run(options.presses, options.emulated, options.seed, order)
+    if options.picture is not None:
+        draw_latency(options.picture, result)
+    command = (
+        f"eitskin bench latency --presses {options.presses} --emulated {options.emulated} --seed"
+        f" {options.seed}" + f' --order "{order}"' * bool(order)
+    )
+    filling = latency.for_page(result, command)
+    return show(options, result, latency.as_text(result), filling, "latency")

@@ -25,5 +25,6 @@ def add_parser(subparsers: Any) -> None:
     bench_making.add_effects(what)
     bench_making.add_scenes(what)
     bench_boards.add_outputs(what)
+    bench_boards.add_latency(what)
     bench_counts.add_gestures(what)
     bench_counts.add_worlds(what)
