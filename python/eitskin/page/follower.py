@@ -265,7 +265,7 @@ class Follower:
         return self._changed(session, action)
 
     def teach(self, what: str) -> Future[str] | str:
-        """ "back" or "skip"; or "fit": a thread of its own makes the model, which goes to the board.
+        """ "back", "skip"; "fit": a thread of its own makes the model, then the board gets it.
 
         Raises:
             UsageError: nothing is taught here.

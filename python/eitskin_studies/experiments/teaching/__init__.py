@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,14 @@ from eitskin.teaching.presses import Presses, load_presses
 from eitskin.teaching.teach import Taught, solve_presses, teach
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
 from eitskin_studies.experiments.teaching.baselines import BASELINES
+from eitskin_studies.experiments.teaching.remounted import (
+    CHANGES,
+    FIRST_SEED,
+    TAUGHT,
+    Change,
+    update_table,
+    updates,
+)
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -75,9 +83,17 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         for count, seed in workspace.progress(jobs, name)
     }
     more = workspace.kept({"study": "teaching", "what": "more"}, partial(_more, presses, splits))
-    data = {"taught": taught, "rivals": rivals, "more": more}
+    changed = [(change, FIRST_SEED + k) for change in CHANGES for k in range(splits)]
+    updated = {
+        f"{change.text}/{seed}": workspace.kept(
+            {"study": "teaching", "update": change.text, "seed": seed},
+            partial(_updated, presses, change, seed),
+        )
+        for change, seed in workspace.progress(changed, "updates")
+    }
+    data = {"taught": taught, "rivals": rivals, "more": more, "updated": updated}
     return ExperimentOutcome(
-        (_by_count(taught, rivals, splits), _targets(taught, more, splits)),
+        (_by_count(taught, rivals, splits), _targets(taught, more, splits), update_table(updated)),
         data,
         {"teaching.png": partial(_draw, data=data, splits=splits)},
         {"conditions": _conditions(splits)},
@@ -179,6 +195,16 @@ def _more(presses: Presses, splits: int) -> dict[str, Any]:
     out["by hand, as given"], out["by hand"] = np.median(hand, axis=0).tolist()
     out["electrode out"] = float(np.median(electrode))
     return out
+
+
+def _updated(presses: Presses, change: Change, seed: int) -> dict[str, Any]:
+    return updates(first_model(presses), presses, change, seed)
+
+
+@cache
+def first_model(presses: Presses) -> Model:
+    """Of the first presses."""
+    return teach(presses.take(np.arange(TAUGHT)), SKIN).model
 
 
 def _middle(taught: Taught, judged: Presses) -> float:

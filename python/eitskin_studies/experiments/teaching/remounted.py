@@ -12,7 +12,8 @@ import numpy.typing as npt
 from eitskin.model.model import Model
 from eitskin.teaching.presses import Presses
 from eitskin.teaching.teach import solve_presses
-from eitskin.teaching.update import update
+from eitskin.teaching.update import KEPT, update
+from eitskin_studies.experiments.experiment import Table
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -68,3 +69,21 @@ def updates(model: Model, presses: Presses, change: Change, seed: int) -> dict[s
         out[str(count)] = error
         out[f"{count} chosen"] = updated.chosen
     return out
+
+
+def update_table(found: dict[str, dict[str, Any]]) -> Table:
+    """Median over seeds of median errors, and their range; how often the model was kept."""
+    rows = []
+    for change in CHANGES:
+        seeds = [one for key, one in found.items() if key.rpartition("/")[0] == change.text]
+        cells = [change.text, f"{np.median([one['0'] for one in seeds]):.1f}"]
+        for count in COUNTS:
+            errors = [one[str(count)] for one in seeds]
+            kept = sum(one[f"{count} chosen"] == KEPT for one in seeds)
+            cells.append(
+                f"{np.median(errors):.1f} ({min(errors):.1f} to {max(errors):.1f})"
+                + (f", {kept} of {len(seeds)} kept" if kept else "")
+            )
+        rows.append(tuple(cells))
+    head = ("a later session, mm", "old model", *(f"{n} new presses" for n in COUNTS))
+    return Table("updates", head, tuple(rows))
