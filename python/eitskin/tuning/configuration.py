@@ -46,6 +46,8 @@ class Configuration:
         touch_sweeps: of the off-grid fit; 0 leaves touches at the image's peaks.
         touch_fit: parts of the search for touches (``core.results``: straight data 1, regrouping 2,
             coupling 4).
+        model_errors: whether the model says what it may be wrong by, for row gains and the test of
+            touches: these cost, and keep false touches away on skins unlike the model.
         second_pass: the image is solved again with the touches' interplay taken out of the data;
             not over a board's link.
         samples: of a measurement, at 1 MS/s; white noise falls with the root of them.
@@ -70,15 +72,24 @@ class Configuration:
     scan: str = "full"
     second_pass: bool = False
     touch_fit: int = ALL_TOUCH_FIT
+    model_errors: bool = True
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
 
     @property
-    def model_settings(self) -> tuple[int, int, str, float, float]:
-        """What a model is built by: pixels, rank, storage, regularisation, column power."""
-        return self.pixels, self.rank, self.storage, self.regularisation, self.column_power
+    def model_settings(self) -> tuple[int, int, str, float, float, bool]:
+        """What a model is built by: pixels, rank, storage, regularisation, column power, and
+        whether it has errors."""
+        return (
+            self.pixels,
+            self.rank,
+            self.storage,
+            self.regularisation,
+            self.column_power,
+            self.model_errors,
+        )
 
     @property
     def solver_settings(self) -> dict[str, Any]:
@@ -115,7 +126,7 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
             " pictures"
         )
     where = f"{where} {name!r}"
-    for key in ("warm_start", "second_pass"):
+    for key in ("warm_start", "second_pass", "model_errors"):
         if not isinstance(table.get(key, False), bool):
             raise ConfigError(f"{where}: {key} must be true or false, not {table[key]!r}")
     one = Configuration(
@@ -148,6 +159,7 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
         touch_fit=integer(
             table, "touch_fit", Configuration.touch_fit, where, low=0, high=ALL_TOUCH_FIT
         ),
+        model_errors=table.get("model_errors", Configuration.model_errors),
     )
     if one.mac_limit and "mac_limit" not in {entry.name for entry in fields(Options)}:
         raise ConfigError(
@@ -188,5 +200,6 @@ def build_settings(
         regularisation=one.regularisation,
         column_power=one.column_power,
         elements=ELEMENTS,
+        samples=None if one.model_errors else 0,
         defaults=defaults,
     )

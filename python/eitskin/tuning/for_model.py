@@ -70,9 +70,10 @@ def _is_of(one: Configuration, point: Point, model: Model) -> bool:
     reduction = (("regularisation", one.regularisation), ("column_power", one.column_power))
     if not all(_same(build.get(name, value), value) for name, value in reduction):
         return False
-    return (one.rank, one.storage, "difference") == (
+    return (one.rank, one.storage, one.model_errors, "difference") == (
         model.rank,
         model.stored.storage,
+        model.model_errors is not None,
         model.data_kind,
     )
 

@@ -83,6 +83,8 @@ def _draw_board(axes: Axes, points: Sequence[Point], board: str) -> None:
         lambda one: one.accuracy(Conditions()),
         MIN_GAIN,
     )
+    if not line:
+        return
     _bars(axes, [_mark(one, board) for one in line], colour, "o", label, line=True)
     named = chosen_presets(usable, board)
     for name, one in named.items():
@@ -101,6 +103,7 @@ def _draw_board(axes: Axes, points: Sequence[Point], board: str) -> None:
 
 
 def _draw_peers(axes: Axes, peers: Sequence[dict[str, Any]]) -> None:
+    timed = [one for one in peers if "host_us" in one]
     marks = [
         (
             report_us(DEFAULT_PERIOD_US, one["host_us"], "host") / 1e3,
@@ -108,13 +111,13 @@ def _draw_peers(axes: Axes, peers: Sequence[dict[str, Any]]) -> None:
             one["low"],
             one["high"],
         )
-        for one in peers
+        for one in timed
     ]
     if not marks:
         return
     _bars(axes, marks, GREY, "s", "rows sent, other methods on the host")
     low = -1.0
-    for (x, y, *_), one in sorted(zip(marks, peers, strict=True), key=lambda pair: pair[0][1]):
+    for (x, y, *_), one in sorted(zip(marks, timed, strict=True), key=lambda pair: pair[0][1]):
         low = max(y, low + 0.011)
         axes.annotate(
             one["name"],

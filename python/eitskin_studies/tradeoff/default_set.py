@@ -51,7 +51,7 @@ SCALE = (
 )
 
 PLAIN = tuple(
-    replace(one, name=f"{one.name} plain", touch_fit=0)
+    replace(one, name=f"{one.name} plain", touch_fit=0, model_errors=False)
     for one in SCALE
     if one.name in ("tiny", "mini", "small", "light", "lean", "modest", "quick", "standard")
 )

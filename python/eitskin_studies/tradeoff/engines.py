@@ -79,7 +79,9 @@ class ModelShop:
         Raises:
             GeometryError, MissingExtraError, ModelError: as ``with_model_errors``.
         """
-        models = {one.model_settings: self._made(one) for one in configurations}
+        models = {one.model_settings: self._made(one) for one in configurations if one.model_errors}
+        if not models:
+            return
         ends = np.cumsum([0, *(model.rank for model in models.values())])
         stacked = np.vstack([model.projection for model in models.values()])
         some = next(iter(models.values()))

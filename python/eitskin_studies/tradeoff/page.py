@@ -7,8 +7,9 @@ from pathlib import Path
 
 from eitskin.errors import UsageError
 from eitskin.fileio import write_beside
-from eitskin.tuning.front import Budget, Conditions, Front, Point, Target, choose
+from eitskin.tuning.front import REPORT_US, Budget, Conditions, Front, Point, Target, choose
 from eitskin_studies.harness.sections import Tabular, fill_marks
+from eitskin_studies.pictures.report_time_picture import chosen_presets
 from eitskin_studies.tradeoff.table import best_points
 
 PICTURES = "pictures/tradeoff"
@@ -34,6 +35,15 @@ FRONT_HEAD = (
     "F767 ms, mean / most",
     "host us",
     "flash, RAM kB",
+)
+PRESET_HEAD = (
+    "preset",
+    "point",
+    "scan, ms",
+    "solve, ms, mean / most",
+    "contact to report, ms",
+    "image MIoU (95 %)",
+    "exact",
 )
 RECOMMENDED_HEAD = (
     "budget",
@@ -76,6 +86,30 @@ def front_table(front: Front) -> Tabular:
             )
         )
     return FRONT_HEAD, rows
+
+
+def preset_table(front: Front) -> Tabular:
+    """What each preset is on the board and on a host."""
+    points = [one for one in front.points if not one.configuration.warm_start]
+    rows = []
+    for board in ("f767", "host"):
+        for name, point in chosen_presets(points, board).items():
+            one, score = point.configuration, point.score(Conditions())
+            report = point.cost(REPORT_US, board, Conditions())
+            assert score is not None and report is not None
+            image = score["image"]
+            rows.append(
+                (
+                    f"{name}, {'board' if board == 'f767' else 'host'}",
+                    point.name,
+                    f"{one.scan}, {one.samples} samples, {point.costs['acquisition_us'] / 1e3:.1f}",
+                    _times(point, board),
+                    f"{report / 1e3:.0f}",
+                    f"{_share(image['mean'])} ({_share(image['low'])} to {_share(image['high'])})",
+                    f"{100 * score['exact_count']:.0f} %",
+                )
+            )
+    return PRESET_HEAD, rows
 
 
 def recommendation_table(front: Front) -> Tabular:
@@ -139,14 +173,18 @@ def conditions(front: Front) -> str:
 
 
 def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) -> None:
-    """Fill the marks ``conditions``, ``front`` and ``recommendations`` of ``page``; pictures go
-    into ``PICTURES`` beside it.
+    """Fill the marks ``conditions``, ``presets``, ``front`` and ``recommendations`` of ``page``;
+    pictures go into ``PICTURES`` beside it.
 
     Raises:
         FileError: the page cannot be read or written.
         ConfigError: a mark is missing.
     """
-    tables = {"front": front_table(front), "recommendations": recommendation_table(front)}
+    tables = {
+        "presets": preset_table(front),
+        "front": front_table(front),
+        "recommendations": recommendation_table(front),
+    }
     texts = {"conditions": conditions(front)}
     fill_marks(page, "tradeoff", (texts, tables))
     folder = page.parent / PICTURES

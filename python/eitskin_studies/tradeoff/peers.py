@@ -7,45 +7,36 @@ numbers stand beside those of configurations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from eitskin.scene.simulate import Measurement
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import ELEMENTS
-from eitskin_studies.compare.families import Family, Method, Setup
+from eitskin_studies.compare.families import Family, Method, Setup, setup_for
 from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.compare.pyeit_method import pyeit_method
 from eitskin_studies.compare.run import CompareSettings, compare
 from eitskin_studies.harness.sessions import Progress
 
-
-@dataclass(frozen=True)
-class Peer:
-    """A method at its best parameter: mean image MIoU with its 95 % interval, and the median time
-    of a frame in us."""
-
-    name: str
-    mean: float
-    low: float
-    high: float
-    host_us: float
+FloatArray = npt.NDArray[np.float64]
 
 
 def peer_families(setup: Setup) -> Sequence[Family]:
-    """The baselines and pyEIT's."""
-    return *baseline_methods(setup.jacobian, setup.grid), pyeit_method(setup)
+    """The baselines, of plain FISTA only the best, and pyEIT's."""
+    *linear, _, _, _, fista = baseline_methods(setup.jacobian, setup.grid)
+    return *linear, fista, pyeit_method(setup)
 
 
-def measure_peers(
-    skin: Skin, protocol: Protocol, settings: dict[str, Any], rounds: int, progress: Progress
+def score_peers(
+    skin: Skin, protocol: Protocol, settings: dict[str, Any], progress: Progress
 ) -> list[dict[str, Any]]:
-    """Every :class:`Peer` as JSON values. ``settings``: ``scenes``, ``train_scenes``, ``seed``,
-    ``simulated_elements`` and ``snr_db``; frames are timed ``rounds`` times eight.
+    """Of each method at its best parameter ``value``: mean image MIoU with its 95 % interval.
+    ``settings``: ``scenes``, ``train_scenes``, ``seed``, ``simulated_elements`` and ``snr_db``.
 
     Raises:
         UsageError, GeometryError, MissingExtraError: as ``compare``.
@@ -59,20 +50,34 @@ def measure_peers(
         families=peer_families,
         progress=progress,
     )
-    dv = compared.test.differences_v()
-    peers = []
-    for family, result in zip(peer_families(compared.setup), compared.results, strict=True):
-        score = result.miou_summary
-        us = _frame_us(family.make(result.value), dv, rounds)
-        peers.append(asdict(Peer(result.name, score.mean, score.low, score.high, us)))
-    return peers
+    return [
+        {
+            "name": one.name,
+            "value": one.value,
+            "mean": one.miou_summary.mean,
+            "low": one.miou_summary.low,
+            "high": one.miou_summary.high,
+        }
+        for one in compared.results
+    ]
 
 
-def _frame_us(method: Method, dv: np.ndarray[Any, Any], rounds: int) -> float:
+def time_peers(
+    skin: Skin, protocol: Protocol, peers: list[dict[str, Any]], dv: FloatArray, rounds: int
+) -> list[float]:
+    """The median time of a frame on this host in us, of each of ``peers``; eight frames of ``dv``
+    (k, m) a round."""
+    setup = setup_for(skin, protocol, elements=ELEMENTS)
+    return [
+        _frame_us(family.make(one["value"]), dv, rounds)
+        for family, one in zip(peer_families(setup), peers, strict=True)
+    ]
+
+
+def _frame_us(method: Method, dv: FloatArray, rounds: int) -> float:
     times = []
-    for k in range(max(8 * rounds, 1)):
-        frame = dv[k % len(dv)][None]
+    for k in range(8 * rounds):
         begun = perf_counter_ns()
-        method.reconstruct(frame)
+        method.reconstruct(dv[k % len(dv)][None])
         times.append((perf_counter_ns() - begun) / 1000)
     return round(float(np.median(times)), 1)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from eitskin import __version__
 from eitskin.core.engine import load_core
 from eitskin.errors import ConfigError, FileError, UsageError
@@ -28,7 +30,7 @@ from eitskin_studies.tradeoff.emulation import Emulator, count_instructions, mak
 from eitskin_studies.tradeoff.engines import Built, ModelShop
 from eitskin_studies.tradeoff.fronts import estimated_instructions, recorded_front
 from eitskin_studies.tradeoff.host_times import host_times
-from eitskin_studies.tradeoff.peers import measure_peers
+from eitskin_studies.tradeoff.peers import score_peers, time_peers
 from eitskin_studies.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, SceneFactory
 
 RESULTS = "results.jsonl"
@@ -329,7 +331,7 @@ def _host(
 
 
 def _peers(workspace: _Desk, skin: Skin, protocol: Protocol) -> list[dict[str, Any]]:
-    """The other methods; none where they are not wanted."""
+    """The other methods, timed where configurations are; none where they are not wanted."""
     how = workspace.settings
     if not how.peers:
         return []
@@ -341,11 +343,21 @@ def _peers(workspace: _Desk, skin: Skin, protocol: Protocol) -> list[dict[str, A
         "snr_db": HEADLINE_DB,
     }
     facts = {**workspace.world, "what": "peers", **settings}
-    kept = workspace.store.get(facts)
-    if kept is None:
-        peers = measure_peers(skin, protocol, settings, how.rounds, workspace.progress)
-        kept = workspace.store.put(facts, {"peers": peers})
-    return list(kept["peers"])
+    peers = workspace.store.get(facts)
+    if peers is None:
+        peers = workspace.store.put(
+            facts, score_peers(skin, protocol, settings, workspace.progress)
+        )
+    if not how.rounds:
+        return list(peers)
+    facts |= {"what": "peers, host", "machine": machine(), "rounds": how.rounds}
+    times = workspace.store.get(facts)
+    if times is None:
+        usual = Configuration("")
+        measured = workspace.session(HEADLINE).measured(HEADLINE_DB, usual.samples, usual.scan, 1)
+        dv = np.array([frames_v[-1] for frames_v in measured.frames_v]) - measured.quiet_v.mean(0)
+        times = workspace.store.put(facts, time_peers(skin, protocol, peers, dv, how.rounds))
+    return [{**one, "host_us": us} for one, us in zip(peers, times, strict=True)]
 
 
 def _estimated(points: Sequence[Point]) -> list[Point]:
