@@ -66,24 +66,6 @@ def _mlp() -> Any:
     return MLPRegressor(hidden_layer_sizes=(128, 64), solver="lbfgs", max_iter=150, random_state=0)
 
 
-def activation_maps(data: FloatArray, place: FloatArray, new: FloatArray) -> FloatArray:
-    """Weighted activation maps: each row's mean |change| about every place, summed with the new
-    press's |changes| as weights; the place of the greatest 2 % of the sum."""
-    rows = np.abs(data) / np.abs(data).mean(axis=0)
-    reach = np.abs(place).max()
-    axis = np.linspace(-reach, reach, 41)
-    at = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    at = at[np.linalg.norm(at, axis=1) <= 1.03 * np.linalg.norm(place, axis=1).max()]
-    width = max(0.1, 0.5 / np.sqrt(len(place))) * reach
-    near = np.exp(-0.5 * np.sum((at[:, None] - place[None]) ** 2, axis=2) / width**2) + 1e-12
-    maps = near @ rows / near.sum(axis=1, keepdims=True)
-    maps = (maps - maps.mean(axis=0)) / maps.std(axis=0)
-    weight = np.abs(new) / np.abs(data).mean(axis=0)
-    total = weight @ maps.T
-    best = np.argsort(-total, axis=1)[:, : max(1, len(at) // 50)]
-    return np.asarray(at[best].mean(axis=1))
-
-
 POWERS = [10.0**k for k in range(-5, 5)]
 BASELINES: dict[str, Baseline] = {
     "kernel ridge": _searched(
@@ -92,5 +74,4 @@ BASELINES: dict[str, Baseline] = {
     "MLP": _searched(_mlp, {"alpha": [0.1, 10.0]}),
     "k-nearest": _searched(_nearest, {"n_neighbors": [1, 2, 3, 4, 6]}),
     "ridge": _searched(_ridge, {"alpha": POWERS}),
-    "activation maps": activation_maps,
 }
