@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from typing import Any
 
 import pytest
 
@@ -39,7 +40,12 @@ def test_a_limit_that_is_not_named_stays(monkeypatch: pytest.MonkeyPatch) -> Non
     def opened(options: object) -> Device:
         device = open_device("sim:two_touch")
         command = device.command
-        device.command = lambda one, timeout_s: given.append(one) or command(one, timeout_s)  # type: ignore[assignment,func-returns-value]
+
+        def noted(one: Any, timeout_s: float) -> Any:
+            given.append(one)
+            return command(one, timeout_s)
+
+        device.command = noted  # type: ignore[assignment]
         return device
 
     monkeypatch.setattr("eitskin.cli.cmd_board.open_named", opened)

@@ -105,7 +105,9 @@ def plugged() -> Iterator[tuple[Device, Port]]:
         assert isinstance(device.link, ThreadedLink)
         device.link._stopping = Clock(port)
         next_item = device.next_item
-        device.next_item = lambda timeout_s: next_item(min(timeout_s, 0.001))  # type: ignore[method-assign]
+        device.next_item = (  # type: ignore[method-assign]
+            lambda timeout_s: next_item(min(timeout_s, 0.001))
+        )
         device.tare(QUIET)
         yield device, port
 

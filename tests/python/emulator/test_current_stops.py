@@ -107,7 +107,9 @@ def doubled_source(board: EmulatedBoard) -> None:
 def dead_converter(board: EmulatedBoard) -> None:
     second = board.adc.second
     read = second.read
-    second.read = lambda offset, size: 0 if offset == SR else read(offset, size)  # type: ignore[method-assign]
+    second.read = (  # type: ignore[method-assign]
+        lambda offset, size: 0 if offset == SR else read(offset, size)
+    )
 
 
 @pytest.mark.parametrize("fails", [doubled_source, dead_converter])
