@@ -117,8 +117,8 @@ class Recommendation:
                 f" {bound} bounds the rate: {1e6 / self.frame_us:.1f} frames a second"
             )
             lines.append(
-                f"from contact to report: {(self.report_us or 0) / 1000:.0f} ms, of 1.5 scans,"
-                " solve and link at 1 Mbaud, an estimate"
+                f"from contact to report: {(self.report_us or 0) / 1000:.0f} ms, half a period,"
+                " scan, solve and link at 1 Mbaud, an estimate"
             )
         lines.append("options: " + " ".join(self.options))
         return "\n".join(lines)

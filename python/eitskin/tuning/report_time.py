@@ -1,9 +1,10 @@
 """From contact to report: what a user waits for a touch, on a board or with its rows on a host.
 
-    report = 1.5 scans + solve and touches + link
+    report = period / 2 + scan + solve and touches + link
 
-A touch that lands while a scan runs is in whole in the next one only: from contact to the end of
-that one are 1.5 scans on average. The board sends touches; a host is sent rows.
+A touch that lands while a scan runs is in whole in the next frame only, which begins half a period
+later on average; the period from frame to frame is the longer of scan and solve. The board sends
+touches; a host is sent rows.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ from eitskin.device.bandwidth import (
 )
 from eitskin.device.ports import BAUD
 
-MEAN_SCANS = 1.5
 ROWS = 208  # of a RAW of 16 electrodes, whichever of them a scan measures
 TWO_TOUCHES = TOUCHES_BYTES // 4
 
@@ -28,4 +28,4 @@ def report_us(scan_us: float, solve_us: float, board: str) -> float:
     average. ``board``: "f767", or "host"."""
     size = RAW_BYTES + ROW_BYTES * ROWS if board == "host" else SOLVED_BYTES + TWO_TOUCHES
     link_us = 1e6 * (size + PACKET_BYTES) * BITS_A_BYTE / BAUD
-    return MEAN_SCANS * scan_us + solve_us + link_us
+    return max(scan_us, solve_us) / 2 + scan_us + solve_us + link_us

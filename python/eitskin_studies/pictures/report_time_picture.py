@@ -53,11 +53,12 @@ def draw_report_time(path: Path, front: Front) -> None:
         axes.set_xscale("log")
         axes.set_xticks(TICKS_MS, [str(ms) for ms in TICKS_MS])
         axes.minorticks_off()
-        axes.set_xlabel("from contact to report, ms: 1.5 scans, solve, link (an estimate)")
+        axes.margins(y=0.1)
+        axes.set_xlabel("from contact to report, ms: half a period, scan, solve, link (an estimate)")
         axes.set_ylabel("mean MIoU of the image, 95 % interval")
         axes.grid(linewidth=0.4, alpha=0.5)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(frameon=False, loc="lower right")
+        axes.legend(frameon=False, loc="lower left")
         scenes, seed = front.settings.get("scenes"), front.settings.get("seed")
         axes.set_title(f"{scenes} scenes of 1 to 3 random touches, 60 dB, seed {seed}")
         save_picture(figure, path)
@@ -86,18 +87,20 @@ def _draw_board(axes: Axes, points: Sequence[Point], board: str) -> None:
     if not line:
         return
     _bars(axes, [_mark(one, board) for one in line], colour, "o", label, line=True)
-    named = chosen_presets(usable, board)
-    for name, one in named.items():
-        x, y, *_ = _mark(one, board)
-        axes.plot(x, y, "o", ms=11, mfc="none", mec=colour, mew=1.6)
-        side = (8, -14) if board == "host" else (-8, 10)
+    names: dict[str, list[str]] = {}
+    at = {}
+    for name, one in chosen_presets(usable, board).items():
+        names.setdefault(one.name, []).append(name)
+        at[one.name] = _mark(one, board)[:2]
+    for point, place in at.items():
+        axes.plot(*place, "o", ms=11, mfc="none", mec=colour, mew=1.6)
         axes.annotate(
-            name,
-            (x, y),
-            xytext=side,
+            ", ".join(names[point]),
+            place,
+            xytext=(0, 20 if board == "host" else -26),
             textcoords="offset points",
             color=colour,
-            ha="left" if side[0] > 0 else "right",
+            ha="center",
             fontweight="bold",
         )
 
