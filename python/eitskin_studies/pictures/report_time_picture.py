@@ -54,7 +54,7 @@ def draw_report_time(path: Path, front: Front) -> None:
         axes.set_xticks(TICKS_MS, [str(ms) for ms in TICKS_MS])
         axes.minorticks_off()
         axes.margins(y=0.1)
-        axes.set_xlabel("from contact to report, ms: half a period, scan, solve, link (an estimate)")
+        axes.set_xlabel("from contact to report, ms: half a period, scan, solve, link")
         axes.set_ylabel("mean MIoU of the image, 95 % interval")
         axes.grid(linewidth=0.4, alpha=0.5)
         axes.spines[["top", "right"]].set_visible(False)
