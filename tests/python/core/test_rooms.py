@@ -21,7 +21,6 @@ ROOMS = (
     "touch",
     "evidence",
     "api",
-    "fast",
 )
 # know nothing of contexts
 APART = {"link": ("base", "link"), "gesture": ("base", "gesture")}

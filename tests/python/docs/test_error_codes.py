@@ -73,7 +73,11 @@ def test_a_code_is_provoked(
     if code in raised:
         monkeypatch.setattr("eitskin.model.prebuilt.load_prebuilt", raiser(raised[code]))
     if code == 9:
-        monkeypatch.setitem(sys.modules, "websockets", None)
+        for name in {
+            "websockets",
+            *(name for name in sys.modules if name.startswith("websockets")),
+        }:
+            monkeypatch.setitem(sys.modules, name, None)
     assert main(COMMANDS[code].replace("PORT", str(taken)).split()) == code
     lines = capsys.readouterr().err.splitlines()
     assert [line[:9] for line in lines] == (["eitskin: "] if code not in (0, 11) else [])

@@ -330,15 +330,15 @@ def test_mcap(swipe: Swipe, tmp_path: Path) -> None:
 
 
 KILLED = """
-import os, signal, sys
+import os, signal, sys, time
 from eitskin.cli import live_output
 from eitskin.live.session import Session
 from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import Source
 with Session("sim:swipe") as session, Outputs(sys.argv[1:], Source("x"), patient=True) as outputs:
-    for item in session.frames():
-        outputs.put(item)
-    while min(one["sent"] for one in outputs.counts) < 40:
+    items = [outputs.put(item) for item in session.frames()]
+    until = time.monotonic() + 20
+    while min(one["sent"] for one in outputs.counts) < len(items) and time.monotonic() < until:
         pass
     os.kill(os.getpid(), signal.SIGKILL)
 """
