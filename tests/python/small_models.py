@@ -30,6 +30,20 @@ STORAGES = ("f32", "f16", "i16", "i8")
 DATA_KINDS = ("difference", "normalised", "log-ratio")
 SIGNS = ("increase", "decrease", "both")
 
+# a skin of 100 mm with 8 electrodes and opposite drives, as its file has it
+EIGHT_OPPOSITE_TOML = """
+[skin]
+name = "small"
+diameter_mm = 100.0
+thickness_mm = 5.0
+conductivity_s_per_m = 0.1
+[electrodes]
+count = 8
+width_mm = 5.0
+[protocol]
+kind = "opposite"
+"""
+
 
 def rounded_rectangle() -> Outline:
     """120 x 60 mm with corners of 15 mm radius, given clockwise."""

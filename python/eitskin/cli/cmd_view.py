@@ -122,13 +122,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _teacher(options: argparse.Namespace) -> Teacher | None:
+    if options.teach is None:
+        return None
     from eitskin.fileio import read_bytes, refuse_unwritable
     from eitskin.page.teacher import Teacher
     from eitskin.skin.skin import load_skin
     from eitskin.teaching.plan import load_plan
 
-    if options.teach is None:
-        return None
     presses = options.presses or options.folder / "presses.npz"
     refuse_unwritable(presses)
     skin, text = None, ""

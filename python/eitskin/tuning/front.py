@@ -247,8 +247,8 @@ def load_front(path: Path | None = None) -> Front:
 @dataclass(frozen=True)
 class Target:
     """What is asked for: at most ``budget``, for the mean frame or the ``worst``, at least
-    ``accuracy``, on ``board``; a frame measured within ``period_us``. ``unit``: in which cost is
-    compared, the budget's where there is one."""
+    ``accuracy``, on ``board``; a frame measured within ``period_us``. ``compared_in``:
+    in which unit cost is compared where there is no budget."""
 
     budget: Budget | None
     accuracy: float | None
@@ -256,11 +256,12 @@ class Target:
     where: Conditions
     period_us: float | None = None
     worst: bool = False
-    unit: str = "us"
+    compared_in: str = "us"
 
-    def __post_init__(self) -> None:
-        if self.budget is not None:
-            object.__setattr__(self, "unit", self.budget.unit)
+    @property
+    def unit(self) -> str:
+        """In which cost is compared."""
+        return self.compared_in if self.budget is None else self.budget.unit
 
     @property
     def acquisition_us(self) -> float:
@@ -284,7 +285,7 @@ def preset(name: str, board: str, where: Conditions | None = None) -> Target:
     ms = PRESET_REPORT_MS.get(name)
     budget = None if ms is None else Budget(1000 * ms, REPORT_US)
     accuracy = PRESET_ACCURACY.get(name)
-    return Target(budget, accuracy, board, where or Conditions(), unit=REPORT_US)
+    return Target(budget, accuracy, board, where or Conditions(), compared_in=REPORT_US)
 
 
 def check_wish(target: Target) -> Target:

@@ -21,6 +21,7 @@ from eitskin.teaching.plan import plan_places
 from eitskin.teaching.presses import Presses
 from eitskin.teaching.teach import teach
 from emulated import board_of, clean, connect, power_up, restarted, twin_check
+from small_models import EIGHT_OPPOSITE_TOML
 
 SKIN = Skin("small", disk(100.0), Electrodes(count=8, width_mm=5.0), 0.1, 5.0)
 PLACE_MM = (21.0, -12.0)
@@ -34,18 +35,6 @@ skin = "skin.toml"
 radius_mm = 4.0
 x_mm = {PLACE_MM[0]}
 y_mm = {PLACE_MM[1]}
-"""
-DESCRIPTION = """
-[skin]
-name = "small"
-diameter_mm = 100.0
-thickness_mm = 5.0
-conductivity_s_per_m = 0.1
-[electrodes]
-count = 8
-width_mm = 5.0
-[protocol]
-kind = "opposite"
 """
 
 
@@ -65,7 +54,7 @@ def test_a_taught_model_is_uploaded_and_streamed(image: bytes, tmp_path: Path) -
     physics = encode_model(make_model(SKIN, protocol, linear, BuildSettings(rank=16, samples=0)))
     taught = teach(simulated_presses(12), SKIN).model
     blob = encode_model(taught)
-    (tmp_path / "skin.toml").write_text(DESCRIPTION, encoding="utf-8")
+    (tmp_path / "skin.toml").write_text(EIGHT_OPPOSITE_TOML, encoding="utf-8")
     (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
     device = connect(power_up(image, scene=str(tmp_path / "scene.toml"), model=physics))
     assert device.upload_model(blob).model_crc == zlib.crc32(blob)

@@ -18,20 +18,9 @@ from eitskin.skin.skin import Skin
 from eitskin.teaching.guide import GuideEvent, PressFile, PressGuide, Step, guide_presses
 from eitskin.teaching.plan import Plan, load_plan, plan_places, save_plan
 from eitskin.teaching.presses import load_presses
+from small_models import EIGHT_OPPOSITE_TOML
 
 ROWS = opposite(8)
-SKIN = """
-[skin]
-name = "small"
-diameter_mm = 100.0
-thickness_mm = 5.0
-conductivity_s_per_m = 0.1
-[electrodes]
-count = 8
-width_mm = 5.0
-[protocol]
-kind = "opposite"
-"""
 
 
 def plan_of(count: int) -> Plan:
@@ -144,7 +133,7 @@ def test_a_whole_session(kind: str, tmp_path: Path, capsys: pytest.CaptureFixtur
         assert main(list(arguments)) == 0
         return capsys.readouterr().out
 
-    Path(skin).write_text(SKIN)
+    Path(skin).write_text(EIGHT_OPPOSITE_TOML)
     done("model", "build", skin, "--samples", "0", "-o", physics)
     done("teach", "plan", skin, "-n", "20", "-o", plan, "--practice", scene, "--picture",
          str(tmp_path / "template.pdf"))  # fmt: skip
