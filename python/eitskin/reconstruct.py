@@ -24,9 +24,9 @@ from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import Frames, load_frames
 from eitskin.live.message import frame_table, head, known
 from eitskin.model.model import Model
+from eitskin.model.options import tracking
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.solve.batch import Batch, check_threads
-from eitskin.solve.options import tracking
 from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
 
 if TYPE_CHECKING:

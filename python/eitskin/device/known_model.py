@@ -98,7 +98,7 @@ def _usual(electrodes: int) -> Iterator[Protocol]:
 def board_options(model: Model, board: BoardInfo | None = None, *, track: bool = True) -> Options:
     """The options that a board starts with: the model's own, the noise floor of ``board``'s
     converter, and touches tracked; or without that."""
-    from eitskin.solve.options import default_options, tracking
+    from eitskin.model.options import default_options, tracking
 
     options = default_options(model)
     if board is not None:

@@ -40,6 +40,7 @@ from eitskin.core.results import (
 )
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
+from eitskin.model.options import default_options
 from eitskin.model.storage import stride_for
 from eitskin.reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
 from eitskin.reference.disc_fit import Disc, Reduced
@@ -60,7 +61,6 @@ from eitskin.reference.row_gains import row_gains
 from eitskin.reference.touches import brought_onto_skin, find_touches
 from eitskin.reference.tracker import Tracker
 from eitskin.reference.whitening import Whitening, filled, form_of, whiten
-from eitskin.solve.options import default_options
 
 BoolArray = npt.NDArray[np.bool_]
 

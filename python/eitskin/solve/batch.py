@@ -19,7 +19,7 @@ from eitskin.core.results import LearnedReference, Options, Reconstruction, chec
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 
 MAX_THREADS = 256
 MAX_IN_BLOCK = 32

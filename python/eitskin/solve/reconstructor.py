@@ -17,9 +17,9 @@ from eitskin.core.results import LearnedReference, Options, Reconstruction, chec
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
+from eitskin.model.options import default_options
 from eitskin.reference.engine import ReferenceEngine
 from eitskin.skin.protocol import Protocol
-from eitskin.solve.options import default_options
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -22,13 +22,13 @@ from eitskin.core.results import Options
 from eitskin.errors import UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
+from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.model.storage import STORAGES, store
 from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated import (
     PROGRAM,
     build_cortex_m7,

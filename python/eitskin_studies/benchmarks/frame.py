@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from eitskin.core.engine import CoreEngine
+from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.harness.bare_core import bare_calls
 from eitskin_studies.harness.machine import machine

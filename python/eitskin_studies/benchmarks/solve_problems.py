@@ -20,12 +20,12 @@ from eitskin.errors import FrameError
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
+from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.solve.options import default_options
 
 FloatArray = npt.NDArray[np.float64]
 

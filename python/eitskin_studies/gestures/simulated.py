@@ -19,13 +19,13 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fileio import write_beside
 from eitskin.model.model import Model
+from eitskin.model.options import default_options, tracking
 from eitskin.scene.cover import Cover
 from eitskin.scene.forward_steps import Change, Update, Work
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.scene.streams import stream
 from eitskin.scene.touch_path import sample, touches_at
 from eitskin.scoring.snr import noise_deviation_v
-from eitskin.solve.options import default_options, tracking
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.gestures.drawn import DrawnSession
 

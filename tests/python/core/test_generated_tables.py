@@ -17,7 +17,7 @@ from build_tools import CSRC, ROOT
 from eitskin.core.engine import load_core
 from eitskin.core.options_table import CHOICES, OF_MODEL, RANGES, OptionFields
 from eitskin.model.eitm import encode_model
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.experiments.registry import EXPERIMENTS
 from small_models import prebuilt
 

@@ -19,7 +19,7 @@ from eitskin.device.wire import link_table as cmd
 from eitskin.device.wire.link_table import FaultCode, Quality, RawFlags, ReplyStatus, Stream
 from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches
 from eitskin.errors import DeviceError, UsageError
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt, tiny_blob
 

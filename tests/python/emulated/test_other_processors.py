@@ -13,8 +13,8 @@ import pytest
 
 from cross_build import ROOT
 from eitskin.core.engine import CoreEngine
+from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated import run_steps
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from printed_touches import printed_touches

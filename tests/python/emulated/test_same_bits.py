@@ -20,13 +20,13 @@ from eitskin.core.results import Options, Reconstruction
 from eitskin.model.eitm import encode_model
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
+from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.model.storage import STORAGES, store
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated import PROGRAM, EmulatedFrame, run_frames
 from printed_touches import printed_touches
 from small_models import session as simulated_session

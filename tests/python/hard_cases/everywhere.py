@@ -15,7 +15,7 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Info, Options, known_touch
 from eitskin.errors import EitskinError
 from eitskin.model.eitm import decode_model
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated import EmulatedFrame, EmulatedRun, run_steps
 from eitskin_studies.harness.emulated_steps import (
     Choose,

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 from everywhere import Outcome
 
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Mask, Play, Step, TareStep
 from small_models import small, small_blob, small_model
 

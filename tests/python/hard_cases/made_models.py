@@ -11,9 +11,9 @@ from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Defaults, Golden, Model
+from eitskin.model.options import default_options
 from eitskin.model.storage import store
 from eitskin.skin.protocol import Protocol, adjacent
-from eitskin.solve.options import default_options
 
 ELECTRODES = 8
 ROWS, FOLDED = 40, 20

@@ -12,8 +12,8 @@ from losses import LEVELS, UNITS, all_steps, errors_of
 from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_steps
 from touch_scenes import frames_of, groups
 
+from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TouchScene
-from eitskin.solve.options import default_options
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
 from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep

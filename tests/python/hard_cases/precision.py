@@ -11,7 +11,7 @@ from made_models import made_model, plain_options
 from soundness import U, judged
 
 from eitskin.model.eitm import encode_model
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step, TareStep
 from small_models import prebuilt
 

@@ -26,9 +26,9 @@ from touch_scenes import (
 )
 
 from eitskin.core.diagnostics_table import Touch as Found
+from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.matching import match
-from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
 from margins import Margins
 from small_models import prebuilt

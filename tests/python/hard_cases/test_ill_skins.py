@@ -12,7 +12,7 @@ from soundness import U, check_sound, judged
 
 from eitskin.core.options_table import SOLVERS
 from eitskin.core.results import Options
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from margins import Margins
 

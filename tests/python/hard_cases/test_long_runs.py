@@ -13,7 +13,7 @@ from random_problems import gaussian
 from soundness import check_sound, judged
 
 from eitskin.core.options_table import SIGNS, SOLVERS
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
 from margins import Margins
 from small_models import small, small_blob, small_model

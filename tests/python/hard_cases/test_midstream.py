@@ -10,7 +10,7 @@ from everywhere import Outcome, SameEverywhere, as_printed
 
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.core.results import Options
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
 from margins import Margins
 from small_models import small, small_blob, small_model

@@ -8,7 +8,7 @@ import numpy as np
 from everywhere import SameEverywhere
 from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_steps
 
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
 from margins import Margins
 from small_models import prebuilt

@@ -11,7 +11,7 @@ from everywhere import Outcome, SameEverywhere
 from fault_scenes import COUNT, half, miou, played, quiet_frames, rms_v, simulated, touched
 
 from eitskin.core.results import Options
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from margins import Margins
 from small_models import prebuilt

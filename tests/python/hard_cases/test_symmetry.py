@@ -18,10 +18,10 @@ from eitskin.fem.grid import Grid
 from eitskin.model.build import BuildSettings, Linearisation, linearise, make_model
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
+from eitskin.model.options import default_options
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import Skin
-from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
 from margins import Margins
 from small_models import DATA_KINDS, ELEMENTS, PIXELS, small, small_blob, small_model

@@ -9,7 +9,7 @@ import numpy as np
 from everywhere import Outcome, SameEverywhere
 
 from eitskin.core.results import Options
-from eitskin.solve.options import default_options, tracking
+from eitskin.model.options import default_options, tracking
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from margins import Margins
 from small_models import small, small_blob, small_model

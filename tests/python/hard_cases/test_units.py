@@ -18,7 +18,7 @@ from eitskin.core.results import Options
 from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
 from margins import Margins
 from small_models import DATA_KINDS, small, small_blob, small_model

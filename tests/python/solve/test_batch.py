@@ -10,9 +10,9 @@ import pytest
 
 from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError, UsageError
+from eitskin.model.options import default_options
 from eitskin.solve import Batch, Reconstructor, reconstruct_many
 from eitskin.solve.batch import check_threads
-from eitskin.solve.options import default_options
 from small_models import small, small_blob, small_model
 
 COUNT = 70

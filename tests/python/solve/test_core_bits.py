@@ -11,7 +11,7 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.options_table import SOLVERS
 from eitskin.core.results import Reconstruction
-from eitskin.solve.options import default_options
+from eitskin.model.options import default_options
 from small_models import (
     DATA_KINDS,
     SIGNS,

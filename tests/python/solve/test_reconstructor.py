@@ -11,11 +11,11 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Options
 from eitskin.errors import EitskinError, FrameError, ModelError, ProtocolError, UsageError
+from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
-from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 from small_models import prebuilt, session, small, small_blob, small_model, tiny_blob
 

@@ -13,13 +13,13 @@ import numpy.typing as npt
 from eitskin.core.results import Reconstruction
 from eitskin.model.build import linearise, make_model
 from eitskin.model.model import Model
+from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TouchScene, TouchSet, random_touches, spaced_touches
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import match
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.batch import reconstruct_many
-from eitskin.solve.options import default_options
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.levers.configurations import Ablation
 from eitskin_studies.experiments.scored import session_in_parts

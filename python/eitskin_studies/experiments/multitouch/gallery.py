@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import GeometryError
+from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TouchScene
-from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.multitouch.cells import NARROW, RING, WIDE, Cell, counting_cells

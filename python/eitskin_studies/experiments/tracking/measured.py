@@ -12,6 +12,7 @@ import numpy.typing as npt
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Options
 from eitskin.model.model import Model
+from eitskin.model.options import default_options, tracking
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.reference.tracker import Pairing, Tracker, nearest_pairs
 from eitskin.scene.compiler import compile_scene
@@ -19,7 +20,6 @@ from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.scoring.snr import noise_deviation_v
-from eitskin.solve.options import default_options, tracking
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tracking.counted import TrackCount, count_stream
