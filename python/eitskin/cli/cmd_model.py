@@ -109,8 +109,10 @@ def run_build(options: argparse.Namespace) -> int:
     from eitskin.model.build import BuildSettings, build_model
     from eitskin.model.eitm import save_model
     from eitskin.skin.eidors import read_eidors
+    from eitskin.skin.skin import skin_of_eidors
 
-    skin, protocol = _skin_of(options)
+    their = read_eidors(options.skin) if _is_eidors(options) else None
+    skin, protocol = _skin_of(options) if their is None else skin_of_eidors(their)
     refuse_unwritable(options.output)
     if not 100 <= options.elements <= 500_000:
         raise UsageError(
@@ -130,7 +132,6 @@ def run_build(options: argparse.Namespace) -> int:
         touch_change_ratio=options.touch_change,
         samples=options.samples,
     )
-    their = read_eidors(options.skin) if _is_eidors(options.skin) else None
     jacobian = None if their is None else jacobian_on(their, grid_for(skin.outline, options.pixels))
     model = build_model(skin, protocol, settings, progress=bar("random skins"), jacobian=jacobian)
     size = save_model(options.output, model)
@@ -140,8 +141,8 @@ def run_build(options: argparse.Namespace) -> int:
     return 0
 
 
-def _is_eidors(path: Path | None) -> bool:
-    return path is not None and path.suffix.lower() == ".mat"
+def _is_eidors(options: argparse.Namespace) -> bool:
+    return not options.paper and options.skin is not None and options.skin.suffix.lower() == ".mat"
 
 
 def _skin_of(options: argparse.Namespace) -> tuple[Skin, Protocol]:
