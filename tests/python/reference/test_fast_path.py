@@ -12,10 +12,10 @@ import pytest
 
 from eitskin.errors import UsageError
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.reference.fast.path import FastPath
 from eitskin_studies.experiments import fast_path
 from eitskin_studies.experiments.fast_path.scans import Outcome, Player
 from eitskin_studies.experiments.fast_path.states import States, solve_states
+from eitskin_studies.twins.fast.path import FastPath
 
 SEED, ELEMENTS = 5, 3500
 

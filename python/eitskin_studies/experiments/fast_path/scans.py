@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from eitskin.core.results import LearnedReference
 from eitskin.model.model import Model
-from eitskin.reference.fast.path import FastPath, FastTouch
 from eitskin.reference.row_gains import row_gains
 from eitskin.scoring.matching import GATE_MM
 from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.twins.fast.path import FastPath, FastTouch
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -25,8 +25,8 @@ from eitskin.core.constants_table import (
     FAST_STARTS,
     FAST_STEPS,
 )
-from eitskin.reference.fast.rows import Drive, RowModel
-from eitskin.reference.fast.tracks import lower_solve
+from eitskin_studies.twins.fast.rows import Drive, RowModel
+from eitskin_studies.twins.fast.tracks import lower_solve
 
 FloatArray = npt.NDArray[np.float64]
 

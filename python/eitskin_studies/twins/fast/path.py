@@ -56,9 +56,9 @@ from eitskin.core.constants_table import (
 )
 from eitskin.core.diagnostics_table import Touch
 from eitskin.model.model import Model
-from eitskin.reference.fast.births import Births, Fit, Held, inverted
-from eitskin.reference.fast.rows import RowModel, drives_of
-from eitskin.reference.fast.tracks import SIZE, VX, VY, C, Innovation, Tracks, X, Y, lower_solve
+from eitskin_studies.twins.fast.births import Births, Fit, Held, inverted
+from eitskin_studies.twins.fast.rows import RowModel, drives_of
+from eitskin_studies.twins.fast.tracks import SIZE, VX, VY, C, Innovation, Tracks, X, Y, lower_solve
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
