@@ -43,6 +43,7 @@ const uint8_t *eits_get_electrode_states(const eits_context *ctx)
     return ctx->rows.electrode;
 }
 
+/* What the user left out; what a frame could not use besides is in the row states. */
 int eits_is_masked(const eits_context *ctx, uint32_t row)
 {
     return ctx->rows.masked[row] != 0;

@@ -51,6 +51,7 @@ static void lay_out_scratch(eits_context *ctx, arena *a)
         s->row[k] = take_reals(a, stride);
     for (int k = 0; k < EITS_SCRATCH_PIXELS; ++k)
         s->pixel[k] = take_reals(a, pixels);
+    /* lent to the active set's factor and to the evidence, which never run in one another */
     s->square = take_reals(a, ctx->model->rank * stride);
 }
 
@@ -63,6 +64,7 @@ static void lay_out_frame(eits_context *ctx, arena *a)
     ctx->reference.v0 = take_reals(a, rows);
     ctx->reference.m2 = take_reals(a, rows);
     ctx->reference.row_gain = take_reals(a, rows);
+    /* 1 and not 0: a model without row gains multiplies by these as well, to the same bits */
     for (size_t i = 0; i < rows; ++i)
         ctx->reference.row_gain[i] = 1;
     ctx->rows.masked = take(a, rows);
@@ -108,6 +110,8 @@ static void lay_out_solver(eits_context *ctx, arena *a)
     s->factor = lent->square;
 }
 
+/* The evidence has a factor of its own: the scratch's square changes with each hypothesis that is
+ * tried under it. */
 static void lay_out_touches(eits_context *ctx, arena *a)
 {
     const size_t stride = EITS_STRIDE(ctx->model->rank);
@@ -162,6 +166,7 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
         return EITS_E_ARGUMENT;
     if ((uintptr_t)workspace % 16 != 0 || size < eits_workspace_size(model, 0))
         return EITS_E_WORKSPACE;
+    /* The scratch before the parts that borrow of it. */
     eits_context *made = workspace;
     arena a = {(uint8_t *)workspace + EITS_CONTEXT_SIZE};
     *made = (eits_context){.model = model,
@@ -175,12 +180,15 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     lay_out_solver(made, &a);
     lay_out_touches(made, &a);
     lay_out_columns(made, &a);
+    /* By the memory that there is, not by a flag: the caller has decided with the size. */
     if (size >= eits_workspace_size(model, 1))
         lay_out_panels(made, &a);
     eits_learn_range(made);
     eits_whitening_init(made, &made->scratch);
     /* Learned from the model above, once: it does not change. */
     (void)eits_options_default(model, &made->options);
+    /* The context is given also where the arithmetic fails: eits_self_test then says by how much.
+     */
     *ctx = made;
     eits_real contracted, reordered;
     eits_try_arithmetic(&contracted, &reordered);
@@ -198,6 +206,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
     if (o->project_reference != ctx->options.project_reference ||
         o->regularisation_noise_factor != ctx->options.regularisation_noise_factor)
         ctx->projection.stale = 1;
+    /* The gains were learned from the reference, which is still here: no new tare is needed. */
     const int row_gains = o->row_gains != ctx->options.row_gains;
     ctx->options = *o;
     if (row_gains && ctx->reference.ready)
@@ -217,6 +226,7 @@ void eits_forget(eits_context *ctx)
 {
     if (ctx == NULL)
         return;
+    /* ids count on: one that a host has seen never names another finger */
     ctx->solver.warm = 0;
     ctx->tracker.count = 0;
 }

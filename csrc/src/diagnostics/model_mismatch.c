@@ -49,6 +49,9 @@ static uint64_t learn_off_range(eits_context *ctx, const eits_scratch *scratch)
     return 2u * (uint64_t)folds * rank;
 }
 
+/* What of |d|^2 noise alone would give: a fold's variance is that of the row it came from, or half
+ * of it where two rows were averaged. A pair that agrees to the last bit was copied, not measured
+ * twice, and has the variance of one. */
 eits_real eits_noise_energy(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
@@ -78,6 +81,8 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
 {
     eits_real *weighed = scratch->row[3];
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
+    /* A model that keeps every direction has no outside. Without noise there is no telling what is
+     * much. */
     if (rank >= folds || !(ctx->reference.noise_v > 0))
         return 0;
     const eits_real drift =
@@ -116,6 +121,8 @@ void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
     if (sign == EITS_SIGN_BOTH || !eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE))
         return;
     const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
+    /* Touches go one way. A change that the data want the other way more is a touch that was there
+     * at the tare, seen from behind. */
     const eits_real against = eits_greatest(ctx->kernels, gradient, ctx->model->n_pixels, other);
     const eits_real min = EITS_STALE_NOISE * ctx->info.lambda_noise;
     if (min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min)

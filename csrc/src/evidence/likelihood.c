@@ -51,7 +51,10 @@ static eits_real *row_of_square(const eits_scratch *scratch, uint32_t count, uin
     return scratch->square + EITS_STRIDE(count) * i;
 }
 
-/* A in the square's lower triangle becomes L, A = L L'. */
+/* A in the square's lower triangle becomes L, A = L L'.
+ *
+ * Two discs at one place have the same columns, and their pivot is rounding: it is held up at a
+ * fraction of the diagonal. The step along such a direction is then short instead of infinite. */
 static void factor(const eits_context *ctx, const eits_scratch *scratch, uint32_t n)
 {
     for (uint32_t i = 0; i < n; ++i) {
@@ -226,6 +229,9 @@ static eits_real bounded(eits_real v, eits_real low, eits_real high)
     return eits_clamp(v, low, high);
 }
 
+/* Bounded, since the linearisation holds within a fraction of a radius: a full step of a weak disc
+ * would leave the skin, or turn its sign. A place off the skin is refused, strength and shape still
+ * move. */
 static eits_answer moved(const eits_context *ctx, const eits_answer *from, const eits_real *step,
                          eits_real fraction)
 {
@@ -270,6 +276,8 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
         eits_likelihood next;
         const eits_answer trial = moved(ctx, answer, likelihood->step, fraction);
         macs += eits_linearise(ctx, scratch, &trial, &next);
+        /* Only what is better is taken, so that no refit makes an answer worse; a shorter step from
+         * the same linearisation is tried else. */
         if (next.here < likelihood->here) {
             *answer = trial;
             *likelihood = next;

@@ -51,6 +51,8 @@ eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_optio
         if (!eits_is_finite(reals[k]) || reals[k] < 0)
             return EITS_E_ARGUMENT;
     }
+    /* Checked first: with a NaN limit every comparison is false, and nothing would move or rejoin.
+     */
     memset(gestures, 0, sizeof *gestures);
     gestures->options = chosen;
     return EITS_OK;
@@ -58,7 +60,10 @@ eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_optio
 
 /* ---- which is which ---- */
 
-/* Whether a touch may still be this contact. */
+/* Whether a touch may still be this contact.
+ *
+ * One that lifted may come back for rejoin_us, but only by a touch that was found: the tracker
+ * holds touches by itself, and one that it holds shows nothing. */
 static int waits(const eits_gestures *g, const eits_contact *c, const eits_touch *touch)
 {
     if ((c->flags & CONTACT_SEEN) != 0 || c->state == CONTACT_NONE)
@@ -95,7 +100,9 @@ static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
     return found;
 }
 
-/* A place for a new contact: an empty one, else that of the one that lifted first. */
+/* A place for a new contact: an empty one, else that of the one that lifted first.
+ *
+ * Lifted ones keep their place as long as it is not needed: they may come back. */
 static uint32_t free_place(const eits_gestures *g)
 {
     uint32_t found = NOBODY, longest_us = 0;
@@ -119,6 +126,8 @@ static uint32_t free_place(const eits_gestures *g)
 static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch *touch)
 {
     const eits_real strength = eits_fabs(touch->strength_s_per_m_mm2);
+    /* A scan in which a finger lifts has some rows with it and some without. Its strength falls,
+     * and its place moves aside: such a frame says that the finger is there, not where. */
     const int firm = strength >= g->options.firm * c->strength;
     if (touch->explained > 0) {
         const int going = !firm || touch->explained < EITS_GOING * c->explained;
@@ -132,6 +141,8 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
     c->seen_x_mm = touch->x_mm;
     c->seen_y_mm = touch->y_mm;
     c->flags |= CONTACT_SEEN;
+    /* a faint one pulls the strength down slowly, so that a finger that eases off for long is firm
+     * again */
     c->strength = firm ? strength : c->strength + (strength - c->strength) * R(0.25);
     if (!firm || !(touch->explained > 0))
         return;
@@ -181,7 +192,9 @@ static void go_on(eits_gestures *g, eits_contact *c, const eits_touch *touch, ev
         tell_place(g, c, EITS_EVENT_MOVE, out);
 }
 
-/* Beside another that is down, or much fainter than the strongest. */
+/* Beside another that is down, or much fainter than the strongest.
+ *
+ * Both are what a solver makes of one clear touch: it comes apart, or leaves a ghost elsewhere. */
 static int is_doubtful(const eits_gestures *g, const eits_touch *touch)
 {
     const eits_real strength = eits_fabs(touch->strength_s_per_m_mm2);
@@ -200,6 +213,7 @@ static void begin_contact(eits_gestures *g, const eits_touch *touch)
 {
     const uint32_t place = free_place(g);
     if (place == NOBODY) {
+        /* counted, not replaced: to drop a finger that is down would report a lift that was none */
         ++g->dropped;
         return;
     }
@@ -212,6 +226,7 @@ static void begin_contact(eits_gestures *g, const eits_touch *touch)
 
 /* ---- a frame ---- */
 
+/* Touches may come over a link, where any bits may stand for a number. */
 static int is_touch(const eits_touch *touch)
 {
     return eits_is_place(touch->x_mm, touch->y_mm) && eits_is_finite(touch->strength_s_per_m_mm2);

@@ -14,6 +14,7 @@ static eits_real angle_of_slope(eits_real t)
     return sum * t * R(57.29577951308232);
 }
 
+/* No atan2 of the C library: its last bits differ from target to target. */
 eits_real eits_angle_deg(eits_real y, eits_real x)
 {
     const eits_real high = eits_fabs(y), wide = eits_fabs(x);
@@ -24,6 +25,8 @@ eits_real eits_angle_deg(eits_real y, eits_real x)
     return y < 0 ? -angle : angle;
 }
 
+/* Where it landed: a finger that lifts pulls its place aside, and what was tapped is where it was
+ * put. */
 static eits_event event_at(const eits_gestures *g, const eits_contact *c, uint32_t kind)
 {
     return (eits_event){.kind = kind,
@@ -33,6 +36,8 @@ static eits_event event_at(const eits_gestures *g, const eits_contact *c, uint32
                         .y_mm = c->start_y_mm};
 }
 
+/* The first tap was reported at once and is not taken back: to wait for a second one would make
+ * every tap late. */
 static void tap(eits_gestures *g, eits_contact *c, event_list *out)
 {
     const int again = g->tapped && c->born_us - g->tap_us <= g->options.double_us &&
@@ -46,7 +51,9 @@ static void tap(eits_gestures *g, eits_contact *c, event_list *out)
     g->tap_y_mm = c->start_y_mm;
 }
 
-/* Its speed over the last speed_us, or over as much as is known; mm/s. */
+/* Its speed over the last speed_us, or over as much as is known; mm/s.
+ *
+ * Times differ as unsigned numbers, so that the board's clock may wrap. */
 static eits_real last_speed(const eits_gestures *g, const eits_contact *c)
 {
     const uint32_t known = c->trail_count < EITS_TRAIL ? c->trail_count : EITS_TRAIL;
@@ -59,6 +66,7 @@ static eits_real last_speed(const eits_gestures *g, const eits_contact *c)
         at = before;
     }
     const uint32_t span_us = last_us - c->trail_us[at];
+    /* one point, or two in one instant: no speed is known, and none is no swipe */
     if (span_us == 0)
         return 0;
     return eits_apart(c->x_mm - c->trail_x_mm[at], c->y_mm - c->trail_y_mm[at]) /
@@ -124,6 +132,8 @@ void eits_lifted(eits_gestures *g, eits_contact *c, event_list *out)
         swipe(g, c, out);
 }
 
+/* Reported while the finger is down, since the one who holds waits for it; hence in a step of its
+ * own, also in frames in which nothing has changed. */
 void eits_hold(eits_gestures *g, event_list *out)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {

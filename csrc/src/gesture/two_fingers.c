@@ -18,6 +18,8 @@ static eits_real distance(eits_real dx_mm, eits_real dy_mm)
     return apart > EITS_MIN_APART_MM ? apart : EITS_MIN_APART_MM;
 }
 
+/* The value is that of the last frame in which both were seen, also at the end: by then one of them
+ * lifts, and its place is worth nothing. */
 static void tell_pair(const eits_gestures *g, uint32_t phase, event_list *out)
 {
     const eits_finger_pair *p = &g->pair;
@@ -34,7 +36,9 @@ static void tell_pair(const eits_gestures *g, uint32_t phase, event_list *out)
                                                                       : apart / p->base_mm});
 }
 
-/* Two fingers and no third: they may begin something. */
+/* Two fingers and no third: they may begin something.
+ *
+ * With a third finger it is unknown which two belong together. */
 static void look_for_pair(eits_gestures *g)
 {
     uint32_t found[2] = {0, 0}, count = 0;
@@ -61,6 +65,8 @@ static void look_for_pair(eits_gestures *g)
                                  .extreme_mm = apart};
 }
 
+/* From here on changes are measured from what was reported last, so that a slow gesture is reported
+ * as often as a quick one of the same way. */
 static void begin_kind(eits_gestures *g, uint32_t kind, eits_real apart_mm, event_list *out)
 {
     eits_finger_pair *p = &g->pair;
@@ -76,6 +82,8 @@ static eits_real way_round(eits_real degrees, eits_real apart_mm)
     return eits_fabs(degrees) * R(0.017453292519943295) * apart_mm;
 }
 
+/* Both ways in mm, so that one threshold serves: in degrees, fingers that are near each other would
+ * turn by noise alone. */
 static void recognise(eits_gestures *g, eits_real apart_mm, event_list *out)
 {
     const eits_finger_pair *p = &g->pair;
@@ -94,9 +102,12 @@ static void go_on(eits_gestures *g, eits_real apart_mm, event_list *out)
 {
     eits_finger_pair *p = &g->pair;
     const int pinch = p->kind == EITS_EVENT_PINCH, rotate = p->kind == EITS_EVENT_ROTATE;
+    /* back from the farthest point, not from the start: a wide pinch may open a little and still be
+     * one */
     const eits_real back = pinch ? apart_mm - p->extreme_mm : p->extreme_mm - apart_mm;
     if (!rotate && back >= g->options.pair_mm) {
         tell_pair(g, EITS_PHASE_END, out);
+        /* the new gesture's value begins at 1 where it turned round */
         p->base_mm = p->extreme_mm;
         begin_kind(g, pinch ? EITS_EVENT_SPREAD : EITS_EVENT_PINCH, apart_mm, out);
         return;
@@ -129,6 +140,7 @@ void eits_pair_step(eits_gestures *g, event_list *out)
         return;
     }
     const eits_contact *first = &g->contact[p->first], *second = &g->contact[p->second];
+    /* A finger that was missed has its old place, which would be half of a movement. */
     if ((first->flags & second->flags & CONTACT_SEEN) == 0)
         return;
     const eits_real dx = second->x_mm - first->x_mm, dy = second->y_mm - first->y_mm;
@@ -136,6 +148,8 @@ void eits_pair_step(eits_gestures *g, event_list *out)
         p->on = 0; /* where they began is not known */
         return;
     }
+    /* Cross and dot product of the last line and this one: the small angle between the two, which
+     * adds up beyond 180 degrees, where an angle from the x axis would jump. */
     p->turned_deg += eits_angle_deg(p->dx_mm * dy - p->dy_mm * dx, p->dx_mm * dx + p->dy_mm * dy);
     p->dx_mm = dx;
     p->dy_mm = dy;

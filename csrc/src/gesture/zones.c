@@ -44,6 +44,7 @@ static eits_real distance_to_edge(const eits_real *from, const eits_real *to, ei
     const eits_real ex = to[0] - from[0], ey = to[1] - from[1];
     const eits_real along = (x - from[0]) * ex + (y - from[1]) * ey, square = ex * ex + ey * ey;
     eits_real part = square > 0 ? along / square : 0;
+    /* beyond either end the end itself is nearest; a segment without length is its first point */
     part = part > 0 ? (part < 1 ? part : 1) : 0;
     return eits_apart(x - (from[0] + part * ex), y - (from[1] + part * ey));
 }
@@ -81,6 +82,8 @@ static eits_real outside(const eits_zone *z, eits_real x, eits_real y)
 /* The zone, from 1, that a finger is in, where it was in `before`; 0: in none. */
 static uint32_t zone_at(const eits_zones *zones, uint32_t before, eits_real x, eits_real y)
 {
+    /* A finger at a border moves by the noise of its place: without this it would press and release
+     * a key with every frame. */
     if (before != 0 && outside(&zones->zone[before - 1], x, y) <= EITS_ZONE_STAY_MM)
         return before;
     for (uint32_t k = 0; k < zones->count; ++k) {
@@ -92,6 +95,8 @@ static uint32_t zone_at(const eits_zones *zones, uint32_t before, eits_real x, e
 
 /* ---- fingers ---- */
 
+/* The finger's place, else an empty one, else EITS_MAX_CONTACTS, which the caller counts as
+ * dropped: no finger that is down loses its place to another. */
 static uint32_t finger_of(eits_zones *zones, uint32_t id)
 {
     uint32_t empty = EITS_MAX_CONTACTS;

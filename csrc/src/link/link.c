@@ -57,6 +57,8 @@ static void put_u32(uint8_t *out, uint32_t value)
     put_u16(out + 2, value >> 16);
 }
 
+/* Head and body apart, so that an image goes out of the context's own memory, without a copy that a
+ * board would need room for. Sizes are compared one after the other: their sum could wrap. */
 size_t eits_link_encode(uint8_t *out, size_t room, uint8_t type, uint32_t sequence,
                         const void *head, size_t head_size, const void *body, size_t body_size)
 {
@@ -76,6 +78,8 @@ size_t eits_link_encode(uint8_t *out, size_t room, uint8_t type, uint32_t sequen
     put_u32(checksum, crc);
 
     stuffer s = {.out = out, .at = 1};
+    /* A zero before as well as after: what was on the line before ends there, and cannot take this
+     * packet with it. */
     out[0] = 0;
     open_block(&s);
     stuff(&s, start, sizeof start);
@@ -99,6 +103,8 @@ static uint32_t get_u32(const uint8_t *bytes)
     return get_u16(bytes) | get_u16(bytes + 2) << 16;
 }
 
+/* The buffer begins at 8 bytes, and so does the payload behind a head of 8: receivers may read its
+ * numbers in place. */
 eits_status eits_link_decoder_init(eits_link_decoder *decoder, uint8_t *buffer, size_t room)
 {
     if (!decoder || !buffer || (uintptr_t)buffer % 8u != 0 || room < (size_t)MIN)
@@ -146,6 +152,7 @@ static void finish(eits_link_decoder *d, eits_link_packet *packet)
         return;
     }
     const size_t size = d->used - (size_t)MIN;
+    /* The checksum before the version: a damaged first byte is no other version. */
     if (eits_crc32(0, d->buffer, d->used - CHECKSUM) != get_u32(d->buffer + d->used - CHECKSUM)) {
         ++d->crc_errors;
     } else if (d->buffer[0] != EITS_LINK_VERSION) {
@@ -162,6 +169,8 @@ static void finish(eits_link_decoder *d, eits_link_packet *packet)
     }
 }
 
+/* Ends behind each packet, so that its payload may be used in place before the buffer is filled
+ * again; the caller feeds the rest. */
 size_t eits_link_feed(eits_link_decoder *d, const uint8_t *bytes, size_t size,
                       eits_link_packet *packet)
 {

@@ -34,6 +34,8 @@ static eits_real gain_at(const eits_force *force, eits_real u, eits_real v)
         for (uint32_t b = 0; b <= degree; ++b)
             power[b] *= u;
     }
+    /* Few places may fit a polynomial that turns negative between them: a force never changes its
+     * sign. */
     return gain > 1 / EITS_MAX_GAIN ? (gain < EITS_MAX_GAIN ? gain : EITS_MAX_GAIN)
                                     : 1 / EITS_MAX_GAIN;
 }
@@ -44,6 +46,8 @@ eits_real eits_force_n(const eits_model *model, eits_real x_mm, eits_real y_mm,
     const eits_force *force = &model->force;
     if (force->head == NULL)
         return 0;
+    /* The gain belongs to the calibrated places. Further out a polynomial would run away, hence the
+     * last place on the same ray. */
     eits_real u, v;
     place_of(force, x_mm, y_mm, &u, &v);
     const eits_real strength = eits_fabs(strength_s_per_m_mm2) * gain_at(force, u, v);

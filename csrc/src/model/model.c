@@ -21,6 +21,8 @@ typedef struct sections {
         force, whit, unce, prec, ordr;
 } sections;
 
+/* By memcpy: a cast would read through a pointer of another type, and entries of the header need
+ * not lie at a word's boundary. Compilers make one load of it. */
 static uint32_t read_u32(const uint8_t *bytes)
 {
     uint32_t value;
@@ -35,6 +37,8 @@ static uint16_t read_u16(const uint8_t *bytes)
     return value;
 }
 
+/* A NaN or infinity in one number spreads to every pixel by the products, where no later check
+ * could say what it came from. */
 static int all_finite(const float *values, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {
@@ -65,6 +69,8 @@ uint32_t eits_crc32(uint32_t crc, const void *bytes, size_t size)
 
 uint64_t eits_protocol_hash(uint32_t n_electrodes, uint32_t n_rows, const uint8_t *table)
 {
+    /* The counts first: tables that are the head of one another have different hashes. Byte by
+     * byte, so that a big-endian writer would make the same number. */
     const uint8_t head[4] = {(uint8_t)n_electrodes, (uint8_t)(n_electrodes >> 8), (uint8_t)n_rows,
                              (uint8_t)(n_rows >> 8)};
     uint64_t hash = 0xCBF29CE484222325u;
@@ -75,6 +81,8 @@ uint64_t eits_protocol_hash(uint32_t n_electrodes, uint32_t n_rows, const uint8_
     return hash;
 }
 
+/* Magic, version, length, checksum, in this order: each is said only where those before hold, so
+ * that a text file is not reported as damaged, nor a newer format as one with a wrong checksum. */
 static eits_status check_header(const uint8_t *bytes, size_t size)
 {
     if (size < 4 || memcmp(bytes, "EITM", 4) != 0)
@@ -86,6 +94,7 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
     const uint32_t total = read_u32(bytes + 8);
     if (total < HEADER_SIZE || total % EITS_MODEL_ALIGNMENT != 0)
         return EITS_E_MODEL_VALUE;
+    /* More bytes than the total may follow: a flash bank is longer than its model. */
     if (size < total)
         return EITS_E_MODEL_TRUNCATED;
     if (eits_crc32(0, bytes + 16, total - 16u) != read_u32(bytes + 12))
@@ -108,6 +117,9 @@ static eits_section *find_slot(sections *found, const uint8_t *tag)
     return NULL;
 }
 
+/* An offset is compared with the total first and the size with what is left behind it: their sum
+ * could pass 2^32 and look small. The count is limited for the same reason, before it is
+ * multiplied. */
 static eits_status read_table(sections *found, const uint8_t *bytes)
 {
     const uint32_t total = read_u32(bytes + 8);
@@ -129,6 +141,7 @@ static eits_status read_table(sections *found, const uint8_t *bytes)
                 return EITS_E_MODEL_VERSION;
             continue;
         }
+        /* Twice the same tag: which one holds would depend on the reader. */
         if (slot->data != NULL)
             return EITS_E_MODEL_SECTION;
         slot->data = bytes + offset;
@@ -142,6 +155,8 @@ static int has_size(const eits_section *s, size_t size)
     return s->data != NULL && s->size == size;
 }
 
+/* With these bounds every size of check_sizes is below 2^30, so that none wraps where size_t has 32
+ * bits. */
 static eits_status read_dims(eits_model *model, const eits_section *dims)
 {
     if (!has_size(dims, DIMS_SIZE))
@@ -188,6 +203,8 @@ static eits_status read_dims(eits_model *model, const eits_section *dims)
     return EITS_OK;
 }
 
+/* Each section has exactly the bytes that the dimensions ask for. After this a pointer into it may
+ * be followed to the end of its array without another look at the file. */
 static eits_status check_sizes(const eits_model *model, const sections *found)
 {
     static const uint8_t item_size[] = {4, 2, 2, 1};
@@ -217,6 +234,8 @@ static eits_status check_tables(const eits_model *model)
             return EITS_E_MODEL_VALUE;
     }
     for (uint32_t i = 0; i < model->n_folded; ++i) {
+        /* sign is a factor: another number than 1 or -1 would scale a row without anyone noticing
+         */
         const eits_fold fold = model->fold[i];
         if (fold.first >= model->n_rows ||
             (fold.second != EITS_FOLD_NONE && fold.second >= model->n_rows) ||
@@ -227,6 +246,8 @@ static eits_status check_tables(const eits_model *model)
         const eits_pixel at = model->pixel[j];
         if (at.ix >= model->nx || at.iy >= model->ny)
             return EITS_E_MODEL_VALUE;
+        /* Ascending, so that no two pixels share a cell of the image and a walk over the kept ones
+         * is a walk over the raster. */
         if (j > 0) {
             const eits_pixel before = model->pixel[j - 1];
             if (at.iy < before.iy || (at.iy == before.iy && at.ix <= before.ix))
@@ -239,6 +260,7 @@ static eits_status check_tables(const eits_model *model)
                : EITS_E_MODEL_VALUE;
 }
 
+/* All bits of the exponent set: infinite or NaN, found without converting the number. */
 static int halves_finite(const uint16_t *values, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {
@@ -260,6 +282,7 @@ static int defaults_in_range(const eits_model *model)
            eits_between(d->mask_threshold, 0, 1) && eits_options_in_range(&own);
 }
 
+/* Integers of storage need no look: each is a number. Their scales do. */
 static eits_status check_numbers(const eits_model *model)
 {
     const eits_matrix *s = &model->sensitivity;
@@ -300,6 +323,7 @@ static eits_status read_fields(eits_model *model, const eits_section *flds)
     return EITS_OK;
 }
 
+/* Strictly, since forces are interpolated between two points: equal ones would divide by zero. */
 static int ascends_from_zero(const float *values, uint32_t count)
 {
     for (uint32_t k = 1; k < count; ++k) {
@@ -336,6 +360,8 @@ static eits_status read_force(eits_force *force, const eits_section *found)
     return EITS_OK;
 }
 
+/* Nothing is copied. Sections begin at multiples of 16 bytes of a blob that does, so that these
+ * casts give aligned pointers to any type. */
 static void point_into(eits_model *model, const sections *found)
 {
     model->protocol = found->prot.data;
@@ -361,6 +387,7 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
     if ((uintptr_t)blob % EITS_MODEL_ALIGNMENT != 0)
         return EITS_E_MODEL_ALIGNMENT;
     const uint8_t *bytes = blob;
+    /* Opened on the side: where anything fails, the caller's model is as it was. */
     eits_model opened = {0};
     sections found = {0};
     eits_status status = check_header(bytes, size);

@@ -10,6 +10,7 @@
 
 enum { ROW_FORM_HEAD = 16 };
 
+/* Relative, and false for NaN: eits_between is. The numbers span many orders. */
 static int near(float value, float wanted, float tolerance)
 {
     return eits_between(value, wanted - tolerance * wanted, wanted + tolerance * wanted);
@@ -24,6 +25,8 @@ static int row_fits(const eits_model *model, const eits_row_form *form, uint32_t
     float sum = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const float value = p[(size_t)k * model->reduction.stride + i];
+        /* in the order of the columns; the tolerance is far above what another order would change
+         */
         sum += value * value;
     }
     return form->strength[i] >= 0 && square >= 0 && eits_between(energy, FLT_MIN, 1e30f) &&
