@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from textwrap import wrap
 from typing import Any
 
-from table import Lines, Table, Tables, enum_of, origin, split_type, types_of, wrapped
+from table import (
+    WIDTH,
+    Lines,
+    Table,
+    Tables,
+    enum_of,
+    origin,
+    plain,
+    split_type,
+    types_of,
+    wrapped,
+)
 from write_constants import python_constants
 
 # how Python has a field that is not a plain number: its type, and its value where none is given
@@ -56,6 +68,25 @@ def remark(text: str, indent: str = "") -> Lines:
     yield from wrapped(text, f"{indent}# ", f"{indent}# ")
 
 
+def said(line: str, doc: str) -> Lines:
+    """``line`` with its remark behind it, or above where it does not fit."""
+    short = f"{line}  # {plain(doc)}" if doc else line
+    if len(short) <= WIDTH:
+        yield short
+    else:
+        indent = line[: len(line) - len(line.lstrip())]
+        yield from (*remark(doc, indent), line)
+
+
+def joined(before: str, items: Sequence[str]) -> Lines:
+    """A tuple in one line, or one item a line where it does not fit."""
+    short = f"{before}({', '.join(items)})"
+    if len(short) <= WIDTH:
+        yield short
+    else:
+        yield from (f"{before}(", *(f"    {item}," for item in items), ")")
+
+
 def word(name: str) -> str:
     """ "WORKING_SET" to "working-set"."""
     return name.lower().replace("_", "-")
@@ -68,9 +99,8 @@ def _names(enum: Table, name: str) -> Lines:
     """A tuple of the members' names, or of their texts, in order."""
     texts = enum.get("columns", [""])[0] == "text"
     yield from remark(f"{enum['c']}: {enum['doc']}")
-    yield f"{name} = ("
-    yield from (f'    "{row[3] if texts else word(row[0])}",' for row in enum["rows"])
-    yield ")"
+    items = [f'"{row[3] if texts else word(row[0])}"' for row in enum["rows"]]
+    yield from joined(f"{name} = ", items)
 
 
 def _numbers(enum: Table) -> Lines:
@@ -96,8 +126,8 @@ def _class(enum: Table) -> Lines:
     yield from docstring(f"{enum['c']}: {enum['doc']}", "    ")
     yield ""
     for member, value, doc, *_ in enum["rows"]:
-        yield from remark(doc, "    ") if doc else ()
-        yield f"    {member} = {f'0x{value:X}' if enum.get('hexadecimal') else value}"
+        number = f"0x{value:X}" if enum.get("hexadecimal") else value
+        yield from said(f"    {member} = {number}", doc)
 
 
 # ---- options ----
@@ -120,8 +150,7 @@ def _options_module(tables: Tables) -> Lines:
     yield from docstring(table["doc"], "    ")
     yield ""
     for name, kind, usual, _, _, doc in rows:
-        yield from remark(doc, "    ")
-        yield f"    {name}: {_option_type(kind)}{_usual(tables, kind, usual)}"
+        yield from said(f"    {name}: {_option_type(kind)}{_usual(tables, kind, usual)}", doc)
     yield from ("", "", *remark("Least and greatest value of each option that is a number."))
     yield "RANGES: dict[str, tuple[float, float]] = {"
     for name, kind, _, least, greatest, _ in table["rows"]:
@@ -137,9 +166,7 @@ def _options_module(tables: Tables) -> Lines:
             yield f'    "{name}": {types[kind]["python"]},'
     yield "}"
     yield from remark("What a model's own defaults say, by the same names.")
-    yield "OF_MODEL = ("
-    yield from (f'    "{row[0]}",' for row in rows if row[2] == "model")
-    yield ")"
+    yield from joined("OF_MODEL = ", [f'"{row[0]}"' for row in rows if row[2] == "model"])
 
 
 def _option_type(kind: str) -> str:
@@ -180,8 +207,7 @@ def _fields(struct: Table, rows: list[list[Any]]) -> Lines:
     for name, kind, doc, *form in rows:
         optional = optional or struct.get("optional_from") == name
         of_type, value = _python_type(kind, form[0] if form else "")
-        yield from remark(doc, "    ") if doc else ()
-        yield f"    {safe(name)}: {of_type}{f' = {value}' if optional else ''}"
+        yield from said(f"    {safe(name)}: {of_type}{f' = {value}' if optional else ''}", doc)
 
 
 def safe(name: str) -> str:
@@ -256,10 +282,17 @@ def _link_module(tables: Tables) -> Lines:
 
 
 def _layout(struct: Table) -> Lines:
-    yield "    LAYOUT: ClassVar[Layout] = Layout("
-    yield f'        "{struct["c"]}",'
-    for name, kind, _, *form in struct["rows"]:
-        yield f'        ("{safe(name)}", "{_letters(kind)}", "{form[0] if form else ""}"),'
+    fields = " ".join(
+        ":".join((safe(name), _letters(kind), *form)) for name, kind, _, *form in struct["rows"]
+    )
+    short = f'    LAYOUT: ClassVar[Layout] = Layout("{struct["c"]}", "{fields}")'
+    if len(short) <= WIDTH:
+        yield short
+        return
+    yield from ("    LAYOUT: ClassVar[Layout] = Layout(", f'        "{struct["c"]}",')
+    pieces = wrap(fields, WIDTH - 12)
+    yield from (f'        "{" " if at else ""}{piece}"' for at, piece in enumerate(pieces[:-1]))
+    yield f'        "{" " if len(pieces) > 1 else ""}{pieces[-1]}",'
     yield "    )"
 
 

@@ -8,40 +8,24 @@ from enum import IntEnum
 class EventKind(IntEnum):
     """eits_event_kind: What happened."""
 
-    # a finger landed
-    DOWN = 1
-    # it moved by move_mm or more since it was last reported
-    MOVE = 2
-    # it lifted
-    UP = 3
-    # down and up at one place within a short time
-    TAP = 4
-    # a second tap at the same place soon after the first, in place of its TAP
-    DOUBLE_TAP = 5
-    # it has been down at one place for a long time
-    HOLD = 6
-    # it moved straight and lifted while it moved
-    SWIPE = 7
-    # two fingers come near one another
-    PINCH = 8
-    # two fingers go apart
-    SPREAD = 9
-    # two fingers turn about one another
-    ROTATE = 10
-    # a finger is in a named zone; of a ring it also says where
-    PRESS = 11
-    # no finger is in the zone any more
-    RELEASE = 12
+    DOWN = 1  # a finger landed
+    MOVE = 2  # it moved by move_mm or more since it was last reported
+    UP = 3  # it lifted
+    TAP = 4  # down and up at one place within a short time
+    DOUBLE_TAP = 5  # a second tap at the same place soon after the first, in place of its TAP
+    HOLD = 6  # it has been down at one place for a long time
+    SWIPE = 7  # it moved straight and lifted while it moved
+    PINCH = 8  # two fingers come near one another
+    SPREAD = 9  # two fingers go apart
+    ROTATE = 10  # two fingers turn about one another
+    PRESS = 11  # a finger is in a named zone; of a ring it also says where
+    RELEASE = 12  # no finger is in the zone any more
 
 
 class EventPhase(IntEnum):
     """eits_event_phase: Where an event lies in what it tells of."""
 
-    # all of it
-    ONCE = 0
-    # it was recognised and goes on
-    BEGIN = 1
-    # it goes on with another value
-    CHANGE = 2
-    # a finger of it lifted
-    END = 3
+    ONCE = 0  # all of it
+    BEGIN = 1  # it was recognised and goes on
+    CHANGE = 2  # it goes on with another value
+    END = 3  # a finger of it lifted

@@ -7,18 +7,9 @@ from dataclasses import dataclass
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS
 
 # eits_sign: Which conductivity changes are looked for.
-SIGNS = (
-    "increase",
-    "decrease",
-    "both",
-)
+SIGNS = ("increase", "decrease", "both")
 # eits_solver: How an image is found; each minimises the same objective (solve.h).
-SOLVERS = (
-    "fista",
-    "working-set",
-    "coordinate",
-    "active-set",
-)
+SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 # eits_touch_fit: Bits: what the touch fit does beyond fitting discs to the image's peaks.
 LOG_DATA = 1
 SPLIT_MERGE = 2
@@ -34,39 +25,28 @@ class OptionFields:
     and ranges.
     """
 
-    # the most iterations; exactly so many where gap_rel is 0
-    iterations: int
-    # the most touches that are reported
-    max_touches: int
-    # the core rejects a frame with more unusable rows; half of the rows by default
-    max_masked: int
-    # fista, working-set, coordinate or active-set (solve.h)
-    solver: str
+    iterations: int  # the most iterations; exactly so many where gap_rel is 0
+    max_touches: int  # the most touches that are reported
+    max_masked: int  # the core rejects a frame with more unusable rows; half of the rows by default
+    solver: str  # fista, working-set, coordinate or active-set (solve.h)
     # 1: ignore changes along the reference frame, that is drift of the gain; 0 by default in taught
     # models
     project_reference: bool
-    # lambda, where lambda_abs is 0, is at least this fraction of lambda_max
-    lambda_rel: float
-    # and at least this multiple of lambda_noise
-    lambda_noise_factor: float
+    lambda_rel: float  # lambda, where lambda_abs is 0, is at least this fraction of lambda_max
+    lambda_noise_factor: float  # and at least this multiple of lambda_noise
     # no touch where lambda_max < detection_factor lambda_noise; 0: no such threshold
     detection_factor: float
-    # a local maximum below this fraction of the greatest starts no touch
-    touch_threshold: float
+    touch_threshold: float  # a local maximum below this fraction of the greatest starts no touch
     # a touch that explains less than this fraction of |y|^2 beside the others is dropped
     touch_min_fraction: float
-    # the least radius of a touch
-    touch_min_radius_mm: float
-    # the greatest
-    touch_max_radius_mm: float
-    # the radius that a fit starts from, between the two
-    touch_seed_radius_mm: float
+    touch_min_radius_mm: float  # the least radius of a touch
+    touch_max_radius_mm: float  # the greatest
+    touch_seed_radius_mm: float  # the radius that a fit starts from, between the two
     # expected conductivity change under a touch, which separates radius from strength; 0: unknown
     touch_change_s_per_m: float
     # weight of the radius so expected against the data, relative to the touch's own energy
     touch_radius_weight: float
-    # a touch that moved at most so far since the last frame keeps its id
-    follow_mm: float
+    follow_mm: float  # a touch that moved at most so far since the last frame keeps its id
     # parts of the touch fit, a bit each; all but those that the model leaves out by default
     touch_fit: int
     # iterations between checks of the duality gap and of divergence, and until the working set is
@@ -78,17 +58,14 @@ class OptionFields:
     warm_start: bool = False
     # > 0: this lambda; 0: the greater of those that lambda_rel and lambda_noise_factor give
     lambda_abs: float = 0.0
-    # > 0: stop once the duality gap <= gap_rel |y|^2 / 2
-    gap_rel: float = 0.0
-    # > 0: a channel at or beyond +-saturation_v is unusable, V
-    saturation_v: float = 0.0
+    gap_rel: float = 0.0  # > 0: stop once the duality gap <= gap_rel |y|^2 / 2
+    saturation_v: float = 0.0  # > 0: a channel at or beyond +-saturation_v is unusable, V
     # sweeps of the off-grid fit over all touches; 0: peaks with their strengths only
     touch_sweeps: int = 6
     # > 0: stop with the best so far where the next step, and the gap after it, would take info.macs
     # beyond this (solve.h)
     mac_limit: int = 0
-    # the diagnostics that are looked for, a bit each
-    diagnostics: int = ALL_DIAGNOSTICS
+    diagnostics: int = ALL_DIAGNOSTICS  # the diagnostics that are looked for, a bit each
     # 1: where more than one touch is found, eits_find_touches solves again with their interaction
     # taken out of the data; image and info are then the second solve's. Not with a mac_limit
     second_pass: bool = False

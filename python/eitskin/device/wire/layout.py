@@ -9,12 +9,15 @@ from typing import ClassVar
 
 class Layout:
     """The struct of C that it is, and its fields in order, each as (name, letters of ``struct``,
-    form in Python)."""
+    form in Python). They are written as "name:letters" or "name:letters:form", with spaces
+    between."""
 
-    def __init__(self, name: str, *fields: tuple[str, str, str]) -> None:
-        self.name, self.fields = name, fields
-        self.struct = struct.Struct("<" + "".join(letters for _, letters, _ in fields))
-        places = [struct.Struct("<" + letters) for _, letters, _ in fields]
+    def __init__(self, name: str, fields: str) -> None:
+        self.name = name
+        parts = [f"{field}:".split(":") for field in fields.split()]
+        self.fields = [(field, letters, form) for field, letters, form, *_ in parts]
+        self.struct = struct.Struct("<" + "".join(letters for _, letters, _ in self.fields))
+        places = [struct.Struct("<" + letters) for _, letters, _ in self.fields]
         # how many values each field has, a text being one
         self.counts = [len(place.unpack(bytes(place.size))) for place in places]
 
