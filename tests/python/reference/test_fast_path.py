@@ -14,7 +14,7 @@ from eitskin.errors import UsageError
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin_studies.experiments import fast_path
 from eitskin_studies.experiments.fast_path.scans import Outcome, Player
-from eitskin_studies.experiments.fast_path.states import States, solve_states
+from eitskin_studies.experiments.fast_path.states import States, draw_states
 from eitskin_studies.twins.fast.path import FastPath
 
 SEED, ELEMENTS = 5, 3500
@@ -24,7 +24,7 @@ SEED, ELEMENTS = 5, 3500
 def solved() -> dict[str, States]:
     model = load_prebuilt()[0]
     return {
-        kind: solve_states(model, kind, count, SEED, ELEMENTS)
+        kind: draw_states(model, kind, count, SEED, ELEMENTS)
         for kind, count in (("presses", 2), ("pairs", 1), ("swipes", 1))
     }
 
@@ -44,7 +44,7 @@ SCENES: dict[str, tuple[str, Any, float, float]] = {
     "one after another": ("pairs", partial(fast_path._pair, later_s=0.03), 8, 4),
     "swipe": ("swipes", partial(fast_path._swipe, speed_mm_per_s=600.0), 6, 4),
     "glitches": ("presses", partial(fast_path._fault, spoil=fast_path._glitches), 40, 5),
-    "open electrode": ("presses", partial(fast_path._fault, spoil=fast_path._open), 100, 5),
+    "open electrode": ("presses", partial(fast_path._fault, spoil=fast_path._open), 100, 10),
     "noisy electrode": ("presses", partial(fast_path._fault, spoil=fast_path._noisy), 100, 5),
     "drift": ("presses", partial(fast_path._fault, spoil=fast_path._drift), 40, 5),
 }

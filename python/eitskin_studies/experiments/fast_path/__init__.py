@@ -4,7 +4,7 @@ drive."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,8 +14,19 @@ import numpy.typing as npt
 
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
-from eitskin_studies.experiments.fast_path.scans import Outcome, Player, Scan, TrueInTime
-from eitskin_studies.experiments.fast_path.states import ELEMENTS, States, at_press, solve_states
+from eitskin_studies.experiments.fast_path.scans import (
+    ROW_S,
+    Outcome,
+    Player,
+    Scan,
+    TrueInTime,
+)
+from eitskin_studies.experiments.fast_path.states import (
+    ELEMENTS,
+    Keyframes,
+    States,
+    draw_states,
+)
 from eitskin_studies.experiments.multitouch.counts import share
 
 FloatArray = npt.NDArray[np.float64]
@@ -81,21 +92,21 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     """All of it; what the workspace has kept is not computed again."""
     settings = workspace.settings
     model, blob = load_prebuilt()
-    solved: dict[str, States] = {}
+    drawn: dict[str, States] = {}
     listed = [(row, settings.count(row.count)) for row in rows()]
     for kind in ("presses", "swipes", "pairs"):
         most = max(count for row, count in listed if row.kind == kind)
-        solved[kind] = solve_states(model, kind, most, settings.seed, ELEMENTS)
+        drawn[kind] = draw_states(model, kind, most, settings.seed, ELEMENTS)
     found = []
     for number, (row, count) in enumerate(workspace.progress(listed, "playing")):
         outcomes = []
         for k in range(count):
             rng = np.random.default_rng([settings.seed, number, k])
-            v0 = solved[row.kind].v0[k]
+            v0 = drawn[row.kind].v0[k]
             sigma = float(np.sqrt(np.mean(v0**2))) / 10 ** (row.snr_db / 20)
             player = Player(model, blob)
             player.tare(v0, sigma, rng)
-            outcomes.append(row.make(player, solved[row.kind], k, rng, sigma))
+            outcomes.append(row.make(player, drawn[row.kind], k, rng, sigma))
         found.append({"name": row.name, **_summary(outcomes)})
     words = (
         f"Seed {settings.seed}; discs of radius 8 mm, contrast 5, 60 dB unless said; frames from"
@@ -108,30 +119,45 @@ def run(workspace: Workspace) -> ExperimentOutcome:
 # ---- scenes ----
 
 
-def _ramp(time_s: FloatArray, from_s: float, rise_s: float, to_s: float) -> FloatArray:
-    """0 to 1 from ``from_s`` on, and down again from ``to_s`` on."""
-    if rise_s == 0:
-        return ((time_s >= from_s) & (time_s < to_s)).astype(np.float64)
-    up, down = (time_s - from_s) / rise_s, 1 - (time_s - to_s) / rise_s
-    return np.clip(np.minimum(up, down), 0, 1)
+def _ramp(
+    from_s: float, rise_s: float, to_s: float, begin: FloatArray, end: FloatArray
+) -> Keyframes:
+    """A touch that is whole ``rise_s`` after ``from_s`` and lifts from ``to_s`` on as slowly."""
+    keys = [(from_s, *begin, 0.0), (from_s + rise_s, *begin, 1.0)][rise_s == 0 :]
+    ends = [(to_s, *end, 1.0), (to_s + rise_s, *end, 0.0)]
+    return [*keys, *ends[: 1 if rise_s == 0 else 2]]
 
 
 def _begin(player: Player, rng: np.random.Generator) -> float:
     rows = player.path.model.protocol.n_rows
-    return BEFORE_S + 1e-4 * rows * float(rng.uniform())
+    return BEFORE_S + ROW_S * rows * float(rng.uniform())
+
+
+def _played(
+    player: Player,
+    states: States,
+    k: int,
+    rng: np.random.Generator,
+    sigma: float,
+    lasts_s: float,
+    touches: Sequence[tuple[Keyframes, TrueInTime]],
+) -> Outcome:
+    scan = Scan.of(player.path, lasts_s)
+    volts = states.volts(k, [path for path, _ in touches], scan.frames)
+    return player.play(
+        scan, volts + sigma * rng.standard_normal(len(volts)), [true for _, true in touches]
+    )
 
 
 def _press(
     player: Player, states: States, k: int, rng: np.random.Generator, sigma: float, *, rise_s: float
 ) -> Outcome:
-    from_s = _begin(player, rng)
+    from_s, place = _begin(player, rng), states.places[k][0]
     to_s = from_s + rise_s + HELD_S
-    scan = Scan.of(player.path, to_s + rise_s + AFTER_S)
-    press = _ramp(scan.time_s, from_s, rise_s, to_s)
-    volts = states.v0[k][scan.row] + at_press(states.change[k][0], press, scan.row)
-    place = states.places[k][0]
-    truth = [TrueInTime(from_s, to_s + rise_s, lambda _: place)]
-    return player.play(scan, volts + sigma * rng.standard_normal(len(volts)), truth)
+    path = _ramp(from_s, rise_s, to_s, place, place)
+    truth = TrueInTime(from_s, to_s + rise_s, lambda _: place)
+    lasts_s = to_s + rise_s + AFTER_S
+    return _played(player, states, k, rng, sigma, lasts_s, [(path, truth)])
 
 
 def _pair(
@@ -146,18 +172,19 @@ def _pair(
 ) -> Outcome:
     from_s = _begin(player, rng)
     to_s = from_s + rise_s + later_s + HELD_S
-    scan = Scan.of(player.path, to_s + rise_s + AFTER_S)
-    first, second = (_ramp(scan.time_s, from_s + late, rise_s, to_s) for late in (0.0, later_s))
-    one, other, both = states.change[k]
-    volts = states.v0[k][scan.row] + at_press(one, first, scan.row)
-    volts += at_press(other, second, scan.row)
-    volts += at_press(both - one - other, np.sqrt(first * second), scan.row)
     here, there = states.places[k]
-    truth = [
-        TrueInTime(from_s, to_s + rise_s, lambda _: here),
-        TrueInTime(from_s + later_s, to_s + rise_s, lambda _: there),
+    touches = [
+        (
+            _ramp(from_s + late_s, rise_s, to_s, place, place),
+            TrueInTime(from_s + late_s, to_s + rise_s, partial(_stays, place)),
+        )
+        for place, late_s in ((here, 0.0), (there, later_s))
     ]
-    return player.play(scan, volts + sigma * rng.standard_normal(len(volts)), truth)
+    return _played(player, states, k, rng, sigma, to_s + rise_s + AFTER_S, touches)
+
+
+def _stays(place: FloatArray, _: float) -> FloatArray:
+    return place
 
 
 def _swipe(
@@ -169,27 +196,23 @@ def _swipe(
     *,
     speed_mm_per_s: float,
 ) -> Outcome:
-    places, change = states.places[k], states.change[k]
-    step_s = float(np.hypot(*(places[1] - places[0]))) / speed_mm_per_s
+    here, there = states.places[k]
+    moves_s = float(np.hypot(*(there - here))) / speed_mm_per_s
     from_s = _begin(player, rng)
-    to_s = from_s + 2 * SWIPE_HELD_S + step_s * (len(places) - 1)
-
-    def along(time_s: npt.ArrayLike) -> FloatArray:
-        gone = (np.asarray(time_s) - from_s - SWIPE_HELD_S) / step_s
-        return np.clip(gone, 0, len(places) - 1 - 1e-9)
+    times_s = from_s + np.array([0.0, SWIPE_HELD_S, SWIPE_HELD_S + moves_s])
+    to_s = float(times_s[-1]) + SWIPE_HELD_S
+    path = [
+        (float(t), *at, 1.0)
+        for t, at in zip((*times_s, to_s), (here, here, there, there), strict=True)
+    ]
 
     def place(time_s: float) -> FloatArray:
-        at = float(along(time_s))
-        low = int(at)
-        return np.asarray(places[low] + (at - low) * (places[low + 1] - places[low]))
+        return np.asarray(
+            here + np.clip((time_s - times_s[1]) / moves_s, 0.0, 1.0) * (there - here)
+        )
 
-    scan = Scan.of(player.path, to_s + AFTER_S)
-    at = along(scan.time_s)
-    low = at.astype(np.int64)
-    moved = change[low, scan.row] + (at - low) * (change[low + 1, scan.row] - change[low, scan.row])
-    volts = states.v0[k][scan.row] + _ramp(scan.time_s, from_s, 0, to_s) * moved
-    volts += sigma * rng.standard_normal(len(volts))
-    return player.play(scan, volts, [TrueInTime(from_s, to_s, place)])
+    truth = TrueInTime(from_s, to_s, place)
+    return _played(player, states, k, rng, sigma, to_s + AFTER_S, [(path, truth)])
 
 
 Spoil = Callable[[FloatArray, Player, Scan, float, np.random.Generator], FloatArray]
@@ -205,14 +228,12 @@ def _fault(
     spoil: Spoil,
     press: bool = True,
 ) -> Outcome:
-    scan = Scan.of(player.path, FAULTED_END_S)
-    volts, truth = states.v0[k][scan.row], []
+    scan, paths, truth = Scan.of(player.path, FAULTED_END_S), [], []
     if press:
-        up = _ramp(scan.time_s, FAULTED_PRESS_S, 0.03, np.inf)
-        volts = volts + at_press(states.change[k][0], up, scan.row)
-        place = states.places[k][0]
+        place, up_s = states.places[k][0], FAULTED_PRESS_S + 0.03
+        paths = [[(FAULTED_PRESS_S, *place, 0.0), (up_s, *place, 1.0), (np.inf, *place, 1.0)]]
         truth = [TrueInTime(FAULTED_PRESS_S, np.inf, lambda _: place)]
-    volts = spoil(volts, player, scan, sigma, rng)
+    volts = spoil(states.volts(k, paths, scan.frames), player, scan, sigma, rng)
     return player.play(scan, volts + sigma * rng.standard_normal(len(volts)), truth)
 
 

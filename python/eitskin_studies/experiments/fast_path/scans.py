@@ -30,13 +30,14 @@ class Scan:
 
     row: npt.NDArray[np.int64]
     time_s: FloatArray
+    frames: int
 
     @classmethod
     def of(cls, path: FastPath, lasts_s: float) -> Scan:
         """Whole frames for at least ``lasts_s``."""
         once = np.concatenate([path.drives[d].rows for d in order(path)])
         frames = int(np.ceil(lasts_s / (ROW_S * len(once))))
-        return cls(np.tile(once, frames), np.asarray(ROW_S * np.arange(frames * len(once))))
+        return cls(np.tile(once, frames), np.asarray(ROW_S * np.arange(frames * len(once))), frames)
 
 
 def order(path: FastPath) -> list[int]:

@@ -1,81 +1,77 @@
-"""What touches do to every row, solved at a few states each, and rows in time interpolated from
-them."""
+"""Skins whose contacts were drawn, with drawn places on them, and what a scan measures there while
+touches land, move and lift: scenes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.fem.cem import ForwardModel
-from eitskin.fem.mesh import mesh_for_elements
 from eitskin.model.model import Model
-from eitskin.scene.cover import Cover
-from eitskin.scene.forward_steps import Change, Update, Work
-from eitskin.scene.random_touches import TrueTouch
+from eitskin.scene.compiler import compile_scene
+from eitskin.scene.description import Scene, scene_from_table
+from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import MeshCache
+from eitskin.skin.protocol import in_order
+from eitskin_studies.experiments.fast_path.scans import ROW_S, STEP
 
 FloatArray = npt.NDArray[np.float64]
+Keyframes = Sequence[tuple[float, float, float, float]]
 
 ELEMENTS = 7000
-RADIUS_MM, CONTRAST, LEVELS = 8.0, 5.0, 6
+RADIUS_MM, CONTRAST = 8.0, 5.0
 REACH = 0.83  # of the skin's radius: where touches are
-STEP_MM = 2.0
-CONTACT_SPREAD = 0.3  # standard deviation of the logarithm
+CONTACT_SPREAD = 0.3
 SKINS = 4  # contacts are drawn again for each part of the touches
+_MESHES = MeshCache()
 
 
-def polarisation(contrast: npt.ArrayLike) -> FloatArray:
-    """(c - 1) / (c + 1), in which a row's change is all but straight."""
-    c = np.asarray(contrast, dtype=np.float64)
-    return np.asarray((c - 1) / (c + 1))
-
-
-class TouchedSkin:
-    """One skin whose contacts were drawn; states are low-rank updates of one factorisation."""
-
-    def __init__(self, model: Model, elements: int, rng: np.random.Generator) -> None:
-        skin = model.skin
-        mesh = mesh_for_elements(skin, elements)
-        contacts = skin.electrodes.contact_impedance_ohm_m2 * np.exp(
-            CONTACT_SPREAD * rng.standard_normal(skin.electrodes.count)
-        )
-        self._model, self._contacts = ForwardModel(mesh, skin, model.protocol, contacts), contacts
-        size = self._model.system_for(contacts == 0).size
-        self._solver = Update(self._model, None, np.arange(size), Work())
-        self._sheet = np.full(mesh.n_elements, skin.conductivity_s_per_m)
-        self._cover = Cover(mesh)
-        self.v0 = self._volts([])
-
-    def _volts(self, touches: Sequence[TrueTouch]) -> FloatArray:
-        change = Change(*self._cover.factor(touches))
-        electrodes = self._solver.electrodes(self._sheet, change, self._contacts)
-        return np.asarray(
-            self._model.patterns.voltages(electrodes) * self._model.protocol.current_a
-        )
-
-    def change(self, places: FloatArray, contrast: float) -> FloatArray:
-        """What touches at ``places`` (k, 2) add to v0, (m,) V."""
-        touches = [TrueTouch(float(x), float(y), RADIUS_MM, contrast) for x, y in places]
-        return self._volts(touches) - self.v0
-
-    def levels(self, places: FloatArray) -> FloatArray:
-        """The same at LEVELS steps of the polarisation, (LEVELS + 1, m)."""
-        u = polarisation(CONTRAST) * np.arange(1, LEVELS + 1) / LEVELS
-        changes = [self.change(places, float((1 + each) / (1 - each))) for each in u]
-        return np.vstack([np.zeros(len(self.v0)), *changes])
-
-
-@dataclass(frozen=True, eq=False)
 class States:
-    """Solved states of n presses, swipes or pairs: ``v0`` (n, m); of presses ``places`` (n, 1, 2)
-    and ``change`` (n, 1, LEVELS + 1, m); of pairs (n, 2, 2) and (n, 3, LEVELS + 1, m), the last
-    both together; of swipes lists of (k, 2) and (k, m)."""
+    """``places`` (n, k, 2) of n presses, swipes (from, to) or pairs; ``v0`` (n, m) of their
+    skins."""
 
-    v0: FloatArray
-    places: Sequence[FloatArray]
-    change: Sequence[FloatArray]
+    def __init__(
+        self, places: FloatArray, seeds: Sequence[int], n_rows: int, elements: int
+    ) -> None:
+        self.places, self._seeds, self._elements = places, seeds, elements
+        self._rate_hz = 1 / (ROW_S * n_rows)
+        untouched = {seed: self._simulated(seed, (), 1)[0] for seed in set(seeds)}
+        self.v0 = np.array([untouched[seed] for seed in seeds])
+
+    def volts(self, k: int, paths: Sequence[Keyframes], frames: int) -> FloatArray:
+        """Rows (t,) in V of ``frames`` scans of skin ``k`` in the order of their times; of each
+        touch ``paths`` has keyframes (s, mm, mm, press), the last held where it is at infinity."""
+        return self._simulated(self._seeds[k], paths, frames)[1:].ravel()
+
+    def _simulated(self, seed: int, paths: Sequence[Keyframes], frames: int) -> FloatArray:
+        """An untouched frame as the protocol stands, then ``frames`` scans in their order."""
+        scene = self._scene(seed, paths, frames)
+        volts = simulate_frames(compile_scene(scene, mesh_cache=_MESHES)).voltage_v
+        volts[1:] = volts[1:, scene.protocol.scan_rows]
+        return volts
+
+    def _scene(self, seed: int, paths: Sequence[Keyframes], frames: int) -> Scene:
+        head = {"seed": seed, "elements": self._elements, "quiet_frames": 1, "frames": frames,
+                "rate_hz": self._rate_hz}  # fmt: skip
+        touches = [_touch(path) for path in paths]
+        effects = {"contact_impedance": {"spread": CONTACT_SPREAD}}
+        table = {"scene": head, "touch": touches, "effects": effects}
+        scene = scene_from_table(table, "fast path", Path())
+        return replace(scene, protocol=in_order(scene.protocol, f"by {STEP}"))
+
+
+def _touch(path: Keyframes) -> dict[str, Any]:
+    keys = [
+        {"t_s": t_s, "x_mm": x_mm, "y_mm": y_mm, "press": press}
+        for t_s, x_mm, y_mm, press in path
+        if np.isfinite(t_s)
+    ]
+    held = len(keys) < len(path)
+    return {"radius_mm": RADIUS_MM, "contrast": CONTRAST, "hold": held, "path": keys}
 
 
 def _place(model: Model, rng: np.random.Generator) -> FloatArray:
@@ -84,46 +80,18 @@ def _place(model: Model, rng: np.random.Generator) -> FloatArray:
     return np.array([radius * np.cos(angle), radius * np.sin(angle)])
 
 
-def _apart(
-    model: Model, rng: np.random.Generator, least_mm: float
-) -> tuple[FloatArray, FloatArray]:
+def _places(model: Model, rng: np.random.Generator, kind: str) -> FloatArray:
+    least_mm = {"presses": 0.0, "pairs": 35.0, "swipes": 70.0}[kind]
     while True:
-        one, other = _place(model, rng), _place(model, rng)
-        if np.hypot(*(one - other)) > least_mm:
-            return one, other
+        places = np.array([_place(model, rng) for _ in range(1 if kind == "presses" else 2)])
+        if np.hypot(*(places[0] - places[-1])) >= least_mm:
+            return places
 
 
-def solve_states(model: Model, kind: str, count: int, seed: int, elements: int) -> States:
+def draw_states(model: Model, kind: str, count: int, seed: int, elements: int) -> States:
     """``count`` "presses", "swipes" (at least 70 mm long) or "pairs" (at least 35 mm apart)."""
     rng = np.random.default_rng([seed, ("presses", "swipes", "pairs").index(kind)])
-    v0, places, changes = [], [], []
-    for part in np.array_split(np.arange(count), min(SKINS, count)):
-        skin = TouchedSkin(model, elements, rng)
-        for _ in part:
-            v0.append(skin.v0)
-            if kind == "presses":
-                place = _place(model, rng)[None]
-                change = skin.levels(place)[None]
-            elif kind == "pairs":
-                place = np.array(_apart(model, rng, 35.0))
-                change = np.array(
-                    [skin.levels(place[:1]), skin.levels(place[1:]), skin.levels(place)]
-                )
-            else:
-                begin, end = _apart(model, rng, 70.0)
-                along = (end - begin) / np.hypot(*(end - begin))
-                place = begin + STEP_MM * np.outer(
-                    np.arange(int(np.hypot(*(end - begin)) / STEP_MM)), along
-                )
-                change = np.array([skin.change(each[None], CONTRAST) for each in place])
-            places.append(place)
-            changes.append(change)
-    return States(np.array(v0), places, changes)
-
-
-def at_press(levels: FloatArray, press: FloatArray, rows: npt.NDArray[np.int64]) -> FloatArray:
-    """Of ``levels`` (LEVELS + 1, m) the ``rows`` (t,) at ``press`` (t,), 0 to 1 of the way to
-    CONTRAST, (t,)."""
-    u = polarisation(1 + (CONTRAST - 1) * press) / polarisation(CONTRAST) * LEVELS
-    low = np.minimum(u.astype(np.int64), LEVELS - 1)
-    return np.asarray(levels[low, rows] + (u - low) * (levels[low + 1, rows] - levels[low, rows]))
+    places = np.array([_places(model, rng, kind) for _ in range(count)])
+    skins = rng.integers(2**32, size=min(SKINS, count)).tolist()
+    seeds = [skins[k * len(skins) // count] for k in range(count)]
+    return States(places, seeds, model.protocol.n_rows, elements)
