@@ -1,4 +1,4 @@
-"""docs/reference/mistakes.md: every mistake in it is made, and gets the answer that stands there.
+"""mistakes.md: every mistake in it is made, and gets the answer that stands there.
 
 ``PYTHONPATH=tests/python python tests/python/docs/test_mistakes.py`` writes the answers anew.
 """
@@ -21,7 +21,7 @@ from eitskin.cli.main import main
 from eitskin.frames.frames import save_frames
 from small_models import session
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "mistakes.md"
+PAGE = Path(__file__).with_name("mistakes.md")
 ROW = re.compile(r"\| `eitskin (.*?)` \| (\d+) \| (.*) \|")
 FILES = {
     "volts.csv": "0.1,0.2,0.3\n0.1,0.2,0.3\n",

@@ -25,28 +25,25 @@ UP = "../../"
 HEAD = """# Hard cases
 
 What makes an EIT skin's numbers go wrong, and what eitskin promises then. Each case is a test, to
-which its name links, that fails where the promise does not hold. Unless the case is about bytes or
-counters, it runs in float32 on the host (vector and plain C kernels) and on an emulated Cortex-M7
-(QEMU mps2-an500); all three give the same bits.
+which its name links, that fails where the promise does not hold;
+[cases.toml](../../tests/python/hard_cases/cases.toml) says what goes wrong in each. Unless the case
+is about bytes or counters, it runs in float32 on the host (vector and plain C kernels) and on an
+emulated Cortex-M7; all three give the same bits. `scripts/hard-cases` runs them and writes this
+page.
 
-`scripts/hard-cases` runs the tests and writes this page and its pictures; `pytest` ends with a line
-a case; `tests/python/hard_cases/cases.toml` names all tests of each. *Nearest to its bound*: what
-uses up most of what the test allows, measured of allowed. Bounds follow from the arithmetic and the
-problem's condition; 0 of 0 means that nothing may go wrong at all. Seeds are fixed. *Sound*:
-finite; objective, residual and gap no worse than at zero, and reported as float64 finds them.
-Touches (physics) are simulated at 60 dB and 12 bits on another mesh than the model's.
+*Nearest to its bound*: of what the test allows, what uses up most, measured of allowed; 0 of 0
+means that nothing may go wrong at all. *Sound*: finite; objective, residual and gap no worse than
+at zero, and reported as float64 finds them.
 """
 
-TABLE = ("| case | what goes wrong | promise | nearest to its bound |", "|---|---|---|---|")
+TABLE = ("| case | promise | nearest to its bound |", "|---|---|---|")
 
 
 def cell(margin: Margin | None) -> str:
-    """One entry of a table: what was measured of what is allowed; where nothing is allowed, the
-    promise says of what."""
+    """One entry of a table: what was measured of what is allowed."""
     if margin is None:
         return ""
-    text = margin.text if margin.bound > 0 else margin.text.removeprefix(f"{margin.what}: ")
-    return text.replace("|", "\\|")
+    return margin.text.removeprefix(f"{margin.what}: ").replace("|", "\\|")
 
 
 def _worst(case: Case, found: Margins) -> Margin | None:
@@ -61,7 +58,7 @@ def _worst(case: Case, found: Margins) -> Margin | None:
 
 def _row(case: Case, found: Margins) -> str:
     name = f"[`{case.id}`]({UP}{case.files[0]})"
-    return f"| {name} | {case.what} | {case.promise} | {cell(_worst(case, found))} |"
+    return f"| {name} | {case.promise} | {cell(_worst(case, found))} |"
 
 
 def page_text(found: Margins) -> str:
@@ -84,7 +81,7 @@ def page_text(found: Margins) -> str:
 
 def measured(row: str) -> str:
     """A row's cell of measured numbers."""
-    return row.replace("\\|", "").split("|")[4].strip()
+    return row.replace("\\|", "").split("|")[3].strip()
 
 
 def without_numbers(text: str) -> str:
