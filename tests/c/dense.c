@@ -229,17 +229,18 @@ void dense_frame(const eits_model *model, const dense *d, const double *v0, doub
     free(drift);
 }
 
-eits_context *dense_bench_open(dense_bench *bench, small_spec spec, int prepared)
-{
-    bench->made = small_model_make(spec);
-    small_context_open(&bench->c, &bench->made, prepared);
-    bench->d = dense_of(&bench->c.model);
-    return bench->c.ctx;
-}
-
 void dense_bench_close(dense_bench *bench)
 {
     dense_free(&bench->d);
     small_context_close(&bench->c);
     small_model_free(&bench->made);
+}
+
+eits_context *dense_bench_open(dense_bench *bench, small_spec spec, int prepared)
+{
+    dense_bench_close(bench);
+    bench->made = small_model_make(spec);
+    small_context_open(&bench->c, &bench->made, prepared);
+    bench->d = dense_of(&bench->c.model);
+    return bench->c.ctx;
 }

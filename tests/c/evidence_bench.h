@@ -30,6 +30,8 @@ typedef struct bench {
     eits_real frame[SMALL_ROWS];
 } bench;
 
+static bench b;
+
 /* Errors like those of a real skin: some of any direction, none alike. */
 static inline void fill_errors(float *packed, double size)
 {
@@ -45,13 +47,11 @@ static inline void fill_errors(float *packed, double size)
 
 static inline eits_context *set_up(bench *b, int project)
 {
+    dense_bench_close(&b->b);
     memset(b, 0, sizeof *b);
     eits_context *ctx = dense_bench_open(&b->b, SPEC, 0);
-    eits_options o = *eits_get_options(ctx);
-    o.diagnostics = 0;
-    o.project_reference = (uint32_t)project;
-    o.max_masked = SMALL_ROWS;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.diagnostics = 0, o.project_reference = (uint32_t)project,
+                   o.max_masked = SMALL_ROWS);
     fill_errors(b->errors, 1e-4);
     fill_errors(b->drift, 1e-5);
     b->b.c.model.uncertainty = (eits_uncertainty){.errors = b->errors, .drift = b->drift};

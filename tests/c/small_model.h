@@ -83,6 +83,14 @@ typedef struct small_context {
 void small_context_open(small_context *context, const small_model *model, int prepared);
 void small_context_close(small_context *context);
 
+/* Sets fields of the options, each said as `o.field = value`; the others stay. */
+#define CHANGE_OPTIONS(ctx, ...)                         \
+    do {                                                 \
+        eits_options o = *eits_get_options(ctx);         \
+        __VA_ARGS__;                                     \
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK); \
+    } while (0)
+
 /* `gain` times the frame that agrees with the model's v_ref on every row. */
 void small_reference(const eits_model *model, double gain, eits_real *frame);
 

@@ -21,16 +21,25 @@ typedef struct bench {
     uint64_t state;
 } bench;
 
+static bench b;
+
 static inline void add_noise(bench *b, eits_real *frame)
 {
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         frame[i] += (eits_real)(1e-3 * small_random(&b->state));
 }
 
+static inline void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 /* 8 electrodes: with 40 rows each electrode has 20 of them, each pair 5 or 6 that drive or measure
  * across it. */
 static inline eits_context *set_up(bench *b, int noise_known)
 {
+    tear_down(b);
     b->made = small_model_make((small_spec){.rank = 12, .side = 4});
     small_context_open(&b->c, &b->made, 0);
     b->state = 7;
@@ -54,12 +63,6 @@ static inline eits_context *set_up(bench *b, int noise_known)
     return b->c.ctx;
 }
 
-static inline void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 static inline int row_uses(const eits_context *ctx, uint32_t i, uint32_t e)
 {
     const uint8_t *row = eits_row(ctx, i);
@@ -75,10 +78,7 @@ static inline int row_crosses(const eits_context *ctx, uint32_t i, uint32_t e, u
 
 static inline void look_for(eits_context *ctx, uint32_t diagnostics)
 {
-    eits_options o = *eits_get_options(ctx);
-    o.diagnostics = diagnostics;
-    o.max_masked = SMALL_ROWS;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.diagnostics = diagnostics, o.max_masked = SMALL_ROWS);
 }
 
 static inline void reconstruct(bench *b)

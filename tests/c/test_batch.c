@@ -20,9 +20,18 @@ typedef struct bench {
     eits_real frames[FRAMES][SMALL_ROWS];
 } bench;
 
+static bench b;
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 /* Frames of noise on the reference; one has nothing but NaN. */
 static eits_context *set_up(bench *b)
 {
+    tear_down(b);
     b->made = small_model_make((small_spec){.rank = 12, .side = SIDE, .shape = SMALL_WAVES});
     small_context_open(&b->c, &b->made, 0);
     uint64_t state = 12;
@@ -37,15 +46,9 @@ static eits_context *set_up(bench *b)
     return b->c.ctx;
 }
 
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 static void each_as_if_alone(void)
 {
-    bench b, alone;
+    bench b = {0}, alone = {0};
     eits_context *ctx = set_up(&b), *other = set_up(&alone);
     static eits_real images[FRAMES][N], coefficients[FRAMES][N], image[N];
     eits_touch touches[FRAMES][EITS_MAX_TOUCHES], found[EITS_MAX_TOUCHES];
@@ -81,7 +84,6 @@ static void each_as_if_alone(void)
 /* What is not wanted is not looked for; a frame of another length is refused by itself. */
 static void without_outputs(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b);
     eits_result results[FRAMES];
     CHECK_EQUAL(
@@ -101,12 +103,12 @@ static void without_outputs(void)
                 EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, NULL),
                 EITS_E_ARGUMENT);
-    tear_down(&b);
 }
 
 int main(void)
 {
     each_as_if_alone();
     without_outputs();
+    tear_down(&b);
     return checks_report("batch");
 }

@@ -28,8 +28,17 @@ typedef struct bench {
     eits_kernels kernels;
 } bench;
 
+static bench b;
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 static eits_context *set_up(bench *b, eits_storage storage, int prepared)
 {
+    tear_down(b);
     memset(b, 0, sizeof *b);
     b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .storage = storage});
     small_context_open(&b->c, &b->made, prepared);
@@ -39,12 +48,6 @@ static eits_context *set_up(bench *b, eits_storage storage, int prepared)
     b->c.ctx->kernels = &b->kernels;
     unpacked = 0;
     return b->c.ctx;
-}
-
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
 }
 
 /* `count` columns from `first`, every `step`-th. */
@@ -72,7 +75,6 @@ static void check_cached(const eits_context *ctx, const uint32_t *index, uint32_
 
 static void unpacked_once_and_replaced(eits_storage storage)
 {
-    bench b;
     eits_context *ctx = set_up(&b, storage, 0);
     uint32_t index[N];
     list(3, 1, 100, index);
@@ -104,13 +106,11 @@ static void unpacked_once_and_replaced(eits_storage storage)
     CHECK_EQUAL(eits_cache_columns(&ctx->columns, ctx->kernels, index, 5), 1);
     CHECK_EQUAL(unpacked, 271);
     check_cached(ctx, index, 5);
-    tear_down(&b);
 }
 
 /* The working set's products from cached columns and from S. */
 static void same_products(eits_storage storage, int prepared)
 {
-    bench b;
     eits_context *ctx = set_up(&b, storage, prepared);
     uint64_t state = 5;
     for (uint32_t count = 0; count <= 300; count += 30) {
@@ -137,7 +137,6 @@ static void same_products(eits_storage storage, int prepared)
         CHECK(memcmp(sum_s, sum_cached, sizeof sum_s) == 0);
         ctx->solver.working_panels = panels;
     }
-    tear_down(&b);
 }
 
 int main(void)
@@ -147,5 +146,6 @@ int main(void)
         same_products((eits_storage)storage, 0);
         same_products((eits_storage)storage, 1);
     }
+    tear_down(&b);
     return checks_report("columns");
 }

@@ -105,13 +105,8 @@ static void exercise(eits_context *ctx, uint64_t *state)
         CHECK_EQUAL(eits_reference_add(ctx, frame, SMALL_ROWS), EITS_OK);
     }
     CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
-    eits_options o = *eits_get_options(ctx);
-    o.touch_min_fraction = 0;
-    o.touch_threshold = 0;
-    o.max_touches = EITS_MAX_TOUCHES;
-    o.warm_start = 1;
-    o.sign = EITS_SIGN_BOTH;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_min_fraction = 0, o.touch_threshold = 0,
+                   o.max_touches = EITS_MAX_TOUCHES, o.warm_start = 1, o.sign = EITS_SIGN_BOTH);
     for (int k = 0; k < 6; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
             frame[i] = small_random(state) < -0.9 + 0.2 * k

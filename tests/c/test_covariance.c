@@ -71,7 +71,6 @@ static void solve_lower(double l[RANK][RANK], double *v)
 static void the_covariance_is_noise_and_model_errors(void)
 {
     for (int way = 0; way < 8; ++way) {
-        bench b;
         const int drift = way & 1, project = way >> 1 & 1, noisy = way >> 2;
         eits_context *ctx = set_up(&b, project);
         const double noise_v = noisy ? 0.02 * (double)ctx->reference.v0_rms : 0;
@@ -107,7 +106,6 @@ static void the_covariance_is_noise_and_model_errors(void)
         CHECK_EQUAL(eits_whiten_errors(ctx, v), RANK * (RANK + 1) / 2 + (project ? 2 * RANK : 0));
         CHECK_NEAR(dense_greatest_difference(expected, v, RANK), 0, BOTH_WIDTHS(1e-3, 1e-6) * size);
         free(w);
-        dense_bench_close(&b.b);
     }
 }
 
@@ -115,7 +113,6 @@ static void the_covariance_is_noise_and_model_errors(void)
  * sign is none. */
 static void a_frame_of_drift_alone_has_errors_of_noise(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     eits_real log_determinant, noise_alone;
     uint64_t macs = 0;
@@ -130,7 +127,6 @@ static void a_frame_of_drift_alone_has_errors_of_noise(void)
         CHECK(log_determinant >= noise_alone);
         CHECK_NEAR(log_determinant, noise_alone, BOTH_WIDTHS(5, 1e-6));
     }
-    dense_bench_close(&b.b);
 }
 
 /* ---- shapes ---- */
@@ -161,7 +157,6 @@ static void shaped_answer(const bench *b, const eits_disc *disc, int parameter, 
  * hundredth of the regularisation. */
 static void the_covariance_of_the_rows_left_is_theirs(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 0);
     CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[4].first, 1), EITS_OK);
     CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[4].second, 1), EITS_OK);
@@ -208,7 +203,6 @@ static void the_covariance_of_the_rows_left_is_theirs(void)
                        0.01 * factored(ctx, i, i) + BOTH_WIDTHS(1e-9, 1e-12));
         }
     }
-    dense_bench_close(&b.b);
 }
 
 /* Re or Im of E_drive E_measure, E averaged over the disc's cover, times -volts change area. */
@@ -246,7 +240,6 @@ static void dipole_answer(const bench *b, const eits_disc *disc, int part, doubl
 /* All in Sigma's metric. */
 static void shapes_move_the_data_as_ellipses_do(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 0);
     eits_real log_determinant;
     uint64_t macs = 0;
@@ -288,14 +281,12 @@ static void shapes_move_the_data_as_ellipses_do(void)
     }
     CHECK_NEAR(dense_greatest_difference(left, ctx->evidence.left, RANK), 0,
                1000 * EPS * sqrt(dense_dot(left, left, RANK)));
-    dense_bench_close(&b.b);
 }
 
 /* Eight parameters a disc where there is room, then four, then none; dipoles where there are fields
  * and room to keep a disc's. */
 static void parameters_fit_the_data(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 0);
     const uint32_t expected[] = {8, 8, 8, 4, 4, 4, 0};
     for (uint32_t count = 0; count < 7; ++count)
@@ -307,7 +298,6 @@ static void parameters_fit_the_data(void)
     CHECK_EQUAL(eits_shape_parameters(ctx, 1), 8);
     b.b.c.model.data_kind = EITS_DATA_NORMALISED;
     CHECK_EQUAL(eits_shape_parameters(ctx, 1), 6);
-    dense_bench_close(&b.b);
 }
 
 int main(void)
@@ -317,5 +307,6 @@ int main(void)
     a_frame_of_drift_alone_has_errors_of_noise();
     shapes_move_the_data_as_ellipses_do();
     parameters_fit_the_data();
+    dense_bench_close(&b.b);
     return checks_report("covariance");
 }

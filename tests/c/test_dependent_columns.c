@@ -11,13 +11,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+static dense_bench b;
+
 enum { SIDE = 7, N = SIDE * SIDE, RANK = 6 };
 
 /* Columns in groups of three that are alike but for `off` of one number each, every seventh zero.
  */
 static eits_context *set_up(dense_bench *b, double off)
 {
-    memset(b, 0, sizeof *b);
+    dense_bench_close(b);
     b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
     uint32_t size;
     uint8_t *sens = small_model_section(&b->made, "SENS", &size);
@@ -55,7 +57,6 @@ static void every_limit_beside_columns_that_depend(void)
 {
     static const double offs[] = {0, 1e-7, 1e-4, 3e-3};
     for (int way = 0; way < 16; ++way) {
-        dense_bench b;
         eits_context *ctx = set_up(&b, offs[way % 4]);
         eits_options o = *eits_get_options(ctx);
         o.sign = way / 4 % 2 ? EITS_SIGN_BOTH : EITS_SIGN_INCREASE;
@@ -83,7 +84,6 @@ static void every_limit_beside_columns_that_depend(void)
                   eits_get_info(ctx)->stop == EITS_STOP_ITERATIONS);
             check_result(&b, at_zero * (1 + 1e-3));
         }
-        dense_bench_close(&b);
     }
 }
 
@@ -91,16 +91,10 @@ static void every_limit_beside_columns_that_depend(void)
  * is far worse than zero. */
 static void starts_that_cancel(void)
 {
-    dense_bench b;
     eits_context *ctx = set_up(&b, 0);
     const uint32_t one = 9 + 1, other = 9 + 2; /* of a group of three */
-    eits_options o = *eits_get_options(ctx);
-    o.sign = EITS_SIGN_BOTH;
-    o.solver = EITS_SOLVER_ACTIVE_SET;
-    o.warm_start = 1;
-    o.lambda_abs = R(1e-5);
-    o.iterations = 30;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_BOTH, o.solver = EITS_SOLVER_ACTIVE_SET,
+                   o.warm_start = 1, o.lambda_abs = R(1e-5), o.iterations = 30);
     small_new_data(ctx, 83);
     ctx->solver.x[one] = R(300.5);
     ctx->solver.x[other] = R(-300);
@@ -120,7 +114,6 @@ static void starts_that_cancel(void)
     check_result(&b, 0.5 * dense_dot(y, y, RANK));
     CHECK(eits_get_info(ctx)->gap_rel < R(1e-3));
     free(y);
-    dense_bench_close(&b);
 }
 
 /* Columns of S without their part along `direction`, a unit vector. */
@@ -168,7 +161,6 @@ static void sweeps_as_written_apart(void)
     enum { RANK_HERE = 12, SWEEPS = 3 };
     for (uint32_t ignored = 0; ignored < 2; ++ignored) {
         for (int storage = 0; storage < 4; ++storage) {
-            dense_bench b;
             eits_context *ctx = dense_bench_open(
                 &b, (small_spec){.rank = RANK_HERE, .side = SIDE, .storage = (eits_storage)storage},
                 0);
@@ -188,18 +180,13 @@ static void sweeps_as_written_apart(void)
                     ctx->frame.y[i] = (eits_real)(r[i] -= along * direction[i]);
                 project_columns(&b.d, direction);
             }
-            eits_options o = *eits_get_options(ctx);
-            o.solver = EITS_SOLVER_COORDINATE;
-            o.sign = EITS_SIGN_BOTH;
-            o.iterations = SWEEPS;
-            o.lambda_rel = R(0.02);
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_COORDINATE, o.sign = EITS_SIGN_BOTH,
+                           o.iterations = SWEEPS, o.lambda_rel = R(0.02));
             CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
             CHECK_EQUAL(eits_get_info(ctx)->iterations, SWEEPS);
             dense_sweeps(&b.d, square, r, (double)eits_get_info(ctx)->lambda, SWEEPS, x);
             CHECK(dense_greatest_difference(x, eits_get_coefficients(ctx), N) < 3000 * EPS);
             free(r), free(x);
-            dense_bench_close(&b);
         }
     }
 }
@@ -210,7 +197,6 @@ static void the_active_set_ends_soon(void)
     enum { RANK_HERE = 12, ROUNDS = 25 };
     static const double lambdas[] = {0.003, 0.03, 0.3};
     for (int way = 0; way < 36; ++way) {
-        dense_bench b;
         eits_context *ctx = dense_bench_open(
             &b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)},
             way % 2);
@@ -229,7 +215,6 @@ static void the_active_set_ends_soon(void)
         const double gap = dense_gap(&b.d, y, x, (double)eits_get_info(ctx)->lambda, o.sign);
         CHECK(gap <= BOTH_WIDTHS(3e-6, 1e-14) * 0.5 * dense_dot(y, y, RANK_HERE));
         free(x), free(y);
-        dense_bench_close(&b);
     }
 }
 
@@ -237,8 +222,7 @@ static void the_active_set_ends_soon(void)
  * for ever. */
 static void hidden_columns(void)
 {
-    dense_bench b;
-    memset(&b, 0, sizeof b);
+    dense_bench b = {0};
     b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
     uint32_t size, k = 3;
     uint8_t *sens = small_model_section(&b.made, "SENS", &size);
@@ -254,12 +238,8 @@ static void hidden_columns(void)
     small_model_seal(&b.made);
     small_context_open(&b.c, &b.made, 0);
     eits_context *ctx = b.c.ctx;
-    eits_options o = *eits_get_options(ctx);
-    o.solver = EITS_SOLVER_ACTIVE_SET;
-    o.diagnostics = o.project_reference = 0;
-    o.max_masked = SMALL_ROWS;
-    o.detection_factor = o.gap_rel = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.diagnostics = o.project_reference = 0,
+                   o.max_masked = SMALL_ROWS, o.detection_factor = o.gap_rel = 0);
     eits_real frame[SMALL_ROWS];
     small_reference(ctx->model, 1, frame);
     CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
@@ -282,5 +262,6 @@ int main(void)
     starts_that_cancel();
     every_limit_beside_columns_that_depend();
     hidden_columns();
+    dense_bench_close(&b);
     return checks_report("exact solvers at their edges");
 }

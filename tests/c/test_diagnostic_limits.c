@@ -13,11 +13,12 @@
 #include <math.h>
 #include <string.h>
 
+static dense_bench b;
+
 enum { RANK = 13, SIDE = 6, N = SIDE * SIDE };
 
 static eits_context *set_up(dense_bench *b, eits_data_kind kind)
 {
-    memset(b, 0, sizeof *b);
     eits_context *ctx = dense_bench_open(
         b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind}, 0);
     eits_real reference[SMALL_ROWS];
@@ -57,12 +58,8 @@ static void said_as(eits_context *ctx, const eits_touch *touches, uint32_t count
 
 static void crowds_on_both_sides_of_the_limit(void)
 {
-    dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
-    eits_options o = *eits_get_options(ctx);
-    o.max_touches = 4;
-    o.touch_seed_radius_mm = 9;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_touches = 4, o.touch_seed_radius_mm = 9);
     eits_zero(ctx->frame.y, EITS_STRIDE(RANK));
     eits_zero(ctx->solver.residual, EITS_STRIDE(RANK));
     /* all folds are in use, of one row each */
@@ -102,14 +99,11 @@ static void crowds_on_both_sides_of_the_limit(void)
     t[3] = (eits_touch){.x_mm = -80, .radius_mm = 9, .explained = R(0.04)};
     said_as(ctx, t, 3, score_of(3, 8, 2, 1, 0.01, 2, 2), 0);
     CHECK_EQUAL(crowded(ctx, t, 4), 1); /* as many as may be */
-    o.max_touches = 5;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_touches = 5);
     said_as(ctx, t, 4, score_of(4, 8, 2, 1, 0.01, 2, 2), 0);
-    o.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_CROWDED;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_CROWDED);
     t[3].x_mm = -41;
     CHECK_EQUAL(crowded(ctx, t, 4), 0);
-    dense_bench_close(&b);
 }
 
 /* ---- a reference that is another skin's ---- */
@@ -143,7 +137,6 @@ static void stale_references_on_both_sides_of_the_limit(void)
         {EITS_SIGN_INCREASE, 1, 1.8, 0.4, 0}, {EITS_SIGN_INCREASE, 1, 1.8, 0.35, 1},
         {EITS_SIGN_INCREASE, 1, 9, 0, 0},     {EITS_SIGN_BOTH, 1, 9, 0.1, 0},
     };
-    dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     for (size_t k = 0; k < sizeof CASES / sizeof *CASES; ++k) {
         eits_options o = *eits_get_options(ctx);
@@ -160,7 +153,6 @@ static void stale_references_on_both_sides_of_the_limit(void)
         CHECK_EQUAL(eits_get_info(ctx)->diagnostics,
                     CASES[k].stale ? EITS_DIAGNOSTIC_STALE_REFERENCE : 0);
     }
-    dense_bench_close(&b);
 }
 
 /* ---- mismatch ---- */
@@ -186,7 +178,6 @@ static int model_mismatch(eits_context *ctx, double off)
 
 static void mismatches_on_both_sides_of_the_limits(void)
 {
-    dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     CHECK(ctx->range.known);
     for (int i = 0; i < RANK; ++i) { /* the ridge: s^2 / (s^2 + 1e-4 s_1^2), over |P_i|^2 */
@@ -211,14 +202,12 @@ static void mismatches_on_both_sides_of_the_limits(void)
     CHECK(model_mismatch(ctx, off));
     ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 0.9));
     CHECK(!model_mismatch(ctx, off) && eits_get_info(ctx)->model_mismatch == 0);
-    dense_bench_close(&b);
 }
 
 /* Two norms of the folds' data and one of the reduced: where the gain is not ignored nothing is
  * learned of its drift. */
 static void a_gain_that_counts_costs_nothing(void)
 {
-    dense_bench b;
     uint64_t macs = 0;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     ctx->reference.noise_v = R(1e-4);
@@ -226,7 +215,6 @@ static void a_gain_that_counts_costs_nothing(void)
     ctx->range.off_range_build = ctx->projection.builds + 1;
     (void)eits_check_model_mismatch(ctx, &ctx->scratch, &macs);
     CHECK_EQUAL(macs, 0);
-    dense_bench_close(&b);
 }
 
 /* Two measurements of a fold have half the variance of one; a copy is none. Ratios have that of the
@@ -234,7 +222,6 @@ static void a_gain_that_counts_costs_nothing(void)
 static void noise_of_the_data(void)
 {
     for (int kind = 0; kind < 2; ++kind) {
-        dense_bench b;
         eits_context *ctx = set_up(&b, kind ? EITS_DATA_NORMALISED : EITS_DATA_DIFFERENCE);
         ctx->reference.noise_v = R(0.25);
         double sum = 0;
@@ -248,7 +235,6 @@ static void noise_of_the_data(void)
             sum += one * one / (two ? 2 : 1);
         }
         CHECK_NEAR(eits_noise_energy(ctx), sum, 1e-5 * sum);
-        dense_bench_close(&b);
     }
 }
 
@@ -273,7 +259,6 @@ static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_
  * deviations and 5 % of its own. */
 static void odd_readings_on_both_sides_of_the_limit(void)
 {
-    dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     eits_real older[SMALL_ROWS], newer[SMALL_ROWS], spoilt[SMALL_ROWS];
     uint32_t marked[SMALL_FOLDED];
@@ -304,13 +289,11 @@ static void odd_readings_on_both_sides_of_the_limit(void)
         spoilt[ctx->model->fold[count].first] += R(0.2);
         CHECK_EQUAL(odd_folds(ctx, spoilt, older, marked), count <= EITS_OUTLIER_MAX ? count : 0);
     }
-    dense_bench_close(&b);
 }
 
 /* Rows that are not in use are neither volts nor a change. */
 static void rows_out_of_use(void)
 {
-    dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     const uint32_t rows[2] = {ctx->model->fold[4].first, ctx->model->fold[4].second};
     eits_real older[SMALL_ROWS], newer[SMALL_ROWS];
@@ -325,7 +308,6 @@ static void rows_out_of_use(void)
         CHECK(marked[4]);
         ctx->rows.masked[rows[out]] = 0;
     }
-    dense_bench_close(&b);
 }
 
 /* ---- noise that is learned ---- */
@@ -337,7 +319,6 @@ static void noise_of_any_size(void)
     static const double sizes[] = {1, BOTH_WIDTHS(1e-24, 1e-170), BOTH_WIDTHS(1e24, 1e170)};
     enum { FRAMES = 8 };
     for (int n = 0; n < 3; ++n) {
-        dense_bench b;
         eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
         uint64_t state = 3;
         eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
@@ -366,20 +347,14 @@ static void noise_of_any_size(void)
             CHECK_EQUAL(eits_reference_add(ctx, frame, SMALL_ROWS),
                         k < FRAMES / 2 ? EITS_OK : EITS_E_FRAME_ZERO);
         }
-        dense_bench_close(&b);
     }
-    dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     small_new_data(ctx, 5);
     ctx->reference.lambda_noise = R(0.25);
-    eits_options o = *eits_get_options(ctx);
-    o.lambda_rel = R(1e-3);
-    o.lambda_noise_factor = R(0.5);
-    o.detection_factor = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.lambda_rel = R(1e-3), o.lambda_noise_factor = R(0.5),
+                   o.detection_factor = 0);
     CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     CHECK(eits_get_info(ctx)->lambda == R(0.125) && eits_get_info(ctx)->lambda_noise == R(0.25));
-    dense_bench_close(&b);
 }
 
 int main(void)
@@ -393,5 +368,6 @@ int main(void)
     odd_readings_on_both_sides_of_the_limit();
     rows_out_of_use();
     noise_of_any_size();
+    dense_bench_close(&b);
     return checks_report("diagnostic limits");
 }

@@ -14,6 +14,8 @@ enum { SIDE = 12, RANK = 36 };
 
 typedef dense_bench bench;
 
+static bench b;
+
 static eits_context *set_up(bench *b, eits_storage storage)
 {
     return dense_bench_open(
@@ -56,7 +58,6 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
  * (radius^2 + pixel^2 / 12). */
 static void the_area_is_that_of_the_covers(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
     const double pixel = (double)b.c.model.pixel_mm, span = SIDE * pixel;
     for (double radius = 3; radius <= 15; radius += 4) {
@@ -85,7 +86,6 @@ static void the_area_is_that_of_the_covers(void)
     }
     const eits_disc far = {.x_mm = R(1e6), .y_mm = R(-1e6), .radius_mm = R(5.0)};
     CHECK(eits_disc_area(ctx, &far) == 0);
-    dense_bench_close(&b);
 }
 
 static eits_disc random_disc(uint64_t *state)
@@ -103,7 +103,6 @@ static void responses_are_sums_over_the_covers(void)
 {
     uint64_t state = 81;
     for (int storage = 0; storage < 4; ++storage) {
-        bench b;
         eits_context *ctx = set_up(&b, (eits_storage)storage);
         for (int round = 0; round < 60; ++round) {
             if (round == 30) { /* from here on with a direction to ignore */
@@ -122,13 +121,11 @@ static void responses_are_sums_over_the_covers(void)
                         4 * macs);
             CHECK_NEAR(dense_greatest_difference(expected, atom, RANK), 0, 2000 * EPS);
         }
-        dense_bench_close(&b);
     }
 }
 
 static void far_away_there_is_nothing(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
     static const double places[] = {200, -200, 1e6, -1e6, 1e30, -1e30};
     for (int p = 0; p < 6; ++p) {
@@ -144,7 +141,6 @@ static void far_away_there_is_nothing(void)
                       ctx->scratch.row[5 + 1][i] == 0 && ctx->scratch.row[5 + 2][i] == 0);
         }
     }
-    dense_bench_close(&b);
 }
 
 /* Derivatives by x, y and radius against central differences of the response written out in double.
@@ -172,7 +168,6 @@ static void derivatives_agree_with_differences(void)
 {
     uint64_t state = 82;
     const double step = 1e-4;
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
     int tried = 0;
     for (int round = 0; round < 60; ++round) {
@@ -217,13 +212,11 @@ static void derivatives_agree_with_differences(void)
         for (int i = 0; i < RANK; ++i)
             CHECK_NEAR(ctx->scratch.row[5 + k][i], (up[i] - down[i]) * 512, 2e-3);
     }
-    dense_bench_close(&b);
 }
 
 /* Places on the skin are those in a kept cell or one beside it. */
 static void on_the_skin(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
     const double pixel = (double)ctx->model->pixel_mm;
     uint32_t off = 0;
@@ -263,7 +256,6 @@ static void on_the_skin(void)
     }
     const eits_disc none = {.x_mm = R(NAN)};
     CHECK(!eits_disc_on_skin(ctx, &none));
-    dense_bench_close(&b);
 }
 
 int main(void)
@@ -273,5 +265,6 @@ int main(void)
     far_away_there_is_nothing();
     derivatives_agree_with_differences();
     on_the_skin();
+    dense_bench_close(&b);
     return checks_report("disc");
 }

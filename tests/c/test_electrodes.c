@@ -7,12 +7,9 @@ static void open_electrodes_are_named_and_left_out(void)
 {
     for (int kind = 0; kind < 3; ++kind) {
         for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
-            bench b;
             eits_context *ctx = set_up(&b, 1);
             look_for(ctx, EITS_DIAGNOSTICS_ALL);
-            eits_options o = *eits_get_options(ctx);
-            o.saturation_v = 2;
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHANGE_OPTIONS(ctx, o.saturation_v = 2);
             uint32_t count = 0, last = 0;
             for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
                 if (!row_uses(ctx, i, e))
@@ -42,7 +39,6 @@ static void open_electrodes_are_named_and_left_out(void)
             look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN);
             reconstruct(&b);
             CHECK_EQUAL(eits_get_info(ctx)->open_electrodes, 0);
-            tear_down(&b);
         }
     }
 }
@@ -50,7 +46,6 @@ static void open_electrodes_are_named_and_left_out(void)
 /* Nothing on any row is no matter of electrodes. */
 static void all_dead_is_a_dead_front_end(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     memset(b.frame, 0, sizeof b.frame);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
@@ -59,14 +54,12 @@ static void all_dead_is_a_dead_front_end(void)
         b.frame[i] = R(NAN);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
     CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
-    tear_down(&b);
 }
 
 /* Nor is nothing but noise: a dead front end, which blames no electrode. */
 static void noise_alone(void)
 {
     for (int open = 0; open < 2; ++open) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
         look_for(ctx, open ? EITS_DIAGNOSTICS_ALL
                            : EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN);
@@ -78,7 +71,6 @@ static void noise_alone(void)
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN,
                     open ? EITS_DIAGNOSTIC_ELECTRODE_OPEN : 0);
-        tear_down(&b);
     }
 }
 
@@ -87,7 +79,6 @@ static void noise_alone(void)
 static void what_a_dead_row_is(void)
 {
     for (int way = 0; way < 6; ++way) {
-        bench b;
         eits_context *ctx = set_up(&b, 0);
         const eits_real fraction = way < 2 ? (way ? R(0.025) : R(0.015)) : 0,
                         small = way == 4 ? R(0.4) : R(0.2);
@@ -106,30 +97,24 @@ static void what_a_dead_row_is(void)
         reconstruct(&b);
         CHECK_EQUAL(eits_get_info(ctx)->open_electrodes,
                     way == 1 || way == 3 || way == 4 ? 0 : 1u << 6);
-        tear_down(&b);
     }
 }
 
 /* Refused, and still named. */
 static void refused_by_name(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
-    eits_options o = *eits_get_options(ctx);
-    o.max_masked = 10;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_masked = 10);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = row_uses(ctx, i, 3) ? 0 : b.frame[i];
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
     CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
     CHECK_EQUAL(eits_get_info(ctx)->open_electrodes, 1u << 3);
-    tear_down(&b);
 }
 
 static void bridged_pairs_are_named_and_left_out(void)
 {
     for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
         const uint32_t f = (e + 1) % SMALL_ELECTRODES;
         look_for(ctx, EITS_DIAGNOSTICS_ALL);
@@ -144,7 +129,6 @@ static void bridged_pairs_are_named_and_left_out(void)
         look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_BRIDGED);
         reconstruct(&b);
         CHECK_EQUAL(eits_get_info(ctx)->bridged_electrodes, 0);
-        tear_down(&b);
     }
 }
 
@@ -152,7 +136,6 @@ static void bridged_pairs_are_named_and_left_out(void)
 static void living_pairs_are_not_bridged(void)
 {
     for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
         const uint32_t f = (e + 1) % SMALL_ELECTRODES;
         look_for(ctx, EITS_DIAGNOSTIC_BRIDGED);
@@ -180,7 +163,6 @@ static void living_pairs_are_not_bridged(void)
         }
         reconstruct(&b);
         CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
-        tear_down(&b);
     }
 }
 
@@ -188,12 +170,9 @@ static void living_pairs_are_not_bridged(void)
  * diagnostics end with it. */
 static void masked_and_forgotten(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
-    eits_options o = *eits_get_options(ctx);
-    o.saturation_v = 2;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.saturation_v = 2);
     const eits_real good = b.frame[9];
     b.frame[9] *= -1;
     reconstruct(&b);
@@ -219,14 +198,12 @@ static void masked_and_forgotten(void)
     reconstruct(&b);
     CHECK(eits_get_info(ctx)->diagnostics == 0 && eits_get_info(ctx)->saturated == 0 &&
           eits_get_info(ctx)->masked == 20);
-    tear_down(&b);
 }
 
 /* A row whose reference is next to nothing has not grown before it is eight times 5 % of the rms.
  */
 static void small_rows(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 0);
     const eits_fold fold = b.c.model.fold[4];
     b.frame[fold.first] = R(0.01), b.frame[fold.second] = (eits_real)fold.sign * R(0.01);
@@ -238,14 +215,12 @@ static void small_rows(void)
         CHECK_EQUAL(eits_get_info(ctx)->diagnostics, grown ? EITS_DIAGNOSTIC_OUTLIER : 0);
         CHECK_EQUAL(eits_get_info(ctx)->masked, grown ? 2 : 0);
     }
-    tear_down(&b);
 }
 
 /* A sign that turned, and a row that grew eightfold, are no touch's doing; three turned ones are
  * another order of the channels. */
 static void impossible_rows(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     const eits_real good = b.frame[9];
     b.frame[9] *= -1;
@@ -263,7 +238,6 @@ static void impossible_rows(void)
     reconstruct(&b);
     CHECK((eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0);
     CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
-    tear_down(&b);
 }
 
 int main(void)
@@ -278,5 +252,6 @@ int main(void)
     masked_and_forgotten();
     small_rows();
     impossible_rows();
+    tear_down(&b);
     return checks_report("electrodes");
 }

@@ -92,7 +92,6 @@ static void leaving_out_is_solving_again_without(void)
     const eits_disc discs[] = {ONE, OTHER, third};
     const double room = BOTH_WIDTHS(3e-3, 1e-8);
     for (uint32_t count = 2; count < 4; ++count) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
         eits_real log_determinant;
         eits_likelihood now;
@@ -153,7 +152,6 @@ static void leaving_out_is_solving_again_without(void)
                 CHECK_NEAR(now.here, alone.here, 1e4 * EPS * q.here);
             }
         }
-        dense_bench_close(&b.b);
     }
 }
 
@@ -162,7 +160,6 @@ static void leaving_out_is_solving_again_without(void)
  * is that of the data. */
 static void refitting_lowers_the_misfit_by_limited_steps(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     eits_real log_determinant;
     eits_likelihood now;
@@ -206,7 +203,6 @@ static void refitting_lowers_the_misfit_by_limited_steps(void)
     double *data = dense_copy(ctx->evidence.data, RANK);
     CHECK_NEAR(none.misfit, dense_dot(data, data, RANK), 100 * EPS * (double)none.misfit);
     free(data);
-    dense_bench_close(&b.b);
 }
 
 /* ---- which discs stay ---- */
@@ -248,7 +244,6 @@ static void check_what_stays(eits_context *ctx, const eits_fit *f)
 static void what_model_errors_could_have_made_goes(void)
 {
     for (int errs = 0; errs < 2; ++errs) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
         eits_disc discs[2] = {ONE, OTHER};
         double ghost[RANK] = {0};
@@ -263,13 +258,11 @@ static void what_model_errors_could_have_made_goes(void)
         CHECK_NEAR(f.disc[0].x_mm, ONE.x_mm, errs ? 1 : 0);
         CHECK_NEAR(f.disc[0].y_mm, ONE.y_mm, errs ? 1 : 0);
         CHECK(errs || memcmp(f.disc, discs, sizeof discs) == 0);
-        dense_bench_close(&b.b);
     }
 }
 
 static void halves_of_a_touch_become_one(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     eits_disc halves[2] = {ONE, ONE};
     stage_discs(&b, &ONE, 1);
@@ -282,7 +275,6 @@ static void halves_of_a_touch_become_one(void)
     check_what_stays(ctx, &f);
     CHECK_NEAR(f.disc[0].x_mm, ONE.x_mm, 1.5);
     CHECK_NEAR(f.disc[0].y_mm, ONE.y_mm, 1.5);
-    dense_bench_close(&b.b);
 }
 
 /* Data that no discs explain and a drift of the sheet does: the discs that were found in it go, the
@@ -292,7 +284,6 @@ static void discs_found_in_a_drift_go(void)
 {
     eits_real rise[2];
     for (int drifts = 0; drifts < 2; ++drifts) {
-        bench b;
         eits_context *ctx = set_up(&b, 0);
         eits_disc discs[2] = {ONE, OTHER};
         double y[RANK] = {0}, drift[RANK];
@@ -318,7 +309,6 @@ static void discs_found_in_a_drift_go(void)
             CHECK_NEAR(f.disc[0].x_mm, ONE.x_mm, 0.5);
             CHECK_NEAR(f.disc[0].y_mm, ONE.y_mm, 0.5);
         }
-        dense_bench_close(&b.b);
     }
     CHECK(rise[1] > 10 * rise[0]);
 }
@@ -326,7 +316,6 @@ static void discs_found_in_a_drift_go(void)
 /* A frame with rows left out is tested like any other. */
 static void rows_left_out_do_not_stop_the_test(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     const eits_disc discs[2] = {ONE, OTHER};
     CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[4].first, 1), EITS_OK);
@@ -337,21 +326,17 @@ static void rows_left_out_do_not_stop_the_test(void)
     eits_test_touches(ctx, &ctx->scratch, &f);
     CHECK(f.tested == 1 && f.count == 1);
     CHECK_NEAR(f.disc[0].x_mm, ONE.x_mm, 0.5);
-    dense_bench_close(&b.b);
 }
 
 /* No such section, not asked for, numbers out of range: discs stay as they are. */
 static void what_cannot_be_tested_is_left_alone(void)
 {
     for (int way = 0; way < 6; ++way) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
-        eits_options o = *eits_get_options(ctx);
         eits_disc ghosts[6];
         if (way == 0)
             b.b.c.model.uncertainty.errors = NULL;
-        o.touch_test = way != 1;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.touch_test = way != 1);
         stage_discs(&b, &ONE, 1);
         for (int i = 0; i < PACKED; ++i) {
             b.errors[i] = way == 2 ? 1e30f : (way == 3 ? 0 : b.errors[i]);
@@ -374,7 +359,6 @@ static void what_cannot_be_tested_is_left_alone(void)
         CHECK_EQUAL(f.tested, 0);
         CHECK_EQUAL(f.count, before.count);
         CHECK(memcmp(f.disc, before.disc, sizeof f.disc) == 0);
-        dense_bench_close(&b.b);
     }
 }
 
@@ -383,7 +367,6 @@ static void what_cannot_be_tested_is_left_alone(void)
 static void zeros_and_nan_come_to_an_end(void)
 {
     for (int way = 0; way < 3; ++way) {
-        bench b;
         eits_context *ctx = set_up(&b, way == 1);
         const eits_disc discs[2] = {ONE, OTHER};
         double y[RANK] = {0};
@@ -397,7 +380,6 @@ static void zeros_and_nan_come_to_an_end(void)
         f = fit_of(ctx, discs, 0);
         eits_test_touches(ctx, &ctx->scratch, &f);
         CHECK(f.count == 0 && f.tested == 0);
-        dense_bench_close(&b.b);
     }
 }
 
@@ -408,7 +390,6 @@ static void ghosts_beside_touches_go(void)
 {
     uint64_t state = 41;
     for (int round = 0; round < 48; ++round) {
-        bench b;
         eits_context *ctx = set_up(&b, round & 1);
         const int size = round / 2 % 4;
         eits_disc discs[5] = {ONE, OTHER, ONE, OTHER, ONE};
@@ -438,7 +419,6 @@ static void ghosts_beside_touches_go(void)
                                               (double)(f.disc[l].y_mm - discs[k].y_mm)));
             CHECK(nearest < 3);
         }
-        dense_bench_close(&b.b);
     }
 }
 
@@ -449,7 +429,6 @@ static void two_side_by_side_are_split(void)
     uint64_t state = 5;
     int split = 0, left = 0;
     for (int round = 0; round < 60; ++round) {
-        bench b;
         eits_context *ctx = set_up(&b, round & 1);
         const double angle = 3 * small_random(&state), apart = 8 + 3 * small_random(&state),
                      c = cos(angle), s = sin(angle);
@@ -480,7 +459,6 @@ static void two_side_by_side_are_split(void)
             CHECK(nearest < 4);
             CHECK(f.rise[k] > 0 && f.place_mm2[k][0] > 0 && f.place_mm2[k][2] > 0);
         }
-        dense_bench_close(&b.b);
     }
     CHECK(split > 5);
     CHECK(left > 0);
@@ -498,5 +476,6 @@ int main(void)
     what_cannot_be_tested_is_left_alone();
     zeros_and_nan_come_to_an_end();
     ghosts_beside_touches_go();
+    dense_bench_close(&b.b);
     return checks_report("evidence");
 }

@@ -22,6 +22,14 @@ typedef struct bench {
     small_context c;
 } bench;
 
+static bench b;
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 static eits_context *open_made(bench *b, int prepared)
 {
     small_context_open(&b->c, &b->made, prepared);
@@ -31,30 +39,19 @@ static eits_context *open_made(bench *b, int prepared)
 
 static eits_context *set_up(bench *b, small_spec spec, int prepared)
 {
+    tear_down(b);
     memset(b, 0, sizeof *b);
     b->made = small_model_make(spec);
     return open_made(b, prepared);
-}
-
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
 }
 
 /* lambda: a fraction of the greatest correlation. */
 static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iterations, eits_sign sign,
                        double lambda, double gap)
 {
-    eits_options o = *eits_get_options(ctx);
-    o.solver = solver;
-    o.iterations = iterations;
-    o.sign = sign;
-    o.lambda_abs = 0;
-    o.lambda_rel = (eits_real)lambda;
-    o.lambda_noise_factor = 0;
-    o.gap_rel = (eits_real)gap;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.solver = solver, o.iterations = iterations, o.sign = sign,
+                   o.lambda_abs = 0, o.lambda_rel = (eits_real)lambda, o.lambda_noise_factor = 0,
+                   o.gap_rel = (eits_real)gap);
     CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     return *eits_get_info(ctx);
 }
@@ -84,7 +81,6 @@ static void both_solvers_reach_the_optimum(void)
         for (int storage = 0; storage < 4; ++storage) {
             for (int sign = 0; sign < 3; ++sign) {
                 for (int l = 0; l < 4; ++l) {
-                    bench b;
                     eits_context *ctx = set_up(
                         &b,
                         (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
@@ -94,7 +90,6 @@ static void both_solvers_reach_the_optimum(void)
                     CHECK_EQUAL(info.stop, EITS_STOP_OPTIMUM);
                     CHECK(info.nonzeros >= 1 && info.nonzeros <= RANK);
                     check_gap(ctx, s == 1 ? BOTH_WIDTHS(2e-6, 1e-14) : BOTH_WIDTHS(2e-4, 1e-10));
-                    tear_down(&b);
                 }
             }
         }
@@ -104,13 +99,11 @@ static void both_solvers_reach_the_optimum(void)
 static void a_gap_that_is_asked_for(void)
 {
     for (int s = 0; s < 2; ++s) {
-        bench b;
         eits_context *ctx = set_up(&b, RANDOM, 1);
         const eits_info info = solve(ctx, SOLVERS[s], MANY, EITS_SIGN_BOTH, 0.03, 1e-3);
         CHECK_EQUAL(info.stop, EITS_STOP_GAP);
         CHECK(info.gap_rel <= R(1e-3));
         check_gap(ctx, 1.001e-3);
-        tear_down(&b);
     }
 }
 
@@ -119,7 +112,6 @@ static void the_support_reaches_the_rank(void)
 {
     for (int s = 0; s < 2; ++s) {
         for (int sign = 0; sign < 3; ++sign) {
-            bench b;
             eits_context *ctx = set_up(&b, RANDOM, 1);
             const eits_info info =
                 solve(ctx, SOLVERS[s], s == 1 ? 200 : 2000, (eits_sign)sign, 0, 0);
@@ -129,7 +121,6 @@ static void the_support_reaches_the_rank(void)
                 CHECK(info.residual <= R(BOTH_WIDTHS(1e-3, 1e-6)) * info.data_norm);
             for (int j = 0; j < N; ++j)
                 CHECK(isfinite((double)eits_get_coefficients(ctx)[j]));
-            tear_down(&b);
         }
     }
 }
@@ -142,8 +133,7 @@ static void columns_that_depend(void)
         for (int near = 0; near < 2; ++near) {
             for (int sign = 0; sign < 3; ++sign) {
                 for (int l = 0; l < 3; ++l) {
-                    bench b;
-                    memset(&b, 0, sizeof b);
+                    tear_down(&b);
                     b.made = small_model_make(
                         (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
                     uint32_t size;
@@ -168,7 +158,6 @@ static void columns_that_depend(void)
                     /* descent by single coordinates hardly moves along what nearly cancels */
                     check_gap(ctx,
                               s == 0 && near ? BOTH_WIDTHS(0.5, 0.05) : BOTH_WIDTHS(1e-3, 1e-4));
-                    tear_down(&b);
                 }
             }
         }
@@ -180,12 +169,10 @@ static void few_pixels(void)
 {
     for (int s = 0; s < 2; ++s) {
         for (uint32_t side = 1; side <= 3; ++side) {
-            bench b;
             eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = side}, 1);
             CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, EITS_SIGN_BOTH, 0.02, 0).stop,
                         EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-5, 1e-12));
-            tear_down(&b);
         }
     }
 }
@@ -194,7 +181,7 @@ static void same_bits_in_every_layout(void)
 {
     for (int s = 0; s < 2; ++s) {
         for (int storage = 0; storage < 4; ++storage) {
-            bench b[4];
+            bench b[4] = {0};
             for (int way = 0; way < 4; ++way) {
                 eits_context *ctx = set_up(
                     &b[way],
@@ -219,7 +206,6 @@ static void warm_starts(void)
 {
     for (int s = 0; s < 2; ++s) {
         for (int sign = 0; sign < 3; ++sign) {
-            bench b;
             eits_context *ctx = set_up(&b, RANDOM, sign % 2);
             ctx->options.warm_start = 1;
             (void)solve(ctx, EITS_SOLVER_FISTA, 2, (eits_sign)sign, 0.001, 0);
@@ -241,7 +227,6 @@ static void warm_starts(void)
             CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop,
                         EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
-            tear_down(&b);
         }
     }
 }
@@ -250,14 +235,12 @@ static void warm_starts(void)
 static void from_the_optimum(void)
 {
     for (int sign = 0; sign < 3; ++sign) {
-        bench b;
         eits_context *ctx = set_up(&b, RANDOM, sign % 2);
         ctx->options.warm_start = 1;
         const eits_info cold = solve(ctx, EITS_SOLVER_ACTIVE_SET, MANY, (eits_sign)sign, 0.01, 0);
         const eits_info warm = solve(ctx, EITS_SOLVER_ACTIVE_SET, MANY, (eits_sign)sign, 0.01, 0);
         CHECK(cold.iterations >= 1 && warm.iterations == 0 && warm.macs < cold.macs / 4);
         CHECK_EQUAL(warm.nonzeros, cold.nonzeros);
-        tear_down(&b);
     }
 }
 
@@ -277,14 +260,12 @@ static void it_never_rises(void)
     for (int s = 0; s < 2; ++s) {
         double before = INFINITY;
         for (uint32_t count = 1; count <= 25; ++count) {
-            bench b;
             eits_context *ctx = set_up(&b, RANDOM, 0);
             const eits_info info = solve(ctx, SOLVERS[s], count, EITS_SIGN_INCREASE, 0.003, 0);
             CHECK(info.iterations <= count);
             const double now = objective(ctx);
             CHECK(now <= before * (1 + 20 * EPS));
             before = now;
-            tear_down(&b);
         }
     }
 }
@@ -295,7 +276,6 @@ static void beside_a_basis(void)
     static const int lost[] = {0, 1, 4, RANK - 2};
     for (int s = 0; s < 2; ++s) {
         for (int k = 0; k < 4; ++k) {
-            bench b;
             eits_context *ctx = set_up(&b, RANDOM, k % 2);
             eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
             uint64_t state = 63;
@@ -308,20 +288,15 @@ static void beside_a_basis(void)
                                                                 : b.c.model.fold[i].second] =
                         R(NAN);
             CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
-            eits_options o = *eits_get_options(ctx);
-            o.solver = SOLVERS[s];
-            o.iterations = MANY;
-            o.max_masked = SMALL_ROWS;
-            o.sign = EITS_SIGN_BOTH;
-            o.lambda_rel = R(0.01);
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHANGE_OPTIONS(ctx, o.solver = SOLVERS[s], o.iterations = MANY,
+                           o.max_masked = SMALL_ROWS, o.sign = EITS_SIGN_BOTH,
+                           o.lambda_rel = R(0.01));
             CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
             CHECK_EQUAL(ctx->projection.count, lost[k] + 1);
             CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
             CHECK(eits_get_info(ctx)->nonzeros >= 1 &&
                   eits_get_info(ctx)->gap_rel <= R(BOTH_WIDTHS(1e-4, 1e-10)));
             CHECK(s == 0 || eits_get_info(ctx)->nonzeros <= (uint32_t)(RANK - 1 - lost[k]));
-            tear_down(&b);
         }
     }
 }
@@ -333,13 +308,10 @@ static void numbers_that_cannot_be(void)
     for (int s = 0; s < 2; ++s) {
         for (size_t k = 0; k < sizeof wild / sizeof wild[0]; ++k) {
             for (int whole = 0; whole < 2; ++whole) {
-                bench b;
                 eits_context *ctx = set_up(&b, RANDOM, 0);
                 for (uint32_t i = 0; i < (whole ? RANK : 1u); ++i)
                     ctx->frame.y[i] = (eits_real)(wild[k] * (i % 2 ? 1 : 0.7));
-                eits_options o = *eits_get_options(ctx);
-                o.solver = SOLVERS[s];
-                CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+                CHANGE_OPTIONS(ctx, o.solver = SOLVERS[s]);
                 const eits_status status = eits_solve(ctx, NULL);
                 CHECK(k > 1 || status == EITS_E_NOT_FINITE);
                 for (int j = 0; j < N; ++j)
@@ -349,7 +321,6 @@ static void numbers_that_cannot_be(void)
                 CHECK(isfinite((double)eits_get_info(ctx)->gap) &&
                       isfinite((double)eits_get_info(ctx)->gap_rel) &&
                       isfinite((double)eits_get_info(ctx)->residual));
-                tear_down(&b);
             }
         }
     }
@@ -368,5 +339,6 @@ int main(void)
     it_never_rises();
     beside_a_basis();
     numbers_that_cannot_be();
+    tear_down(&b);
     return checks_report("exact solvers");
 }

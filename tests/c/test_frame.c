@@ -21,11 +21,21 @@ typedef struct bench {
     uint8_t out[SMALL_ROWS];
 } bench;
 
+static bench b;
+
+static void tear_down(bench *b)
+{
+    dense_free(&b->d);
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 /* A context with a reference of `gain` times the model's, each channel off by up to 3 %, so that no
  * two reciprocal rows agree; and a frame that differs from it by up to 20 %. */
 static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int project)
 {
     uint64_t state = 31;
+    tear_down(b);
     memset(b, 0, sizeof *b);
     b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .kind = kind});
     small_context_open(&b->c, &b->made, 0);
@@ -41,13 +51,6 @@ static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int proj
     CHECK_EQUAL(eits_set_options(b->c.ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_reference_set(b->c.ctx, b->reference, SMALL_ROWS), EITS_OK);
     return b->c.ctx;
-}
-
-static void tear_down(bench *b)
-{
-    dense_free(&b->d);
-    small_context_close(&b->c);
-    small_model_free(&b->made);
 }
 
 static eits_status stage(bench *b, uint32_t *masked)
@@ -91,7 +94,6 @@ static void data_of_each_kind(void)
     for (int kind = 0; kind < 3; ++kind) {
         for (int project = 0; project < 2; ++project) {
             for (int turned = 0; turned < 2; ++turned) { /* polarity: the gain takes it up */
-                bench b;
                 eits_context *ctx = set_up(&b, (eits_data_kind)kind, turned ? -0.5 : 2, project);
                 check_stage(&b, 0);
                 const double gain = (double)ctx->reference.gain;
@@ -120,7 +122,6 @@ static void data_of_each_kind(void)
                 CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
                 check_stage(&b, 0);
                 CHECK_EQUAL(ctx->projection.count, !project);
-                tear_down(&b);
             }
         }
     }
@@ -133,7 +134,6 @@ static void drift_of_the_gain(void)
         for (size_t e = 0; e < sizeof drifts / sizeof drifts[0]; ++e) {
             double size[2];
             for (int project = 0; project < 2; ++project) {
-                bench b;
                 eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1.7, project);
                 for (int i = 0; i < SMALL_ROWS; ++i)
                     b.frame[i] = b.reference[i] * (eits_real)(1 + drifts[e]);
@@ -142,7 +142,6 @@ static void drift_of_the_gain(void)
                 double *y = dense_copy(ctx->frame.y, RANK);
                 size[project] = sqrt(dense_dot(y, y, RANK));
                 free(y);
-                tear_down(&b);
             }
             CHECK(size[0] > 0.5 * fabs(drifts[e]));
             CHECK(size[1] <= 30 * EPS * (1 + fabs(drifts[e])));
@@ -155,7 +154,6 @@ static void unusable_channels(void)
 {
     for (int kind = 0; kind < 3; ++kind) {
         for (int project = 0; project < 2; ++project) {
-            bench b;
             eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1, project);
             const eits_fold pair = b.c.model.fold[2], other = b.c.model.fold[6],
                             single = b.c.model.fold[20];
@@ -176,9 +174,7 @@ static void unusable_channels(void)
             b.out[pair.second] = 1;
             check_stage(&b, 4);
             CHECK_EQUAL(ctx->projection.count, 2 + project);
-            eits_options o = *eits_get_options(ctx);
-            o.saturation_v = 5;
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHANGE_OPTIONS(ctx, o.saturation_v = 5);
             b.frame[0] = 5; /* at the limit counts as beyond it */
             b.frame[1] = R(-5.5);
             b.out[0] = b.out[1] = 1;
@@ -188,7 +184,6 @@ static void unusable_channels(void)
             b.frame[3] *= R(1.2);
             check_stage(&b, 0);
             CHECK_EQUAL(ctx->projection.count, project);
-            tear_down(&b);
         }
     }
 }
@@ -197,7 +192,6 @@ static void unusable_channels(void)
 static void changing_masks(void)
 {
     for (int kind = 0; kind < 3; ++kind) {
-        bench b;
         eits_context *ctx = set_up(&b, (eits_data_kind)kind, -1.5, 1);
         uint64_t state = 41;
         eits_real good[SMALL_ROWS];
@@ -213,7 +207,6 @@ static void changing_masks(void)
             if (expected <= eits_get_options(ctx)->max_masked)
                 check_stage(&b, expected);
         }
-        tear_down(&b);
     }
 }
 
@@ -221,7 +214,6 @@ static void changing_masks(void)
  * minimises over them. */
 static void left_out_is_minimised_over(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 0);
     const uint32_t k = 5, first = b.c.model.fold[k].first, second = b.c.model.fold[k].second;
     double *v0 = dense_copy(b.reference, SMALL_ROWS), y[RANK], y_with[RANK];
@@ -247,17 +239,13 @@ static void left_out_is_minimised_over(void)
     CHECK(fabs(a) > 1);
     CHECK_NEAR(dense_greatest_difference(y, seen[0], RANK), 0, 60 * EPS);
     free(v0);
-    tear_down(&b);
 }
 
 /* So many rows left out that no direction is left: nothing is seen, not the rounding of nothing. */
 static void nothing_left(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
-    eits_options o = *eits_get_options(ctx);
-    o.max_masked = SMALL_ROWS;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_masked = SMALL_ROWS);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         const eits_fold fold = b.c.model.fold[k];
         b.frame[fold.first] = R(NAN);
@@ -272,18 +260,14 @@ static void nothing_left(void)
                   eits_get_info(ctx)->stop == EITS_STOP_ZERO && eits_get_info(ctx)->nonzeros == 0);
     }
     CHECK_EQUAL(eits_get_info(ctx)->masked, SMALL_ROWS);
-    tear_down(&b);
 }
 
 static void refused_frames_clear_the_image(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
-    eits_options o = *eits_get_options(ctx);
     eits_real image[SIDE * SIDE], again[SIDE * SIDE], good[SMALL_ROWS];
     eits_info info;
-    o.max_masked = 3;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_masked = 3);
     memcpy(good, b.frame, sizeof good);
     static const eits_status expected[] = {EITS_E_FRAME_CHANNELS, EITS_E_FRAME_LENGTH,
                                            EITS_E_FRAME_LENGTH,   EITS_E_FRAME_LENGTH,
@@ -328,12 +312,10 @@ static void refused_frames_clear_the_image(void)
     CHECK_EQUAL(eits_frame_stage(ctx, NULL, SMALL_ROWS, &masked, &macs), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_frame_stage(ctx, good, SMALL_ROWS, NULL, &macs), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_frame_stage(ctx, good, SMALL_ROWS, &masked, NULL), EITS_E_ARGUMENT);
-    tear_down(&b);
 }
 
 static void masked_rows(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
     eits_real image[SIDE * SIDE], again[SIDE * SIDE];
     CHECK_EQUAL(eits_mask_row(NULL, 0, 1), EITS_E_ARGUMENT);
@@ -347,7 +329,6 @@ static void masked_rows(void)
     CHECK_EQUAL(eits_mask_row(ctx, SMALL_ROWS - 1, 0), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, again, NULL), EITS_OK);
     CHECK(eits_get_info(ctx)->masked == 0 && memcmp(image, again, sizeof image) == 0);
-    tear_down(&b);
 }
 
 /* A row that was left out while the reference was taken has none: it stays out until the next
@@ -355,7 +336,6 @@ static void masked_rows(void)
 static void row_without_reference(void)
 {
     for (int learned = 0; learned < 2; ++learned) {
-        bench b;
         eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
         CHECK_EQUAL(eits_mask_row(ctx, 9, 1), EITS_OK);
         b.out[9] = 1;
@@ -374,7 +354,6 @@ static void row_without_reference(void)
         CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         b.out[9] = 0;
         check_stage(&b, 0);
-        tear_down(&b);
     }
 }
 
@@ -382,7 +361,6 @@ static void row_without_reference(void)
 static void ratios_at_their_limits(void)
 {
     for (int kind = EITS_DATA_NORMALISED; kind <= EITS_DATA_LOG_RATIO; ++kind) {
-        bench b;
         eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1, 0);
         const uint32_t row = b.c.model.fold[20].first;
         b.reference[row] = R(1e-8);
@@ -390,9 +368,7 @@ static void ratios_at_their_limits(void)
         b.out[row] = 1; /* left out as if masked, though not counted as unusable */
         check_stage(&b, 0);
         CHECK_EQUAL(ctx->projection.count, 1);
-        tear_down(&b);
     }
-    bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_LOG_RATIO, 1, 0);
     const uint32_t row = b.c.model.fold[20].first;
     static const double factors[] = {16, 17, 1e6, -1, 0, 1.0 / 16, 1.0 / 17};
@@ -405,7 +381,6 @@ static void ratios_at_their_limits(void)
                    (double)ctx->reference.gain * (double)b.reference[row] * log(ratios[f]),
                    20 * EPS);
     }
-    tear_down(&b);
 }
 
 /* Directions of rows left out that nearly agree are orthogonal all the same. */
@@ -451,7 +426,6 @@ static void directions_that_nearly_agree(void)
 static void reciprocals_that_agree(void)
 {
     for (int kind = 0; kind < 2; ++kind) {
-        bench b;
         eits_context *ctx = set_up(&b, (eits_data_kind)kind, 2, 0);
         const eits_fold fold = b.c.model.fold[4]; /* sign 1 */
         uint32_t masked;
@@ -466,7 +440,6 @@ static void reciprocals_that_agree(void)
             CHECK((ctx->frame.reciprocity_error[4] == 0) == (step < 3));
             CHECK(ctx->frame.reciprocity_error[5] != 0);
         }
-        tear_down(&b);
     }
 }
 
@@ -484,5 +457,6 @@ int main(void)
     ratios_at_their_limits();
     directions_that_nearly_agree();
     reciprocals_that_agree();
+    tear_down(&b);
     return checks_report("frame");
 }

@@ -15,6 +15,8 @@ typedef struct bench {
     eits_event told[KEPT];
 } bench;
 
+static bench b;
+
 static void begin(bench *b)
 {
     b->now_us = 0xFFFF0000u; /* the clock wraps on the way */
@@ -115,7 +117,6 @@ static const eits_event *last(const bench *b, eits_event_kind kind)
 
 static void a_tap_is_told_in_the_first_frame_without_it(void)
 {
-    bench b;
     begin(&b);
     none(&b, 2);
     finger(&b, 7, 10, -20, 0, 0, 5);
@@ -133,7 +134,6 @@ static void a_tap_is_told_in_the_first_frame_without_it(void)
 
 static void two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first(void)
 {
-    bench b;
     begin(&b);
     b.now_us = 10000000; /* what counts is the time between them */
     for (uint32_t k = 1; k <= 3; ++k) {
@@ -156,7 +156,6 @@ static void two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first(void)
 
 static void a_long_press_is_a_hold_once_and_no_tap(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 5, 5, 0, 0, 24);
     CHECK_EQUAL(once(&b, EITS_EVENT_HOLD), 0);
@@ -175,7 +174,6 @@ static void a_long_press_is_a_hold_once_and_no_tap(void)
 static void a_swipe_says_where_it_goes(void)
 {
     for (int side = 0; side < 8; ++side) {
-        bench b;
         const double angle = 3.14159265358979 * side / 4;
         begin(&b);
         finger(&b, 1, 0, 0, 6 * cos(angle), 6 * sin(angle), 10);
@@ -189,7 +187,6 @@ static void a_swipe_says_where_it_goes(void)
 
 static void what_ends_at_rest_or_comes_back_is_no_swipe(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 0, 0, 6, 0, 10);
     finger(&b, 1, 54, 0, 0, 0, 6);
@@ -213,7 +210,6 @@ static void what_ends_at_rest_or_comes_back_is_no_swipe(void)
 
 static void two_fingers_pinch_and_the_end_says_by_how_much(void)
 {
-    bench b;
     begin(&b);
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 20);
     CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_BEGIN), 1);
@@ -232,7 +228,6 @@ static void two_fingers_pinch_and_the_end_says_by_how_much(void)
 
 static void a_pinch_that_opens_again_becomes_a_spread(void)
 {
-    bench b;
     begin(&b);
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 16);
     fingers(&b, (double[]){-20, 0, 20, 0}, (double[]){-2, 0, 2, 0}, 16);
@@ -253,7 +248,6 @@ static void a_pinch_that_opens_again_becomes_a_spread(void)
 static void two_fingers_turn_either_way(void)
 {
     for (int way = -1; way <= 1; way += 2) {
-        bench b;
         begin(&b);
         for (int k = 0; k < 40; ++k) {
             const double angle = 3.0 + way * 0.08 * k;
@@ -271,7 +265,6 @@ static void two_fingers_turn_either_way(void)
 
 static void fingers_that_rest_or_are_three_do_nothing_together(void)
 {
-    bench b;
     begin(&b);
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){0, 0, 0, 0}, 40);
     none(&b, 3);
@@ -292,7 +285,6 @@ static void fingers_that_rest_or_are_three_do_nothing_together(void)
 
 static void a_scan_that_a_finger_lands_in_invents_nothing(void)
 {
-    bench b;
     begin(&b);
     const eits_touch two[] = {touch(1, -8, 3), touch(2, -37, -9)};
     frame(&b, two, 2);
@@ -305,7 +297,6 @@ static void a_scan_that_a_finger_lands_in_invents_nothing(void)
 
 static void a_scan_that_a_finger_lifts_in_does_not_move_it(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 40, 59, 0, 0, 12);
     eits_touch going = touch(1, 28, 50);
@@ -327,7 +318,6 @@ static void a_scan_that_a_finger_lifts_in_does_not_move_it(void)
 
 static void a_lighter_press_is_followed_on(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 0, 0, 0, 0, 4);
     for (int k = 0; k < 12; ++k) {
@@ -342,7 +332,6 @@ static void a_lighter_press_is_followed_on(void)
 
 static void a_held_touch_and_a_lost_frame_do_not_end_a_hold(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 5, 5, 0, 0, 8);
     eits_touch held = touch(1, 9, 9);
@@ -362,7 +351,6 @@ static void a_held_touch_and_a_lost_frame_do_not_end_a_hold(void)
 
 static void a_tap_that_is_found_again_is_told_once(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 5, 5, 0, 0, 4);
     none(&b, 1);
@@ -380,7 +368,6 @@ static void a_tap_that_is_found_again_is_told_once(void)
 
 static void another_id_is_the_same_finger(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 0, 0, 6, 0, 5);
     finger(&b, 9, 30, 0, 6, 0, 5);
@@ -401,7 +388,6 @@ static void another_id_is_the_same_finger(void)
 
 static void half_of_a_touch_is_no_finger_until_it_has_lasted(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 0, 0, 0, 0, 6);
     const eits_touch split[] = {touch(1, -6, 0), touch(2, 8, 0)};
@@ -428,7 +414,6 @@ static void half_of_a_touch_is_no_finger_until_it_has_lasted(void)
 /* The tracker calls what it lands as by another id, a while later. */
 static void a_landing_that_is_renamed_holds_where_it_rests(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 20, 57, 0, 0, 1);
     const eits_touch both[] = {touch(1, 14, 62), touch(2, 12, 44)};
@@ -450,7 +435,6 @@ static void a_landing_that_is_renamed_holds_where_it_rests(void)
 
 static void a_swipe_of_two_frames_counts_the_one_it_lifts_in(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 0, 0, 10, 0, 2);
     eits_touch going = touch(1, 32, 0);
@@ -477,7 +461,6 @@ static void a_swipe_of_two_frames_counts_the_one_it_lifts_in(void)
 
 static void fingers_that_merge_end_their_pinch(void)
 {
-    bench b;
     begin(&b);
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 20);
     finger(&b, 1, 0, 0, 0, 0, 10);
@@ -488,7 +471,6 @@ static void fingers_that_merge_end_their_pinch(void)
 
 static void a_pair_that_is_not_found_for_a_frame_goes_on(void)
 {
-    bench b;
     begin(&b);
     b.g.options.lost_us = 30000;
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 12);
@@ -502,7 +484,6 @@ static void a_pair_that_is_not_found_for_a_frame_goes_on(void)
 
 static void events_without_room_are_counted(void)
 {
-    bench b;
     eits_event few[2];
     uint32_t told;
     eits_touch many[EITS_MAX_TOUCHES];
@@ -522,7 +503,6 @@ static void events_without_room_are_counted(void)
 
 static void more_fingers_than_can_be_followed_are_counted(void)
 {
-    bench b;
     eits_touch many[EITS_MAX_TOUCHES];
     begin(&b);
     b.g.options.lost_us = 500000;
@@ -541,7 +521,6 @@ static void more_fingers_than_can_be_followed_are_counted(void)
 
 static void the_place_of_what_lifted_first_is_taken(void)
 {
-    bench b;
     eits_touch many[EITS_MAX_TOUCHES];
     begin(&b);
     b.g.options.rejoin_us = 500000;
@@ -558,7 +537,6 @@ static void the_place_of_what_lifted_first_is_taken(void)
 
 static void what_is_no_number_is_passed_over(void)
 {
-    bench b;
     begin(&b);
     for (int k = 0; k < 6; ++k) {
         eits_touch bad[] = {touch(1, NAN, 0),   touch(2, 0, INFINITY), touch(3, 1e30, 0),
@@ -584,7 +562,6 @@ static void what_is_no_number_is_passed_over(void)
 
 static void time_that_stands_goes_back_or_leaps(void)
 {
-    bench b;
     begin(&b);
     finger(&b, 1, 0, 0, 0, 0, 4);
     b.now_us -= FRAME_US; /* the same frame again */
@@ -604,7 +581,6 @@ static void time_that_stands_goes_back_or_leaps(void)
 
 static void wrong_arguments_are_refused(void)
 {
-    bench b;
     eits_event events[1];
     eits_gesture_options options;
     uint32_t told;

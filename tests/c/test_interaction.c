@@ -16,6 +16,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+static dense_bench b;
+
 enum { RANK = 16, SIDE = 12, L = SMALL_ELECTRODES };
 static const double PIXEL = 6, PI = 3.14159265358979323846;
 static const small_spec WITH_FIELDS = {.rank = RANK, .side = SIDE, .fields = 1};
@@ -26,10 +28,7 @@ static const eits_disc THREE[] = {
 static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out, eits_real *frame)
 {
     eits_context *ctx = dense_bench_open(b, spec, 0);
-    eits_options o = *eits_get_options(ctx);
-    o.project_reference = 0;
-    o.max_masked = SMALL_ROWS;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.project_reference = 0, o.max_masked = SMALL_ROWS);
     uint64_t state = 3;
     uint32_t masked;
     uint64_t macs;
@@ -149,7 +148,6 @@ static double size_of(const double *a)
 static void as_computed_densely(void)
 {
     for (int left_out = -1; left_out < 12; left_out += 4) {
-        dense_bench b;
         eits_real frame[SMALL_ROWS];
         double added[RANK], expected[RANK];
         uint64_t macs;
@@ -164,7 +162,6 @@ static void as_computed_densely(void)
                                4 * EPS * fabs((double)ctx->frame.y[i]));
         }
         CHECK(left_out < 0 || ctx->frame.sides[left_out] == EITS_SIDE_NONE);
-        dense_bench_close(&b);
     }
 }
 
@@ -172,7 +169,6 @@ static void as_computed_densely(void)
  * use, two norms. */
 static void work_is_counted(void)
 {
-    dense_bench b;
     eits_real frame[SMALL_ROWS], field[SMALL_FIELDS_STRIDE];
     double added[RANK];
     uint64_t macs, expected = 0;
@@ -183,13 +179,12 @@ static void work_is_counted(void)
     interplay(ctx, THREE, 3, added, &macs);
     CHECK_EQUAL(macs,
                 expected + 3 * (2 * 4 * L + 3 * SMALL_FOLDED) + SMALL_FOLDED * RANK + 2 * RANK);
-    dense_bench_close(&b);
 }
 
 /* Driven and measured pairs exchanged: the same datum, to what halves make of the mirror. */
 static void reciprocals_give_the_same(void)
 {
-    dense_bench b, turned;
+    dense_bench b = {0}, turned = {0};
     eits_real frame[SMALL_ROWS];
     double added[RANK], other[RANK];
     uint64_t macs;
@@ -221,7 +216,6 @@ static void reciprocals_give_the_same(void)
  * nothing at all in one place. */
 static void distance_and_overlap(void)
 {
-    dense_bench b;
     eits_real frame[SMALL_ROWS];
     double near[RANK], added[RANK];
     uint64_t macs;
@@ -254,7 +248,6 @@ static void distance_and_overlap(void)
     interplay(ctx, two, 2, added, &macs);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(added[i], 0, tolerance); /* the mirror 65504 mm away */
-    dense_bench_close(&b);
 }
 
 /* Whether the data stay as they are, bit for bit. */
@@ -267,7 +260,6 @@ static int left_alone(eits_context *ctx, const eits_disc *disc, uint32_t count)
 
 static void when_it_is_left_alone(void)
 {
-    dense_bench b;
     eits_real frame[SMALL_ROWS];
     eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
     CHECK(eits_has_interaction(ctx) && !left_alone(ctx, THREE, 2));
@@ -285,11 +277,8 @@ static void when_it_is_left_alone(void)
     CHECK(!left_alone(ctx, strong, 2));
     strong[0].change *= R(1.02);
     CHECK(left_alone(ctx, strong, 2));
-    eits_options o = *eits_get_options(ctx);
-    o.touch_fit = EITS_TOUCH_FIT_LOG_DATA | EITS_TOUCH_FIT_SPLIT_MERGE;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_fit = EITS_TOUCH_FIT_LOG_DATA | EITS_TOUCH_FIT_SPLIT_MERGE);
     CHECK(!eits_has_interaction(ctx) && left_alone(ctx, THREE, 2));
-    dense_bench_close(&b);
     static const small_spec others[] = {
         {.rank = RANK, .side = SIDE},
         {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO},
@@ -299,7 +288,6 @@ static void when_it_is_left_alone(void)
         /* differences need no fields */
         CHECK(!eits_has_interaction(ctx) && left_alone(ctx, THREE, 3) &&
               ctx->frame.has_y_log == (k == 0));
-        dense_bench_close(&b);
     }
     /* fields of three discs and one more do not fit into the factor of rank 9: 9 x 16 numbers hold
      * six of 24 */
@@ -313,7 +301,6 @@ static void when_it_is_left_alone(void)
     ctx = open_bench(&b, low, -1, frame);
     CHECK(!left_alone(ctx, many, 5));
     CHECK(left_alone(ctx, many, 6));
-    dense_bench_close(&b);
 }
 
 /* The linear data of a model of differences are the data of the same matrices' model of log
@@ -321,7 +308,7 @@ static void when_it_is_left_alone(void)
 static void log_data(void)
 {
     for (int left_out = -1; left_out < 9; left_out += 3) {
-        dense_bench b, log_bench;
+        dense_bench b = {0}, log_bench = {0};
         eits_real frame[SMALL_ROWS];
         eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out, frame);
         const small_spec spec = {
@@ -333,9 +320,7 @@ static void log_data(void)
         uint32_t masked;
         uint64_t with = 0, without = 0;
         CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &with), EITS_OK);
-        eits_options o = *eits_get_options(ctx);
-        o.touch_fit = EITS_TOUCH_FIT_SPLIT_MERGE | EITS_TOUCH_FIT_INTERACTION;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.touch_fit = EITS_TOUCH_FIT_SPLIT_MERGE | EITS_TOUCH_FIT_INTERACTION);
         CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &without), EITS_OK);
         CHECK_EQUAL(ctx->frame.has_y_log, 0);
         const uint32_t folds = SMALL_FOLDED - (left_out >= 0);
@@ -349,7 +334,6 @@ static void log_data(void)
  */
 static void log_data_without_a_ratio(void)
 {
-    dense_bench b;
     eits_real frame[SMALL_ROWS], y[RANK];
     uint32_t masked;
     uint64_t macs;
@@ -359,15 +343,12 @@ static void log_data_without_a_ratio(void)
     const eits_fold fold = b.c.model.fold[3];
     ctx->reference.v0[fold.first] = ctx->reference.v0[fold.second] = 0;
     frame[fold.first] = frame[fold.second] = R(0.01);
-    eits_options o = *eits_get_options(ctx);
-    o.diagnostics = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.diagnostics = 0);
     CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
     eits_copy(y, ctx->frame.y, RANK);
     CHECK(eits_dot(ctx->kernels, y, y, RANK) > 0);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->frame.y_log[i], y[i], 4 * EPS * fabs((double)y[i]));
-    dense_bench_close(&b);
 }
 
 int main(void)
@@ -379,5 +360,6 @@ int main(void)
     when_it_is_left_alone();
     log_data();
     log_data_without_a_ratio();
+    dense_bench_close(&b);
     return checks_report("coupling");
 }

@@ -16,6 +16,8 @@ enum { SIDE = 7, N = SIDE * SIDE, RANK = 12, SOLVERS = 4 };
 
 typedef dense_bench bench;
 
+static bench b;
+
 static eits_context *set_up(bench *b)
 {
     return dense_bench_open(b, (small_spec){.rank = RANK, .side = SIDE}, 0);
@@ -83,7 +85,6 @@ static void every_limit_holds(void)
     for (int solver = 0; solver < SOLVERS; ++solver) {
         for (int warm = 0; warm < 2; ++warm) {
             for (int gap = 0; gap < 2; ++gap) {
-                bench b;
                 eits_context *ctx = set_up(&b);
                 const way w = {(eits_solver)solver, warm ? EITS_SIGN_INCREASE : EITS_SIGN_BOTH,
                                warm, gap ? 1e-6 : 0};
@@ -105,7 +106,6 @@ static void every_limit_holds(void)
                 const eits_info enough = solve(ctx, w, (uint32_t)(2 * free_run.macs));
                 CHECK(enough.macs == free_run.macs && enough.gap == free_run.gap &&
                       enough.stop == free_run.stop);
-                dense_bench_close(&b);
             }
         }
     }
@@ -116,7 +116,6 @@ static void every_limit_holds(void)
 static void to_the_last_mac(void)
 {
     for (int solver = 0; solver < 2; ++solver) {
-        bench b;
         eits_context *ctx = set_up(&b);
         const way w = {(eits_solver)solver, EITS_SIGN_INCREASE, 0, 0};
         const eits_info free_run = solve(ctx, w, 0);
@@ -124,15 +123,13 @@ static void to_the_last_mac(void)
         const eits_info less = solve(ctx, w, (uint32_t)free_run.macs - 1);
         CHECK_EQUAL(less.stop, EITS_STOP_MACS);
         CHECK_EQUAL(less.iterations, free_run.iterations - 1);
-        dense_bench_close(&b);
     }
 }
 
 /* A step that is too long starts over from zero: the limit holds there too. */
 static void beside_step_halvings(void)
 {
-    bench b;
-    memset(&b, 0, sizeof b);
+    dense_bench_close(&b);
     b.made =
         small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 1.0 / 16});
     small_context_open(&b.c, &b.made, 0);
@@ -148,7 +145,6 @@ static void beside_step_halvings(void)
                   info.stop == EITS_STOP_ITERATIONS);
         }
     }
-    dense_bench_close(&b);
 }
 
 /* A frame's own multiply-accumulates are always spent; what is left of the limit is the solver's:
@@ -156,7 +152,6 @@ static void beside_step_halvings(void)
 static void of_a_whole_frame(int masked)
 {
     for (int solver = 0; solver < SOLVERS; ++solver) {
-        bench b;
         const small_spec spec = {
             .rank = RANK, .side = SIDE, .shape = masked ? SMALL_WHITENED : SMALL_RANDOM};
         eits_context *ctx = dense_bench_open(&b, spec, 0);
@@ -173,17 +168,13 @@ static void of_a_whole_frame(int masked)
         }
         uint64_t min = 0;
         for (uint32_t limit = 1; limit < 20000; limit += 1 + limit / 50) {
-            eits_options o = *eits_get_options(ctx);
-            o.solver = (eits_solver)solver;
-            o.mac_limit = limit;
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.mac_limit = limit);
             eits_info info;
             CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, &info), EITS_OK);
             min = limit == 2 ? info.macs : min; /* the first frame also builds the basis */
             CHECK(limit <= 2 || info.macs <= (limit > min ? limit : min));
         }
         CHECK_EQUAL(ctx->whitening.form != EITS_WHITENING_STORED, masked);
-        dense_bench_close(&b);
     }
 }
 
@@ -194,5 +185,6 @@ int main(void)
     beside_step_halvings();
     of_a_whole_frame(0);
     of_a_whole_frame(1);
+    dense_bench_close(&b);
     return checks_report("mac limit");
 }

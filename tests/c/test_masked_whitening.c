@@ -72,7 +72,6 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
  * map. */
 static void the_reduction_without_those_rows(double noise)
 {
-    bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
     CHECK(ctx->whitening.possible);
     (void)stage(&b);
@@ -103,7 +102,6 @@ static void the_reduction_without_those_rows(double noise)
         for (int i = 0; i < RANK; ++i)
             CHECK_NEAR(pulled[i], right[i], bound);
     }
-    dense_bench_close(&b.b);
 }
 
 /* White noise on the rows that are left, in the correlations: that with all rows and the
@@ -111,7 +109,6 @@ static void the_reduction_without_those_rows(double noise)
  */
 static void noise_in_the_correlations(double noise)
 {
-    bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
     double all = 0;
     ctx->reference.lambda_noise = R(3.0);
@@ -133,7 +130,6 @@ static void noise_in_the_correlations(double noise)
         /* it has 8 probes */
         CHECK_NEAR(eits_lambda_noise(ctx), expected, (noise > 0 ? 0.06 : 0.04) * expected);
     }
-    dense_bench_close(&b.b);
 }
 
 static void solvers_solve_the_seen_problem(void)
@@ -143,7 +139,6 @@ static void solvers_solve_the_seen_problem(void)
             small_spec spec = WHITENED;
             spec.storage = (eits_storage)storage;
             spec.lipschitz_factor = 1.0001;
-            bench b;
             eits_context *ctx = set_up(&b, spec, storage % 2);
             for (uint32_t k = 0; k < 7; ++k)
                 leave_out(&b, 3 * k % 20);
@@ -151,7 +146,6 @@ static void solvers_solve_the_seen_problem(void)
             CHECK(ctx->whitening.form);
             CHECK_EQUAL(ctx->projection.count, storage % 2);
             solve_what_is_seen(&b, sign);
-            dense_bench_close(&b.b);
         }
     }
 }
@@ -162,7 +156,7 @@ static void solvers_solve_the_seen_problem(void)
 static void until_nothing_is_left(void)
 {
     for (int project = 0; project < 2; ++project) {
-        bench b, fresh;
+        bench b = {0}, fresh = {0};
         eits_context *ctx = set_up(&b, WHITENED, project);
         eits_real whole[N], image[N], good[SMALL_ROWS], norm = 0;
         memcpy(good, b.frame, sizeof good);
@@ -199,7 +193,6 @@ static void until_nothing_is_left(void)
 /* The values of rows left out are nothing to the answer, and drift of the gain is still ignored. */
 static void rows_out_do_not_count(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, WHITENED, 1);
     eits_real seen[2][STRIDE];
     for (int round = 0; round < 2; ++round) {
@@ -221,7 +214,6 @@ static void rows_out_do_not_count(void)
     (void)stage(&b);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->frame.y[i], 0, 200 * EPS);
-    dense_bench_close(&b.b);
 }
 
 static void scale(uint8_t *at, double factor)
@@ -235,8 +227,7 @@ static void scale(uint8_t *at, double factor)
  * whitened (factor 0): whether frames with rows left out are whitened again. */
 static uint32_t can_whiten_masked_with(double factor, eits_real first_of_whitening[RANK])
 {
-    bench b;
-    memset(&b, 0, sizeof b);
+    bench b = {0};
     b.b.made = small_model_make(WHITENED);
     uint8_t *p = small_model_section(&b.b.made, "REDU", NULL),
             *form = small_model_section(&b.b.made, "WHIT", NULL);
@@ -283,11 +274,9 @@ static void models_of_another_form(void)
     CHECK(memcmp(plain, scaled, sizeof plain) == 0);
     CHECK(can_whiten_masked_with(1 / 1099511627776.0, scaled));
     CHECK(memcmp(plain, scaled, sizeof plain) == 0);
-    bench b;
     small_spec other = WHITENED;
     other.shape = SMALL_RANDOM;
     CHECK(!set_up(&b, other, 0)->whitening.possible);
-    dense_bench_close(&b.b);
     other.shape = SMALL_IDENTITY; /* whitened with no regularisation at all */
     eits_context *ctx = set_up(&b, other, 0);
     CHECK(ctx->whitening.possible && ctx->whitening.mu == 0);
@@ -296,7 +285,6 @@ static void models_of_another_form(void)
     CHECK(ctx->whitening.form);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->frame.y[i], i == 1 ? 0 : sqrt(MARGIN) * (double)ctx->frame.d[i], 1e-4);
-    dense_bench_close(&b.b);
 }
 
 int main(void)
@@ -310,5 +298,6 @@ int main(void)
     until_nothing_is_left();
     rows_out_do_not_count();
     models_of_another_form();
+    dense_bench_close(&b.b);
     return checks_report("observed");
 }

@@ -53,9 +53,7 @@ static void touches_are_finite_whatever_the_units(void)
 
 static void look_for_nothing(eits_context *ctx)
 {
-    eits_options o = *eits_get_options(ctx);
-    o.diagnostics = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.diagnostics = 0);
 }
 
 /* Six reference frames, the first `first` times the model's volts, the others `others` times; the

@@ -6,13 +6,11 @@
 static void a_clean_frame_has_no_diagnostics(void)
 {
     for (int known = 0; known < 2; ++known) {
-        bench b;
         eits_context *ctx = set_up(&b, known);
         reconstruct(&b);
         CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
         CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
         CHECK(ctx->reference.outliers == 0 && (ctx->reference.noise_v > 0) == known);
-        tear_down(&b);
     }
 }
 
@@ -22,7 +20,6 @@ static void one_outlier_is_left_out(void)
 {
     for (int known = 0; known < 2; ++known) {
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
-            bench b;
             eits_context *ctx = set_up(&b, known);
             const eits_fold fold = b.c.model.fold[k];
             CHECK(!ctx->range.known);
@@ -40,7 +37,6 @@ static void one_outlier_is_left_out(void)
             look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_OUTLIER);
             reconstruct(&b);
             CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
-            tear_down(&b);
         }
     }
 }
@@ -49,7 +45,6 @@ static void one_outlier_is_left_out(void)
  * share none are no network's. */
 static void many_outliers(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -71,14 +66,12 @@ static void many_outliers(void)
     reconstruct(&b);
     CHECK((eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0 &&
           eits_get_info(ctx)->masked == 0);
-    tear_down(&b);
 }
 
 /* One reading of any of the reference frames: left out, and the reference is as without it. */
 static void an_outlier_in_the_reference(void)
 {
     for (int at = 0; at < UNTOUCHED; ++at) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
         const eits_real noise = ctx->reference.noise_v, lambda_noise = ctx->reference.lambda_noise;
         const uint32_t row = at % 3 ? b.c.model.fold[at].second : b.c.model.fold[at].first;
@@ -101,14 +94,12 @@ static void an_outlier_in_the_reference(void)
             CHECK_EQUAL(eits_reference_add(ctx, b.untouched[k], SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
         CHECK(ctx->reference.outliers == 0 && ctx->reference.noise_v > 5 * noise);
-        tear_down(&b);
     }
 }
 
 /* More readings of a reference frame than outliers are: it counts as it is. */
 static void reference_frame_of_another_kind(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     for (uint32_t count = 1; count <= EITS_OUTLIER_MAX + 1; ++count) {
         b.untouched[5][b.c.model.fold[count].first] += R(0.5);
@@ -119,7 +110,6 @@ static void reference_frame_of_another_kind(void)
         CHECK_EQUAL(ctx->reference.outliers, count <= EITS_OUTLIER_MAX ? count : 0);
         CHECK((ctx->reference.noise_v < R(2e-3)) == (count <= EITS_OUTLIER_MAX));
     }
-    tear_down(&b);
 }
 
 static void medians(void)
@@ -144,7 +134,6 @@ static void medians(void)
 
 static void options_and_names(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 0);
     eits_options o = *eits_get_options(ctx);
     CHECK_EQUAL(o.diagnostics, EITS_DIAGNOSTICS_ALL);
@@ -157,7 +146,6 @@ static void options_and_names(void)
     }
     CHECK_EQUAL(all, EITS_DIAGNOSTICS_ALL);
     CHECK(strcmp(eits_diagnostic_text((eits_diagnostic)0), "unknown diagnostic") == 0);
-    tear_down(&b);
 }
 
 int main(void)
@@ -169,5 +157,6 @@ int main(void)
     reference_frame_of_another_kind();
     medians();
     options_and_names();
+    tear_down(&b);
     return checks_report("diagnostics");
 }

@@ -38,6 +38,14 @@ typedef struct bench {
     int half; /* second rows are copies */
 } bench;
 
+static bench b;
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 static void shape_reduction(small_model *made)
 {
     uint8_t *p = small_model_section(made, "REDU", NULL);
@@ -108,6 +116,7 @@ enum { PLAIN, PAIR, CROSSED };
 
 static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kind kind)
 {
+    tear_down(b);
     memset(b, 0, sizeof *b);
     b->made = small_model_make(
         (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind});
@@ -124,10 +133,7 @@ static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kin
         if (fold.second != EITS_FOLD_NONE)
             b->reference[fold.second] = (eits_real)fold.sign;
     }
-    eits_options o = *eits_get_options(ctx);
-    o.project_reference = 0;
-    o.max_masked = SMALL_ROWS;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.project_reference = 0, o.max_masked = SMALL_ROWS);
     CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
     for (int k = 0; k < UNTOUCHED; ++k) {
         clean_frame(b, 0);
@@ -143,18 +149,9 @@ static eits_context *set_up(bench *b, int half)
     return open_shaped(b, PLAIN, half, EITS_DATA_DIFFERENCE);
 }
 
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 static void look_for(eits_context *ctx, uint32_t diagnostics, uint32_t max_masked)
 {
-    eits_options o = *eits_get_options(ctx);
-    o.diagnostics = diagnostics;
-    o.max_masked = max_masked;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.diagnostics = diagnostics, o.max_masked = max_masked);
 }
 
 /* What was wrong with the rows themselves; the small model's touches are nothing to tell crowds by.
@@ -176,11 +173,8 @@ static void spoil(bench *b, uint32_t k, double off)
 static void clean_half_scans(void)
 {
     for (int project = 0; project < 2; ++project) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
-        eits_options o = *eits_get_options(ctx);
-        o.project_reference = (uint32_t)project;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.project_reference = (uint32_t)project);
         CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         for (int k = 0; k < 40; ++k) {
             clean_frame(&b, k % 2 ? 0.15 : 0.001);
@@ -188,7 +182,6 @@ static void clean_half_scans(void)
             CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
             CHECK(eits_get_info(ctx)->model_mismatch < EITS_MISMATCH_FRACTION || k % 2 == 0);
         }
-        tear_down(&b);
     }
 }
 
@@ -197,7 +190,6 @@ static void clean_half_scans(void)
 static void one_outlier_of_a_half_scan(void)
 {
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
-        bench b;
         eits_context *ctx = set_up(&b, 1);
         const eits_fold fold = b.c.model.fold[k];
         const uint32_t rows = fold.second == EITS_FOLD_NONE ? 1 : 2;
@@ -207,7 +199,6 @@ static void one_outlier_of_a_half_scan(void)
         const uint32_t found = reconstruct(&b);
         if (k == 15 || k == 18) { /* what no other says anything about may be so */
             CHECK(found == 0 && eits_get_info(ctx)->masked == 0);
-            tear_down(&b);
             continue;
         }
         CHECK_EQUAL(found, EITS_DIAGNOSTIC_OUTLIER);
@@ -233,7 +224,6 @@ static void one_outlier_of_a_half_scan(void)
             CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
         CHECK_EQUAL(reconstruct(&b), 0);
         CHECK(memcmp(data, ctx->frame.y, sizeof data) == 0);
-        tear_down(&b);
     }
 }
 
@@ -241,7 +231,6 @@ static void one_outlier_of_a_half_scan(void)
  * bear each other out. */
 static void mismatches_that_are_no_outlier(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     clean_frame(&b, 0.15);
     for (uint32_t k = 0; k < 9; k += 3)
@@ -271,7 +260,6 @@ static void mismatches_that_are_no_outlier(void)
     spoil(&b, 3, -1.1);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
     CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
-    tear_down(&b);
     ctx = set_up(&b, 0);
     clean_frame(&b, 0.15);
     const eits_fold fold = b.c.model.fold[5];
@@ -279,13 +267,11 @@ static void mismatches_that_are_no_outlier(void)
     b.frame[fold.second] += (eits_real)fold.sign * R(0.6);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
     CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
-    tear_down(&b);
 }
 
 /* How far the gain drifted is no news; an outlier beside it is. */
 static void drift_is_no_mismatch(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 0);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) { /* a reference that the model cannot give */
         const eits_fold fold = b.c.model.fold[k];
@@ -300,9 +286,7 @@ static void drift_is_no_mismatch(void)
     }
     CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
     for (int project = 0; project < 2; ++project) {
-        eits_options o = *eits_get_options(ctx);
-        o.project_reference = (uint32_t)project;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.project_reference = (uint32_t)project);
         clean_frame(&b, 0.02);
         CHECK_EQUAL(reconstruct(&b), 0);
         for (int i = 0; i < SMALL_ROWS; ++i)
@@ -314,7 +298,6 @@ static void drift_is_no_mismatch(void)
         b.frame[fold.second] += (eits_real)fold.sign * R(0.05);
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
     }
-    tear_down(&b);
 }
 
 /* Of a fold whose sides differ, the side that the others bear out stays. */
@@ -322,7 +305,6 @@ static void the_wrong_side_goes(void)
 {
     for (int kind = 0; kind < 3; ++kind) {
         for (uint32_t k = 0; k < SMALL_PAIRS; ++k) {
-            bench b;
             eits_context *ctx = open_shaped(&b, PLAIN, 0, (eits_data_kind)kind);
             const eits_fold fold = b.c.model.fold[k];
             for (int side = 0; side < 2; ++side) {
@@ -335,7 +317,6 @@ static void the_wrong_side_goes(void)
                 CHECK_EQUAL(ctx->rows.unusable[right], block_of(k) < BLOCKS ? 0 : EITS_ROW_OUTLIER);
                 CHECK_EQUAL(eits_get_info(ctx)->outliers, block_of(k) < BLOCKS ? 1 : 2);
             }
-            tear_down(&b);
         }
     }
 }
@@ -343,7 +324,6 @@ static void the_wrong_side_goes(void)
 /* Two wrong of three that agree: the third tells. With one fold left out nothing tells. */
 static void several_wrong_sides(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 0);
     for (uint32_t count = 1; count <= EITS_OUTLIER_MAX; ++count) {
         clean_frame(&b, 0.15);
@@ -363,7 +343,6 @@ static void several_wrong_sides(void)
     b.frame[b.c.model.fold[2].first] *= R(1.5);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
     CHECK_EQUAL(eits_get_info(ctx)->outliers, 2);
-    tear_down(&b);
 }
 
 /* The thresholds, from both sides: noise, the fraction of the largest datum, the fraction of their
@@ -377,7 +356,6 @@ static void what_sides_may_differ_by(void)
     } CASES[] = {{0, 6e-4, 0, 1},   {0, 3e-4, 0, 0},   {0, 0.02, 0.5, 1},   {0, 0.01, 0.5, 0},
                  {0.3, 0.12, 0, 1}, {0.3, 0.08, 0, 0}, {-0.3, -0.08, 0, 0}, {-0.3, -0.12, 0, 1}};
     for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
-        bench b;
         eits_context *ctx = set_up(&b, 0);
         CHECK(ctx->reference.noise_v > R(4e-5) && ctx->reference.noise_v < R(7e-5));
         look_for(ctx, EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);
@@ -393,7 +371,6 @@ static void what_sides_may_differ_by(void)
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] += ctx->reference.v0[i] - b.reference[i];
         CHECK_EQUAL(reconstruct(&b), CASES[n].found ? EITS_DIAGNOSTIC_OUTLIER : 0);
-        tear_down(&b);
     }
 }
 
@@ -416,7 +393,6 @@ static int uses_either(const eits_context *ctx, uint32_t i)
 static void noisy_channel(void)
 {
     for (int crossed = 0; crossed < 2; ++crossed) {
-        bench b;
         eits_context *ctx = open_shaped(&b, crossed ? CROSSED : PAIR, 0, EITS_DATA_DIFFERENCE);
         clean_frame(&b, 0.02);
         for (uint32_t k = 0; k < PAIR_FOLDS; ++k) {
@@ -432,7 +408,6 @@ static void noisy_channel(void)
             count += (uint32_t)left;
         }
         CHECK(count >= PAIR_FOLDS && eits_get_info(ctx)->masked == count);
-        tear_down(&b);
     }
 }
 
@@ -446,5 +421,6 @@ int main(void)
     several_wrong_sides();
     what_sides_may_differ_by();
     noisy_channel();
+    tear_down(&b);
     return checks_report("unpaired");
 }

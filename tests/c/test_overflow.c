@@ -19,8 +19,17 @@ typedef struct bench {
     eits_real frame[SMALL_ROWS];
 } bench;
 
+static bench b;
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 static void make(bench *b, uint32_t rank)
 {
+    tear_down(b);
     memset(b, 0, sizeof *b);
     b->made = small_model_make((small_spec){.rank = rank, .side = SIDE});
 }
@@ -30,12 +39,6 @@ static eits_context *open_made(bench *b)
     small_model_seal(&b->made);
     small_context_open(&b->c, &b->made, 0);
     return b->c.ctx;
-}
-
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
 }
 
 /* Every number of VREF. */
@@ -50,7 +53,6 @@ static void set_v_ref(bench *b, float value)
  * `measured` volts. */
 static void reference(float volts, double measured, eits_status expected)
 {
-    bench b;
     make(&b, 12);
     set_v_ref(&b, volts);
     eits_context *ctx = open_made(&b);
@@ -60,7 +62,6 @@ static void reference(float volts, double measured, eits_status expected)
     CHECK_EQUAL(ctx->reference.ready, expected == EITS_OK);
     CHECK(expected != EITS_OK ||
           (isfinite((double)ctx->reference.gain) && ctx->reference.gain != 0));
-    tear_down(&b);
 }
 
 static void references_out_of_proportion_never_give_nan(void)
@@ -99,7 +100,6 @@ static void check_cleared(const eits_context *ctx)
 static void correlations_that_overflow_never_give_nan(void)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        bench b;
         make(&b, 12);
         set_columns(&b, 12, 1e36f, 1e36f);
         eits_context *ctx = open_made(&b);
@@ -111,7 +111,6 @@ static void correlations_that_overflow_never_give_nan(void)
                                     eits_get_info(ctx)->lambda_max == 0));
         if (sizeof(eits_real) == 4)
             check_cleared(ctx);
-        tear_down(&b);
     }
 }
 
@@ -121,7 +120,6 @@ static void correlations_that_overflow_never_give_nan(void)
  * factor gives where the data are great. */
 static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_limit)
 {
-    bench b;
     make(&b, MAX_RANK);
     set_columns(&b, MAX_RANK, 3.75e-23f, 2.6e-23f);
     /* the least that a model may state */
@@ -129,18 +127,12 @@ static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_l
     eits_context *ctx = open_made(&b);
     for (int i = 0; i < MAX_RANK; ++i)
         ctx->frame.y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
-    eits_options o = *eits_get_options(ctx);
-    o.solver = solver;
-    o.sign = EITS_SIGN_BOTH;
-    o.lambda_rel = R(0.01);
-    o.iterations = 50;
-    o.mac_limit = mac_limit;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.solver = solver, o.sign = EITS_SIGN_BOTH, o.lambda_rel = R(0.01),
+                   o.iterations = 50, o.mac_limit = mac_limit);
     CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     const eits_info info = *eits_get_info(ctx);
     if (sizeof(eits_real) == 4)
         check_cleared(ctx);
-    tear_down(&b);
     return info;
 }
 
@@ -167,5 +159,6 @@ int main(void)
     references_out_of_proportion_never_give_nan();
     correlations_that_overflow_never_give_nan();
     columns_whose_squares_vanish_never_give_nan();
+    tear_down(&b);
     return checks_report("overflow");
 }

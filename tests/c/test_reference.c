@@ -17,17 +17,20 @@ typedef struct bench {
     eits_real frame[SMALL_ROWS];
 } bench;
 
-static eits_context *set_up(bench *b)
-{
-    b->made = small_model_make((small_spec){.rank = 12, .side = 4});
-    small_context_open(&b->c, &b->made, 0);
-    return b->c.ctx;
-}
+static bench b;
 
 static void tear_down(bench *b)
 {
     small_context_close(&b->c);
     small_model_free(&b->made);
+}
+
+static eits_context *set_up(bench *b)
+{
+    tear_down(b);
+    b->made = small_model_make((small_spec){.rank = 12, .side = 4});
+    small_context_open(&b->c, &b->made, 0);
+    return b->c.ctx;
 }
 
 /* Frames around `gain` times the model's reference: relative noise `noise`, each channel with an
@@ -43,7 +46,6 @@ static void reference_frame(bench *b, double gain, double noise, uint64_t *state
 
 static void gain_and_correlation(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b);
     static const double gains[] = {1, 2.5, -0.75, 1e-6, -1e6};
     for (size_t g = 0; g < sizeof gains / sizeof gains[0]; ++g) {
@@ -75,12 +77,10 @@ static void gain_and_correlation(void)
     CHECK_NEAR(ctx->reference.correlation, vr / sqrt(vv * rr), 20 * EPS);
     CHECK_NEAR(ctx->reference.gain, copysign(sqrt(rr / vv), vr), 20 * EPS * sqrt(rr / vv));
     CHECK_NEAR(ctx->reference.v0_rms, sqrt(vv / SMALL_FOLDED), 20 * EPS);
-    tear_down(&b);
 }
 
 static void refused_frames(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b);
     small_reference(&b.c.model, 1, b.frame);
     CHECK_EQUAL(eits_reference_set(NULL, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
@@ -102,9 +102,7 @@ static void refused_frames(void)
     CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     CHECK_NEAR(ctx->reference.gain, 1, 8 * EPS);
     CHECK_EQUAL(eits_mask_row(ctx, 7, 0), EITS_OK);
-    eits_options o = *eits_get_options(ctx);
-    o.saturation_v = R(1.2);
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.saturation_v = R(1.2));
     small_reference(&b.c.model, 1, b.frame); /* its greatest number is above 1.2 */
     CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
     small_reference(&b.c.model, -1, b.frame);
@@ -113,13 +111,11 @@ static void refused_frames(void)
     CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     b.frame[3] = R(-1.2); /* at the limit counts as beyond it */
     CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
-    tear_down(&b);
 }
 
 /* A reference that cannot be one leaves the old one in force, to the bit. */
 static void all_zero_keeps_the_old(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b);
     eits_real frame[SMALL_ROWS], wrong[SMALL_ROWS] = {0}, before[16], after[16], v0[SMALL_ROWS];
     uint64_t state = 8;
@@ -150,12 +146,10 @@ static void all_zero_keeps_the_old(void)
         CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, after, NULL), EITS_OK);
         CHECK(memcmp(before, after, sizeof before) == 0);
     }
-    tear_down(&b);
 }
 
 static void order_of_learning(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b);
     uint64_t state = 9;
     reference_frame(&b, 1, 1e-3, &state);
@@ -203,21 +197,17 @@ static void order_of_learning(void)
     CHECK_EQUAL(eits_reference_add(ctx, zero, SMALL_ROWS), EITS_E_FRAME_ZERO);
     CHECK_EQUAL(eits_reference_finish(ctx), EITS_E_REFERENCE_SHORT);
     CHECK(!ctx->reference.ready);
-    tear_down(&b);
 }
 
 /* Mean, noise and lambda_noise against two passes in double. Row 11 is masked, and both rows of the
  * first fold. */
 static void learned_numbers(int project)
 {
-    bench b;
     eits_context *ctx = set_up(&b);
     dense d = dense_of(&b.c.model);
     static eits_real frames[UNTOUCHED][SMALL_ROWS];
-    eits_options o = *eits_get_options(ctx);
     uint64_t state = 10;
-    o.project_reference = (uint32_t)project;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.project_reference = (uint32_t)project);
     const eits_fold whole = b.c.model.fold[0];
     const uint32_t masked[3] = {11, whole.first, whole.second};
     for (int k = 0; k < 3; ++k)
@@ -277,7 +267,6 @@ static void learned_numbers(int project)
     CHECK_NEAR(ctx->reference.gain, gain, 1e-3);
     CHECK_EQUAL(ctx->reference.count, UNTOUCHED);
     dense_free(&d);
-    tear_down(&b);
 }
 
 /* A row masked in any of the reference frames has no reference, and does not disturb the others'
@@ -287,7 +276,6 @@ static void masked_while_learning(void)
 {
     double noise[2];
     for (int masked = 0; masked < 2; ++masked) {
-        bench b;
         eits_context *ctx = set_up(&b);
         uint64_t state = 33;
         CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
@@ -308,7 +296,6 @@ static void masked_while_learning(void)
         CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
-        tear_down(&b);
     }
     CHECK(noise[0] > 1e-4 && noise[0] != noise[1]);
     CHECK_NEAR(noise[1], noise[0], 0.05 * noise[0]);
@@ -317,12 +304,9 @@ static void masked_while_learning(void)
 /* References that say nothing of the model, and masks that leave nothing of the reference. */
 static void nothing_to_compare(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b);
     uint64_t state = 34;
-    eits_options o = *eits_get_options(ctx);
-    o.max_masked = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_masked = 0);
     CHECK_EQUAL(eits_mask_row(ctx, 2, 1), EITS_OK);
     CHECK_EQUAL(eits_reference_begin(ctx, 4), EITS_OK);
     /* the second half runs the frame stage, which allows no masked row */
@@ -332,8 +316,7 @@ static void nothing_to_compare(void)
                     k < 2 ? EITS_OK : EITS_E_FRAME_CHANNELS);
     }
     CHECK_EQUAL(ctx->reference.count, 2);
-    o.max_masked = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_masked = 1);
     for (int k = 0; k < 2; ++k)
         CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
@@ -344,7 +327,6 @@ static void nothing_to_compare(void)
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         CHECK_EQUAL(eits_mask_row(ctx, i, 0), EITS_OK);
     CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
-    tear_down(&b);
     /* a model that is zero on all rows but one fold's */
     small_model made = small_model_make((small_spec){.rank = 12, .side = 4});
     for (uint32_t k = 1; k < SMALL_FOLDED; ++k)
@@ -367,7 +349,6 @@ static void nothing_to_compare(void)
 /* Offsets far above the noise do not drown it (Welford). */
 static void noise_on_a_large_offset(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b);
     uint64_t state = 21;
     double squares = 0;
@@ -389,7 +370,6 @@ static void noise_on_a_large_offset(void)
     }
     const double noise = sqrt(squares / (SMALL_ROWS * 63.0));
     CHECK_NEAR(ctx->reference.noise_v, noise, BOTH_WIDTHS(0.02, 1e-9) * noise);
-    tear_down(&b);
 }
 
 int main(void)
@@ -403,5 +383,6 @@ int main(void)
     masked_while_learning();
     nothing_to_compare();
     noise_on_a_large_offset();
+    tear_down(&b);
     return checks_report("reference");
 }

@@ -10,9 +10,7 @@ static const double FACTOR = 5, MAX = 1;
 
 static void choose_factor(eits_context *ctx, double factor)
 {
-    eits_options o = *eits_get_options(ctx);
-    o.regularisation_noise_factor = (eits_real)factor;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.regularisation_noise_factor = (eits_real)factor);
 }
 
 /* D_i of the formula; the strongest direction's is 1. */
@@ -30,7 +28,6 @@ static void the_formula(void)
     for (size_t n = 0; n < sizeof noises / sizeof noises[0]; ++n) {
         /* P and S are stored as float */
         const double mu = fmin(FACTOR * noises[n], MAX), bound = BOTH_WIDTHS(1e-5, 1e-6);
-        bench b;
         eits_context *ctx = set_up(&b, WHITENED, 0);
         (void)stage(&b);
         double *stored = dense_copy(ctx->frame.y, RANK);
@@ -55,7 +52,6 @@ static void the_formula(void)
         for (int i = 0; i < RANK; ++i)
             CHECK_NEAR(ctx->frame.y[i], weight(i, mu) * stored[i], bound * fabs(stored[i]));
         free(stored);
-        dense_bench_close(&b.b);
     }
 }
 
@@ -63,7 +59,6 @@ static void the_formula(void)
  * |y|^2. */
 static void noise_through_it(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
     const double stored = (double)ctx->whitening.energy;
     double energy = 0, sum = 0, whole = 0;
@@ -82,7 +77,6 @@ static void noise_through_it(void)
     leave_out(&b, 3);
     (void)stage(&b);
     CHECK_NEAR(ctx->whitening.energy, stored, 0);
-    dense_bench_close(&b.b);
 }
 
 static void solvers_solve_the_seen_problem(void)
@@ -92,14 +86,12 @@ static void solvers_solve_the_seen_problem(void)
             small_spec spec = WHITENED;
             spec.storage = (eits_storage)storage;
             spec.lipschitz_factor = 1.0002; /* the small model finds it from below */
-            bench b;
             eits_context *ctx = set_up(&b, spec, storage % 2);
             pretend_noise(ctx, storage < 2 ? 0.02 : 0.1);
             (void)stage(&b);
             CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_DIAGONAL);
             CHECK_EQUAL(ctx->projection.count, storage % 2);
             solve_what_is_seen(&b, sign);
-            dense_bench_close(&b.b);
         }
     }
 }
@@ -113,7 +105,7 @@ static void reconstruct(bench *b, eits_real image[N])
  * than there is; raised ones are the same from all kernels, and go with the option. */
 static void only_where_asked_for(void)
 {
-    bench b, other;
+    bench b = {0}, other = {0};
     eits_real plain[N], image[N], raised[N];
     eits_context *ctx = set_up(&b, WHITENED, 1);
     reconstruct(&b, plain);
@@ -160,7 +152,6 @@ static void only_where_asked_for(void)
  * regularisation gets one. */
 static void models_of_other_forms(void)
 {
-    bench b;
     small_spec spec = WHITENED;
     spec.shape = SMALL_RANDOM;
     eits_context *ctx = set_up(&b, spec, 0);
@@ -168,7 +159,6 @@ static void models_of_other_forms(void)
     (void)stage(&b);
     reconstruct(&b, NULL);
     CHECK(!ctx->whitening.form && eits_get_info(ctx)->regularisation == 0);
-    dense_bench_close(&b.b);
     spec.shape =
         SMALL_IDENTITY; /* whitened with no regularisation at all; all directions are alike */
     ctx = set_up(&b, spec, 0);
@@ -184,7 +174,6 @@ static void models_of_other_forms(void)
     reconstruct(&b, NULL);
     CHECK(!ctx->whitening.form && ctx->whitening.noise_ratio == 1 &&
           eits_get_info(ctx)->regularisation == 0);
-    dense_bench_close(&b.b);
 }
 
 /* The reference frames' own noise raises the regularisation for the second half of them already,
@@ -192,7 +181,6 @@ static void models_of_other_forms(void)
 static void learned_with_it(void)
 {
     enum { UNTOUCHED = 4 };
-    bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
     eits_real untouched[UNTOUCHED][SMALL_ROWS], mean[SMALL_ROWS];
     uint64_t state = 5;
@@ -223,7 +211,6 @@ static void learned_with_it(void)
     CHECK_NEAR(learned, max / (double)ctx->whitening.noise_ratio, 1e-4 * learned);
     CHECK(ctx->whitening.noise_ratio < R(0.8));
     free(back);
-    dense_bench_close(&b.b);
 }
 
 int main(void)
@@ -234,5 +221,6 @@ int main(void)
     only_where_asked_for();
     models_of_other_forms();
     learned_with_it();
+    dense_bench_close(&b.b);
     return checks_report("floor");
 }

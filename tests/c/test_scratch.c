@@ -59,11 +59,7 @@ static eits_context *set_up(bench *b, small_spec spec, int noise_known, eits_sol
     eits_context *ctx = b->c.ctx;
     uint64_t state = 5;
     eits_real frame[SMALL_ROWS], v[SMALL_ROWS];
-    eits_options o = *eits_get_options(ctx);
-    o.solver = solver;
-    o.warm_start = 1;
-    o.max_masked = SMALL_ROWS;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.solver = solver, o.warm_start = 1, o.max_masked = SMALL_ROWS);
     small_reference(&b->c.model, 1, frame);
     if (!noise_known) {
         CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);

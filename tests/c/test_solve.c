@@ -21,10 +21,20 @@ typedef struct bench {
     double y[16];
 } bench;
 
+static bench b;
+
+static void tear_down(bench *b)
+{
+    dense_free(&b->d);
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 /* A context of this model, with random y in [-1, 1). */
 static eits_context *set_up(bench *b, small_spec spec, int prepared)
 {
     uint64_t state = 51;
+    tear_down(b);
     memset(b, 0, sizeof *b);
     b->made = small_model_make(spec);
     small_context_open(&b->c, &b->made, prepared);
@@ -36,23 +46,12 @@ static eits_context *set_up(bench *b, small_spec spec, int prepared)
     return b->c.ctx;
 }
 
-static void tear_down(bench *b)
-{
-    dense_free(&b->d);
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
 
 /* Solve with these settings; other options at their defaults. */
 static eits_info solve(eits_context *ctx, uint32_t iterations, eits_sign sign, double lambda)
 {
-    eits_options o = *eits_get_options(ctx);
-    o.iterations = iterations;
-    o.sign = sign;
-    o.lambda_abs = (eits_real)lambda;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.iterations = iterations, o.sign = sign, o.lambda_abs = (eits_real)lambda);
     CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     return *eits_get_info(ctx);
 }
@@ -62,7 +61,6 @@ static void identity_gives_the_soft_threshold(void)
     const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 1};
     for (int sign = 0; sign < 3; ++sign) {
         for (uint32_t iterations = 1; iterations <= 41; iterations += 40) {
-            bench b;
             eits_context *ctx = set_up(&b, spec, 0);
             const eits_info info = solve(ctx, iterations, (eits_sign)sign, 0.25);
             uint32_t nonzeros = 0;
@@ -84,7 +82,6 @@ static void identity_gives_the_soft_threshold(void)
             CHECK_NEAR(info.data_norm, sqrt(dense_dot(b.y, b.y, 16)), 8 * EPS);
             CHECK_NEAR(info.gap, 0, 8 * EPS);
             CHECK_NEAR(info.lambda, 0.25, 0);
-            tear_down(&b);
         }
     }
 }
@@ -97,7 +94,6 @@ static void same_as_the_textbook(void)
             for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
                 const small_spec spec = {
                     .rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
-                bench b;
                 eits_context *ctx = set_up(&b, spec, (int)(k % 2));
                 double x[N] = {0}, largest = 0;
                 const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
@@ -113,7 +109,6 @@ static void same_as_the_textbook(void)
                           eits_get_coefficients(ctx)[j] * (eits_real)b.c.model.column_weight[j]);
                 CHECK_EQUAL(info.iterations, counts[k]); /* exactly so many */
                 CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
-                tear_down(&b);
             }
         }
     }
@@ -127,7 +122,6 @@ static void same_bits_in_every_layout(void)
         eits_info first_info = {0};
         for (int way = 0; way < 4; ++way) {
             const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
-            bench b;
             eits_context *ctx = set_up(&b, spec, way % 2);
             CHECK((ctx->columns.panels != NULL) == (way % 2 == 1));
             CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
@@ -139,7 +133,6 @@ static void same_bits_in_every_layout(void)
             CHECK(memcmp(first, eits_get_image(ctx), sizeof first) == 0);
             CHECK(info.gap == first_info.gap && info.residual == first_info.residual &&
                   info.macs == first_info.macs);
-            tear_down(&b);
         }
     }
 }
@@ -147,7 +140,6 @@ static void same_bits_in_every_layout(void)
 static void optimum_has_its_marks(void)
 {
     for (int sign = 0; sign < 3; ++sign) {
-        bench b;
         eits_context *ctx = set_up(&b, RANDOM, 1);
         eits_options o = *eits_get_options(ctx);
         o.gap_rel = R(BOTH_WIDTHS(1e-6, 1e-12));
@@ -179,7 +171,6 @@ static void optimum_has_its_marks(void)
         }
         CHECK(slack < 0.1 * lambda && on >= 3 && off >= 10);
         free(x);
-        tear_down(&b);
     }
 }
 
@@ -189,7 +180,6 @@ static void gap_bounds_the_suboptimality(void)
     for (int sign = 0; sign < 3; ++sign) {
         double before = 1e9;
         for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
-            bench b;
             eits_context *ctx = set_up(&b, RANDOM, 0);
             const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
             double *x = dense_copy(eits_get_coefficients(ctx), N), best_x[N] = {0}, r[RANK];
@@ -208,19 +198,14 @@ static void gap_bounds_the_suboptimality(void)
             CHECK(counts[k] < 4 || gap < before);
             before = gap;
             free(x);
-            tear_down(&b);
         }
     }
 }
 
 static void stopping_by_the_gap(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM, 0);
-    eits_options o = *eits_get_options(ctx);
-    o.gap_rel = R(1e-3);
-    o.gap_every = 7;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.gap_rel = R(1e-3), o.gap_every = 7);
     eits_info info = solve(ctx, 100000, EITS_SIGN_INCREASE, 0.05);
     CHECK_EQUAL(info.stop, EITS_STOP_GAP);
     CHECK(info.gap_rel <= R(1e-3) && info.gap_rel > 0);
@@ -232,18 +217,14 @@ static void stopping_by_the_gap(void)
           info.gap_rel > R(1e-3));
     info = solve(ctx, 5, EITS_SIGN_INCREASE, 0.05);
     CHECK(info.stop == EITS_STOP_ITERATIONS && info.iterations == 5 && info.gap_rel > 0);
-    o.gap_rel = R(0.9);
-    o.gap_every = 1000;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.gap_rel = R(0.9), o.gap_every = 1000);
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.05); /* the last iteration is always checked */
     CHECK(info.stop == EITS_STOP_GAP && info.iterations == 3);
-    tear_down(&b);
 }
 
 static void zero_is_the_optimum(void)
 {
     for (int sign = 0; sign < 3; ++sign) {
-        bench b;
         eits_context *ctx = set_up(&b, RANDOM, 0);
         double c[N], greatest = 0;
         dense_correlate(&b.d, b.y, c);
@@ -263,28 +244,23 @@ static void zero_is_the_optimum(void)
         /* lambda just at lambda_max */
         info = solve(ctx, 20, (eits_sign)sign, (double)info.lambda_max);
         CHECK_EQUAL(info.stop, EITS_STOP_ZERO);
-        tear_down(&b);
     }
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM, 0);
     memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
     eits_info info = solve(ctx, 20, EITS_SIGN_BOTH, 0);
     CHECK(info.stop == EITS_STOP_ZERO && info.lambda_max == 0 && info.data_norm == 0);
-    tear_down(&b);
     const small_spec identity = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
     ctx = set_up(&b, identity, 0);
     for (int i = 0; i < 16; ++i)
         ctx->frame.y[i] = R(-1); /* nothing to be found above zero */
     info = solve(ctx, 20, EITS_SIGN_INCREASE, 0);
     CHECK(info.stop == EITS_STOP_ZERO && info.lambda_max == 0);
-    tear_down(&b);
 }
 
 /* Rows that are left out: the same as the dense problem with their directions taken out of S and y.
  */
 static void solving_beside_a_basis(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM, 1);
     eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
     uint64_t state = 52, macs;
@@ -315,7 +291,6 @@ static void solving_beside_a_basis(void)
     CHECK_NEAR(info.residual, sqrt(dense_dot(r, r, RANK)), 100 * EPS);
     free(basis);
     free(y);
-    tear_down(&b);
 }
 
 /* On the identity with one positive datum each iterate has one non-zero, so that each product can
@@ -323,7 +298,6 @@ static void solving_beside_a_basis(void)
 static void work_is_counted(void)
 {
     const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
-    bench b;
     eits_context *ctx = set_up(&b, spec, 0);
     const uint64_t whole = 16 * 16, column = 16;
     memset(ctx->frame.y, 0, 16 * sizeof *ctx->frame.y);
@@ -388,7 +362,6 @@ static void work_is_counted(void)
     CHECK_EQUAL(info.nonzeros, 1);
     CHECK_EQUAL(info.macs, whole + triangle + 2 * (whole + 2 * triangle) + 3 * column +
                                (whole + 2 * triangle));
-    tear_down(&b);
 }
 
 int main(void)
@@ -402,5 +375,6 @@ int main(void)
     zero_is_the_optimum();
     solving_beside_a_basis();
     work_is_counted();
+    tear_down(&b);
     return checks_report("solve");
 }

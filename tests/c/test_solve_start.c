@@ -13,6 +13,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+static dense_bench b;
+
 enum { SIDE = 8, N = SIDE * SIDE, RANK = 16 };
 
 typedef dense_bench bench;
@@ -34,7 +36,6 @@ static eits_info solve(eits_context *ctx)
 /* After a halved step the iterations that are left are those from zero, with fresh momentum. */
 static void a_halved_step_starts_afresh(void)
 {
-    bench b;
     small_spec spec = RANDOM;
     spec.lipschitz_factor = 1.02 / 6;
     eits_context *ctx = dense_bench_open(&b, spec, 0);
@@ -54,7 +55,6 @@ static void a_halved_step_starts_afresh(void)
                 EITS_SIGN_INCREASE, x);
     CHECK(dense_greatest_difference(x, eits_get_coefficients(ctx), N) < 2000 * EPS);
     free(y), free(x);
-    dense_bench_close(&b);
 }
 
 /* The residual is small at the start, but the penalty is not: zero is the better start, to the bit.
@@ -62,7 +62,7 @@ static void a_halved_step_starts_afresh(void)
 static void a_start_worse_than_zero(void)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        bench warm, cold;
+        bench warm = {0}, cold = {0};
         eits_context *ctx = dense_bench_open(&warm, RANDOM, 0),
                      *other = dense_bench_open(&cold, RANDOM, 0);
         small_new_data(ctx, 92);
@@ -102,12 +102,8 @@ static eits_context *open_warm(bench *b, int solver)
     eits_real frame[SMALL_ROWS];
     small_reference(&b->c.model, 1, frame);
     CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
-    eits_options o = *eits_get_options(ctx);
-    o.solver = (eits_solver)solver;
-    o.warm_start = 1;
-    o.iterations = 4;
-    o.sign = EITS_SIGN_BOTH;
-    set_options(ctx, o);
+    CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.warm_start = 1, o.iterations = 4,
+                   o.sign = EITS_SIGN_BOTH);
     return ctx;
 }
 
@@ -115,7 +111,7 @@ static eits_context *open_warm(bench *b, int solver)
 static void touches_leave_no_trace(void)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        bench seen, unseen;
+        bench seen = {0}, unseen = {0};
         eits_context *ctx = open_warm(&seen, solver), *other = open_warm(&unseen, solver);
         for (uint32_t k = 0; k < 12; ++k) {
             eits_real frame[SMALL_ROWS];
@@ -139,7 +135,7 @@ static void touches_leave_no_trace(void)
 static void cold_after_nothing(void)
 {
     for (int why = 0; why < 3; ++why) {
-        bench b, fresh;
+        bench b = {0}, fresh = {0};
         eits_context *ctx = open_warm(&b, EITS_SOLVER_WORKING_SET),
                      *other = open_warm(&fresh, EITS_SOLVER_WORKING_SET);
         eits_real frame[SMALL_ROWS], nothing[SMALL_ROWS];
@@ -175,16 +171,11 @@ static void the_longest_intervals(void)
     static const uint32_t intervals[] = {1000, UINT32_MAX - 1, UINT32_MAX};
     uint64_t macs[3];
     for (int k = 0; k < 3; ++k) {
-        bench b;
         eits_context *ctx = dense_bench_open(&b, RANDOM, 0);
         small_new_data(ctx, 95);
-        eits_options o = *eits_get_options(ctx);
-        o.solver = EITS_SOLVER_WORKING_SET;
-        o.iterations = 100;
-        o.gap_every = intervals[k];
-        set_options(ctx, o);
+        CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_WORKING_SET, o.iterations = 100,
+                       o.gap_every = intervals[k]);
         macs[k] = solve(ctx).macs;
-        dense_bench_close(&b);
     }
     CHECK_EQUAL(macs[1], macs[0]);
     CHECK_EQUAL(macs[2], macs[0]);
@@ -195,14 +186,10 @@ static void the_longest_intervals(void)
 static void iterations_without_number(void)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        bench b;
         eits_context *ctx = dense_bench_open(&b, RANDOM, 1);
         small_new_data(ctx, 96);
-        eits_options o = *eits_get_options(ctx);
-        o.solver = (eits_solver)solver;
-        o.iterations = 100000;
-        o.lambda_rel = R(0.05);
-        set_options(ctx, o);
+        CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.iterations = 100000,
+                       o.lambda_rel = R(0.05));
         const eits_info info = solve(ctx);
         CHECK(solver < 2 ? info.stop == EITS_STOP_ITERATIONS && info.iterations == 100000
                          : info.stop == EITS_STOP_OPTIMUM);
@@ -211,7 +198,6 @@ static void iterations_without_number(void)
         for (int j = 0; j < N; ++j)
             CHECK(isfinite((double)eits_get_coefficients(ctx)[j]) &&
                   eits_get_coefficients(ctx)[j] >= 0);
-        dense_bench_close(&b);
     }
 }
 
@@ -221,7 +207,6 @@ static void steps_that_end_at_zero(void)
 {
     for (int factor = 40; factor < 50; factor += 3) {
         for (uint32_t every = 1; every < 6; ++every) {
-            dense_bench b;
             eits_context *ctx = dense_bench_open(&b,
                                                  (small_spec){.rank = 6,
                                                               .side = 4,
@@ -230,18 +215,12 @@ static void steps_that_end_at_zero(void)
                                                  0);
             for (uint32_t i = 0; i < 6; ++i)
                 ctx->frame.y[i] = (eits_real)(1 + 0.1 * i);
-            eits_options o = *eits_get_options(ctx);
-            o.solver = EITS_SOLVER_FISTA;
-            o.lambda_rel = R(0.1);
-            o.detection_factor = 0;
-            o.gap_every = every;
-            o.iterations = 60;
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_FISTA, o.lambda_rel = R(0.1),
+                           o.detection_factor = 0, o.gap_every = every, o.iterations = 60);
             CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
             CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_ITERATIONS);
             CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 6);
             CHECK(eits_get_info(ctx)->step_halvings > 0 && eits_get_info(ctx)->gap_rel < R(1e-3));
-            dense_bench_close(&b);
         }
     }
 }
@@ -255,5 +234,6 @@ int main(void)
     the_longest_intervals();
     iterations_without_number();
     steps_that_end_at_zero();
+    dense_bench_close(&b);
     return checks_report("starts");
 }

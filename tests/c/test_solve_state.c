@@ -17,6 +17,8 @@ enum { SIDE = 8, N = SIDE * SIDE, RANK = 16 };
 
 typedef dense_bench bench;
 
+static bench b;
+
 static eits_context *set_up(bench *b, small_spec spec)
 {
     return dense_bench_open(b, spec, 1);
@@ -51,7 +53,6 @@ static eits_info solve(eits_context *ctx)
 
 static void detection_threshold_and_lambda_rule(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM);
     fill_y(&b, 1, 0, 0);
     eits_options o = *eits_get_options(ctx);
@@ -89,21 +90,15 @@ static void detection_threshold_and_lambda_rule(void)
     ctx->reference.lambda_noise = (eits_real)(100 * top);
     /* no threshold, and lambda_abs does not look at the noise */
     CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS);
-    dense_bench_close(&b);
 }
 
 static void warm_start_saves_iterations(void)
 {
     uint32_t needed[2];
     for (uint32_t warm = 0; warm < 2; ++warm) {
-        bench b;
         eits_context *ctx = set_up(&b, RANDOM);
-        eits_options o = *eits_get_options(ctx);
-        o.gap_rel = R(1e-4);
-        o.gap_every = 1;
-        o.iterations = 100000;
-        o.warm_start = warm;
-        set_options(ctx, o);
+        CHANGE_OPTIONS(ctx, o.gap_rel = R(1e-4), o.gap_every = 1, o.iterations = 100000,
+                       o.warm_start = warm);
         fill_y(&b, 1, 0, 0);
         (void)solve(ctx);
         fill_y(&b, 1.01, 1e-3, 0); /* nearly the same frame */
@@ -111,7 +106,6 @@ static void warm_start_saves_iterations(void)
         CHECK_EQUAL(info.stop, EITS_STOP_GAP);
         CHECK(info.gap_rel <= R(1e-4));
         needed[warm] = info.iterations;
-        dense_bench_close(&b);
     }
     CHECK(needed[0] >= 10);
     CHECK(2 * needed[1] <= needed[0]);
@@ -121,12 +115,8 @@ static void warm_start_saves_iterations(void)
  * a cold start gives. */
 static void no_ghost_after_lift_off(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM);
-    eits_options o = *eits_get_options(ctx);
-    o.warm_start = 1;
-    o.iterations = 20;
-    set_options(ctx, o);
+    CHANGE_OPTIONS(ctx, o.warm_start = 1, o.iterations = 20);
     fill_y(&b, 1, 0, 0);
     double peak = 0;
     for (int k = 0; k < 5; ++k)
@@ -144,12 +134,10 @@ static void no_ghost_after_lift_off(void)
     for (int j = 0; j < N; ++j)
         CHECK(fabs(after[j]) < 0.1 * peak);
     free(after);
-    dense_bench_close(&b);
 }
 
 static void warm_start_is_forgotten(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM);
     eits_options o = *eits_get_options(ctx);
     eits_real cold[N], warm[N], reference[SMALL_ROWS];
@@ -181,7 +169,6 @@ static void warm_start_is_forgotten(void)
     (void)solve(ctx);
     CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
     eits_forget(NULL);
-    dense_bench_close(&b);
 }
 
 /* A stated Lipschitz constant that is too small: the step is halved until the objective falls. */
@@ -189,12 +176,9 @@ static void step_too_large(void)
 {
     static const double factors[] = {0.3, 0.125, 0.02};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
-        bench b;
         eits_context *ctx =
             set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
-        eits_options o = *eits_get_options(ctx);
-        o.iterations = 400;
-        set_options(ctx, o);
+        CHANGE_OPTIONS(ctx, o.iterations = 400);
         fill_y(&b, 1, 0.01, 0);
         const eits_info info = solve(ctx);
         CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
@@ -223,7 +207,6 @@ static void step_too_large(void)
         }
         free(y);
         free(x);
-        dense_bench_close(&b);
     }
 }
 
@@ -232,24 +215,19 @@ static void step_too_large(void)
 static void ending_above_the_start(void)
 {
     for (int k = 0; k < 4; ++k) {
-        bench b;
         const int above = k % 2;
         const double step = above ? 2.02 : 1.98, lambda = k < 2 ? 1e-4 : 0.5;
         eits_context *ctx = set_up(&b, (small_spec){.rank = RANK,
                                                     .side = 4,
                                                     .shape = SMALL_IDENTITY,
                                                     .lipschitz_factor = 1 / step});
-        eits_options o = *eits_get_options(ctx);
-        o.iterations = 1;
-        o.lambda_abs = (eits_real)lambda;
-        set_options(ctx, o);
+        CHANGE_OPTIONS(ctx, o.iterations = 1, o.lambda_abs = (eits_real)lambda);
         for (int i = 0; i < RANK; ++i)
             ctx->frame.y[i] = 1;
         const eits_info info = solve(ctx);
         CHECK_EQUAL(info.stop, above ? EITS_STOP_DIVERGED : EITS_STOP_ITERATIONS);
         CHECK_EQUAL(info.nonzeros, above ? 0 : RANK);
         CHECK_NEAR(eits_get_coefficients(ctx)[0], above ? 0 : 1.98 * (1 - lambda), 1e-5);
-        dense_bench_close(&b);
     }
 }
 
@@ -258,14 +236,9 @@ static void step_absurdly_large(void)
     static const double factors[] = {1e-4, 1e-12, 1e-36};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
         for (int sign = 0; sign < 3; ++sign) {
-            bench b;
             eits_context *ctx = set_up(
                 &b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
-            eits_options o = *eits_get_options(ctx);
-            o.iterations = 1000;
-            o.sign = (eits_sign)sign;
-            o.warm_start = 1;
-            set_options(ctx, o);
+            CHANGE_OPTIONS(ctx, o.iterations = 1000, o.sign = (eits_sign)sign, o.warm_start = 1);
             fill_y(&b, 1, 0.01, 0);
             for (int again = 0; again < 2; ++again) {
                 const eits_info info = solve(ctx);
@@ -279,14 +252,12 @@ static void step_absurdly_large(void)
                 CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
                 CHECK_EQUAL(count, 0);
             }
-            dense_bench_close(&b);
         }
     }
 }
 
 static void data_that_are_not_finite(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM);
     static const double wrong[] = {NAN, INFINITY, -INFINITY, BOTH_WIDTHS(1e30, 1e200)};
     CHECK_EQUAL(eits_solve(NULL, NULL), EITS_E_ARGUMENT);
@@ -301,9 +272,8 @@ static void data_that_are_not_finite(void)
         for (int j = 0; j < N; ++j)
             CHECK(eits_get_image(ctx)[j] == 0 && eits_get_coefficients(ctx)[j] == 0);
     }
-    dense_bench_close(&b);
     /* coefficients that are finite, an image that is not */
-    bench w;
+    bench w = {0};
     w.made = small_model_make(RANDOM);
     for (uint32_t j = 0; j < N; ++j)
         small_put_f32(small_model_section(&w.made, "COLW", NULL) + 4 * j, 3e38f);
@@ -327,7 +297,6 @@ static void units_do_not_matter(void)
     eits_info first_info = {0};
     double peak = 0;
     for (size_t u = 0; u < sizeof units / sizeof units[0]; ++u) {
-        bench b;
         eits_context *ctx = set_up(&b, RANDOM);
         uint64_t state = 71;
         small_reference(&b.c.model, 1, reference);
@@ -352,10 +321,8 @@ static void units_do_not_matter(void)
         CHECK_NEAR(eits_get_info(ctx)->lambda, first_info.lambda,
                    100 * EPS * (double)first_info.lambda);
         free(as_doubles);
-        dense_bench_close(&b);
     }
     /* and reduced data in other units give coefficients in them */
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM);
     fill_y(&b, 1, 0.01, 0);
     (void)solve(ctx);
@@ -369,7 +336,6 @@ static void units_do_not_matter(void)
             CHECK(eits_get_coefficients(ctx)[j] == first[j] * (eits_real)ldexp(1, power));
         CHECK(info.gap_rel > 0);
     }
-    dense_bench_close(&b);
 }
 
 int main(void)
@@ -383,5 +349,6 @@ int main(void)
     step_absurdly_large();
     data_that_are_not_finite();
     units_do_not_matter();
+    dense_bench_close(&b);
     return checks_report("solve_state");
 }

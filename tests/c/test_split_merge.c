@@ -16,6 +16,8 @@
 #include <math.h>
 #include <string.h>
 
+static dense_bench b;
+
 enum { SIDE = 20, RANK = 64 };
 static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
 static const small_spec WITH_FIELDS = {
@@ -76,7 +78,6 @@ static void check_residual(eits_context *ctx, const eits_fit *f)
 /* Wherever they stand among the others. */
 static void two_halves_become_one(int first)
 {
-    dense_bench b;
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc one = {3, -3, 9, R(0.05), 1}, far = {-39, 33, 9, R(0.05), 1};
     const eits_disc truth[2] = {one, far};
@@ -94,7 +95,6 @@ static void two_halves_become_one(int first)
     check_residual(ctx, &f);
     CHECK(f.macs > 0);
     CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
-    dense_bench_close(&b);
 }
 
 /* Tried or not, what is not joined stays as it was, bit for bit. */
@@ -102,7 +102,6 @@ static void two_touches_stay_two(void)
 {
     static const eits_real distances[] = {20, 24, 36};
     for (int d = 0; d < 3; ++d) {
-        dense_bench b;
         eits_context *ctx = dense_bench_open(&b, WAVES, 0);
         const eits_disc truth[2] = {{-distances[d] / 2, 3, 9, R(0.05), 1},
                                     {distances[d] / 2, 3, 9, R(0.04), 1}};
@@ -118,13 +117,11 @@ static void two_touches_stay_two(void)
             CHECK(f.disc[k].change == truth[k].change);
         }
         check_residual(ctx, &f);
-        dense_bench_close(&b);
     }
 }
 
 static void opposite_signs_are_never_one(void)
 {
-    dense_bench b;
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc truth[2] = {{-3, 3, 9, R(0.05), 1}, {3, 3, 9, R(-0.05), -1}};
     press(ctx, truth, 2);
@@ -132,14 +129,12 @@ static void opposite_signs_are_never_one(void)
     CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
     CHECK_EQUAL(f.count, 2);
     CHECK_EQUAL(f.macs, 0);
-    dense_bench_close(&b);
 }
 
 /* Nearest first: of three in a row whose outer ones are nearer to the middle than to each other,
  * one is left for one touch. */
 static void three_thirds_become_one(void)
 {
-    dense_bench b;
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc one = {3, 3, 12, R(0.05), 1};
     press(ctx, &one, 1);
@@ -150,7 +145,6 @@ static void three_thirds_become_one(void)
     CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 1);
     CHECK_EQUAL(f.count, 1);
     CHECK(has(&f, &one, 2));
-    dense_bench_close(&b);
 }
 
 static void one_disc_over_two_touches_becomes_two(void)
@@ -158,7 +152,6 @@ static void one_disc_over_two_touches_becomes_two(void)
     static const eits_real along[4][2] = {
         {1, 0}, {R(0.70711), R(0.70711)}, {0, 1}, {R(-0.70711), R(0.70711)}};
     for (int d = 0; d < 4; ++d) {
-        dense_bench b;
         eits_context *ctx = dense_bench_open(&b, WAVES, 0);
         eits_disc truth[3] = {
             {0, 0, 9, R(0.05), 1}, {0, 0, 9, R(0.05), 1}, {-42, -36, 9, R(0.05), 1}};
@@ -170,14 +163,11 @@ static void one_disc_over_two_touches_becomes_two(void)
         const eits_disc seen[2] = {truth[2], {4, 6, 14, R(0.04), 1}};
         eits_fit f = begin(ctx, seen, 2);
         eits_fit_move_all(ctx, &ctx->scratch, &f, 3);
-        eits_options o = *eits_get_options(ctx);
-        o.max_touches = 2;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.max_touches = 2);
         eits_fit full = f;
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &full), 0); /* no room for a third */
         CHECK_EQUAL(full.count, 2);
-        o.max_touches = 3;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.max_touches = 3);
         eits_fit_restart(ctx, &ctx->scratch, &f);
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 1);
         CHECK_EQUAL(f.count, 3);
@@ -185,14 +175,12 @@ static void one_disc_over_two_touches_becomes_two(void)
             CHECK(has(&f, &truth[k], 2.0));
         check_residual(ctx, &f);
         CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
-        dense_bench_close(&b);
     }
 }
 
 /* Two explain more than one, but little of what is left: that may as well be something else. */
 static void a_split_that_gains_little_is_undone(void)
 {
-    dense_bench b;
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc truth[2] = {{-10, 6, 9, R(0.05), 1}, {18, 6, 9, R(0.05), 1}},
                     one = {4, 6, 14, R(0.04), 1};
@@ -213,14 +201,12 @@ static void a_split_that_gains_little_is_undone(void)
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), !noisy);
         CHECK_EQUAL(f.count, noisy ? 1 : 2);
     }
-    dense_bench_close(&b);
 }
 
 static void one_large_touch_stays_one(void)
 {
     static const eits_real others[] = {0, R(0.01), R(0.05), R(0.2)};
     for (int rest = 0; rest < 4; ++rest) { /* whatever else is in the data */
-        dense_bench b;
         eits_context *ctx = dense_bench_open(&b, WAVES, 0);
         const eits_disc truth[2] = {{3, 5, 20, R(0.05), 1}, {-39, -33, 9, others[rest], 1}};
         press(ctx, truth, 2);
@@ -235,7 +221,6 @@ static void one_large_touch_stays_one(void)
         f.macs = 0;
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 0);
         CHECK_EQUAL(f.macs, 0);
-        dense_bench_close(&b);
     }
 }
 
@@ -244,9 +229,7 @@ static void one_large_touch_stays_one(void)
 static uint32_t found(eits_context *ctx, uint32_t bits, eits_touch *touch)
 {
     uint32_t count = 0;
-    eits_options o = *eits_get_options(ctx);
-    o.touch_fit = bits;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_fit = bits);
     CHECK_EQUAL(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count), EITS_OK);
     return count;
 }
@@ -254,7 +237,6 @@ static uint32_t found(eits_context *ctx, uint32_t bits, eits_touch *touch)
 /* Two touches that the image shows as one peak. */
 static void one_peak_two_touches(void)
 {
-    dense_bench b;
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc truth[2] = {{-13, 3, 9, R(0.05), 1}, {15, 3, 9, R(0.05), 1}};
@@ -269,11 +251,8 @@ static void one_peak_two_touches(void)
     ctx->frame.has_y_log = 1;
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL - EITS_TOUCH_FIT_SPLIT_MERGE, touch), 1);
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 2);
-    eits_options o = *eits_get_options(ctx);
-    o.max_touches = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_touches = 1);
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 1);
-    dense_bench_close(&b);
 }
 
 /* ---- the image solved again ---- */
@@ -297,7 +276,7 @@ static eits_context *open_pair(dense_bench *b, small_spec spec, uint32_t second_
 
 static void the_second_pass_solves_the_separate_data(void)
 {
-    dense_bench b, plain;
+    dense_bench b = {0}, plain = {0};
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0),
                  *other = open_pair(&plain, WITH_FIELDS, 0, 0);
@@ -347,23 +326,18 @@ static void when_there_is_no_second_pass(void)
                   0,
                   1}};
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
-        dense_bench b;
         eits_touch touch[EITS_MAX_TOUCHES];
         eits_context *ctx = open_pair(&b, cases[k].spec, 1, cases[k].mac_limit);
-        eits_options o = *eits_get_options(ctx);
-        o.max_touches = cases[k].touches;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.max_touches = cases[k].touches);
         const uint64_t macs = eits_get_info(ctx)->macs;
         CHECK_EQUAL(found(ctx, cases[k].bits, touch), cases[k].touches);
         CHECK_EQUAL(eits_get_info(ctx)->macs, macs);
-        dense_bench_close(&b);
     }
 }
 
 /* Data of which nothing comes: the frame's own image stays, and its data. */
 static void nothing_comes_of_it(void)
 {
-    dense_bench b;
     eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0);
     const eits_real nothing[RANK] = {0}, infinite[RANK] = {R(INFINITY)};
     eits_real image[SIDE * SIDE], y[RANK];
@@ -383,13 +357,11 @@ static void nothing_comes_of_it(void)
     eits_solve_again(ctx, &ctx->scratch, infinite);
     CHECK(memcmp(y, ctx->frame.y, sizeof y) == 0 &&
           memcmp(image, eits_get_image(ctx), sizeof image) == 0);
-    dense_bench_close(&b);
 }
 
 /* The batch's image is the one that eits_find_touches leaves. */
 static void images_of_a_batch(void)
 {
-    dense_bench b;
     eits_real frame[2][SMALL_ROWS], image[2][SIDE * SIDE];
     eits_touch touch[2][EITS_MAX_TOUCHES], alone[EITS_MAX_TOUCHES];
     eits_result result[2];
@@ -418,12 +390,10 @@ static void images_of_a_batch(void)
         CHECK(memcmp(image[k], eits_get_image(ctx), sizeof image[k]) == 0);
     }
     CHECK(after_second_pass > 0);
-    dense_bench_close(&b);
 }
 
 static void options_have_ranges(void)
 {
-    dense_bench b;
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     eits_options o;
     CHECK_EQUAL(eits_options_default(&b.c.model, &o), EITS_OK);
@@ -439,7 +409,6 @@ static void options_have_ranges(void)
     o.second_pass = 2;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_get_options(ctx)->second_pass, 1);
-    dense_bench_close(&b);
 }
 
 int main(void)
@@ -458,5 +427,6 @@ int main(void)
     nothing_comes_of_it();
     images_of_a_batch();
     options_have_ranges();
+    dense_bench_close(&b);
     return checks_report("regroup");
 }

@@ -22,24 +22,27 @@ typedef struct bench {
     uint32_t count;
 } bench;
 
-typedef struct finger {
-    double x, y, radius, change; /* mm, S/m */
-} finger;
-
-static eits_context *set_up(bench *b, eits_storage storage, int round)
-{
-    b->made = small_model_make((small_spec){
-        .rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .storage = storage, .round = round});
-    small_context_open(&b->c, &b->made, 1);
-    b->d = dense_of(&b->c.model);
-    return b->c.ctx;
-}
+static bench b;
 
 static void tear_down(bench *b)
 {
     dense_free(&b->d);
     small_context_close(&b->c);
     small_model_free(&b->made);
+}
+
+typedef struct finger {
+    double x, y, radius, change; /* mm, S/m */
+} finger;
+
+static eits_context *set_up(bench *b, eits_storage storage, int round)
+{
+    tear_down(b);
+    b->made = small_model_make((small_spec){
+        .rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .storage = storage, .round = round});
+    small_context_open(&b->c, &b->made, 1);
+    b->d = dense_of(&b->c.model);
+    return b->c.ctx;
 }
 
 /* y of these discs, pixels covered by area (12 x 12 points each), not by the core's own rule;
@@ -102,13 +105,9 @@ static void one_touch_anywhere(void)
 {
     uint64_t state = 92;
     for (int storage = 0; storage < 4; ++storage) {
-        bench b;
         eits_context *ctx = set_up(&b, (eits_storage)storage, 0);
-        eits_options o = *eits_get_options(ctx);
         /* the radius by the data: held at the seed's, it would bend the strength by some 5 % */
-        o.touch_radius_weight = R(1e-4);
-        o.touch_sweeps = 40;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.touch_radius_weight = R(1e-4), o.touch_sweeps = 40);
         double bias = 0;
         for (int round = 0; round < 15; ++round) {
             const finger f = {44 * small_random(&state), 44 * small_random(&state),
@@ -121,41 +120,33 @@ static void one_touch_anywhere(void)
             bias += t == NULL ? 1 : (double)t->strength_s_per_m_mm2 / strength(f) / 15;
         }
         CHECK_NEAR(bias, 1, 0.01); /* on average it is right */
-        tear_down(&b);
     }
 }
 
 static void both_signs(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger pair[2] = {{-25, 10, 9, 0.05}, {25, -12, 9, -0.03}};
-    eits_options o = *eits_get_options(ctx);
-    o.sign = EITS_SIGN_BOTH;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_BOTH);
     press(&b, pair, 2, 0);
     CHECK_EQUAL(b.count, 2);
     (void)check_found(&b, pair[0], 1, 0.05);
     (void)check_found(&b, pair[1], 1, 0.05);
     /* the strongest first, by size */
     CHECK(b.found[0].strength_s_per_m_mm2 > 0 && b.found[1].strength_s_per_m_mm2 < 0);
-    o.sign = EITS_SIGN_DECREASE;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_DECREASE);
     press(&b, pair + 1, 1, 0);
     CHECK_EQUAL(b.count, 1);
     (void)check_found(&b, pair[1], 1, 0.05);
-    o.sign = EITS_SIGN_INCREASE;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_INCREASE);
     press(&b, pair + 1, 1, 0); /* what is only weaker elsewhere is no touch of this sign */
     for (uint32_t k = 0; k < b.count; ++k)
         CHECK(b.found[k].strength_s_per_m_mm2 >= 0 &&
               (double)b.found[k].strength_s_per_m_mm2 < 0.5 * fabs(strength(pair[1])));
-    tear_down(&b);
 }
 
 static void two_touches_and_one(void)
 {
-    bench b;
     (void)set_up(&b, EITS_STORAGE_F32, 0);
     const finger three[3] = {{-30, -25, 9, 0.05}, {30, -20, 8, 0.04}, {0, 30, 10, 0.06}};
     press(&b, three, 3, 0);
@@ -179,12 +170,10 @@ static void two_touches_and_one(void)
         seen[before < 3 ? before : 0] += 1;
     }
     CHECK(seen[2] >= 4 && seen[1] >= 1);
-    tear_down(&b);
 }
 
 static void dropped_and_limited(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger two[2] = {{-27, 3, 9, 0.05}, {25, 5, 9, 0.015}};
     const eits_options defaults = *eits_get_options(ctx);
@@ -216,24 +205,17 @@ static void dropped_and_limited(void)
         if (max == 1)
             CHECK(b.found[0].x_mm < 0); /* the strongest */
     }
-    tear_down(&b);
 }
 
 /* More peaks than there is room for: the highest are kept, in order, and no memory beyond is
  * touched. */
 static void many_peaks(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
-    eits_options o = *eits_get_options(ctx);
-    o.touch_sweeps = 0;
-    o.touch_threshold = 0;
-    o.touch_min_fraction = 0;
-    o.touch_seed_radius_mm = o.touch_min_radius_mm = R(3.0);
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_sweeps = 0, o.touch_threshold = 0, o.touch_min_fraction = 0,
+                   o.touch_seed_radius_mm = o.touch_min_radius_mm = R(3.0));
     for (uint32_t max = 1; max <= EITS_MAX_TOUCHES; max += 5) {
-        o.max_touches = max;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.max_touches = max);
         memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
         CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
         ctx->info.stop = EITS_STOP_ITERATIONS;
@@ -261,18 +243,13 @@ static void many_peaks(void)
             CHECK((37 * (10 * (iy / 2) + ix / 2) + 99) % 100 >= 100 - max);
         }
     }
-    tear_down(&b);
 }
 
 static void no_touch_below_the_detection_threshold(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger two[2] = {{-25, 0, 9, 0.05}, {25, 5, 9, 0.015}};
-    eits_options o = *eits_get_options(ctx);
-    o.lambda_noise_factor = 0;
-    o.detection_factor = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.lambda_noise_factor = 0, o.detection_factor = 1);
     press(&b, two + 1, 1, 0);
     const eits_real weak = eits_get_info(ctx)->lambda_max;
     press(&b, two, 2, 0);
@@ -289,18 +266,13 @@ static void no_touch_below_the_detection_threshold(void)
     press(&b, two + 1, 1, 0); /* alone it does not even pass the frame's detection threshold */
     CHECK(eits_get_info(ctx)->stop == EITS_STOP_BELOW_THRESHOLD && b.count == 0 &&
           eits_get_info(ctx)->touch_macs == 0);
-    tear_down(&b);
 }
 
 static void without_sweeps(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger f = {16.5, -8.5, 9, 0.05};
-    eits_options o = *eits_get_options(ctx);
-    o.touch_sweeps = 0;
-    o.touch_seed_radius_mm = R(7.5);
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_sweeps = 0, o.touch_seed_radius_mm = R(7.5));
     press(&b, &f, 1, 0);
     CHECK(b.count >= 1);
     const eits_touch t = b.found[0];
@@ -308,12 +280,10 @@ static void without_sweeps(void)
     CHECK_NEAR(t.y_mm, -9, 0);
     CHECK_NEAR(t.radius_mm, 7.5, 0);
     CHECK_NEAR(t.strength_s_per_m_mm2, strength(f), 0.15 * strength(f));
-    tear_down(&b);
 }
 
 static void radius_by_strength(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const eits_options defaults = *eits_get_options(ctx);
     eits_options o = defaults;
@@ -342,7 +312,6 @@ static void radius_by_strength(void)
         CHECK(b.count >= 1 && b.found[0].radius_mm <= R(9.5) &&
               b.found[0].radius_mm >= o.touch_min_radius_mm);
     }
-    tear_down(&b);
 }
 
 static void at_rim_and_corner(void)
@@ -350,7 +319,6 @@ static void at_rim_and_corner(void)
     static const finger edges[] = {{-57, -57, 9, 0.05}, {57, 57, 9, 0.05},  {60, 0, 9, 0.05},
                                    {-60, 10, 9, 0.05},  {-57, 57, 9, 0.05}, {7, -58, 9, 0.05},
                                    {59, -59, 9, 0.05}};
-    bench b;
     (void)set_up(&b, EITS_STORAGE_F32, 0);
     for (size_t k = 0; k < sizeof edges / sizeof edges[0]; ++k) {
         press(&b, &edges[k], 1, 0);
@@ -360,7 +328,6 @@ static void at_rim_and_corner(void)
         CHECK_NEAR(off, 0, 0.5 * PIXEL);
         CHECK(b.found[0].strength_s_per_m_mm2 > 0 && b.found[0].explained > R(0.9));
     }
-    tear_down(&b);
     (void)set_up(&b, EITS_STORAGE_I8, 1); /* a round image has corners without pixels */
     for (int k = 0; k < 12; ++k) {
         const finger f = {55 * cos(k * PI / 6), 55 * sin(k * PI / 6), 8, 0.05};
@@ -369,12 +336,10 @@ static void at_rim_and_corner(void)
         CHECK_NEAR(hypot((double)b.found[0].x_mm - f.x, (double)b.found[0].y_mm - f.y), 0,
                    0.5 * PIXEL);
     }
-    tear_down(&b);
 }
 
 static void nothing_to_find(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger f = {10, 10, 9, 0.05}, two[2] = {{-25, 0, 9, 0.05}, {25, 5, 9, 0.03}};
     uint32_t count = 9;
@@ -397,7 +362,6 @@ static void nothing_to_find(void)
     CHECK_EQUAL(eits_get_info(ctx)->touches, 2);
     /* the image is not changed by looking for touches */
     CHECK(memcmp(image, eits_get_image(ctx), sizeof image) == 0);
-    tear_down(&b);
 }
 
 int main(void)
@@ -412,5 +376,6 @@ int main(void)
     radius_by_strength();
     at_rim_and_corner();
     nothing_to_find();
+    tear_down(&b);
     return checks_report("touch");
 }

@@ -54,10 +54,7 @@ static void work_is_counted(void)
     small_model made;
     small_context c;
     eits_context *ctx = set_up(&made, &c);
-    eits_options o = *eits_get_options(ctx);
-    o.touch_sweeps = 0;
-    o.touch_threshold = R(0.2);
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_sweeps = 0, o.touch_threshold = R(0.2));
     const uint64_t covered = press(ctx, 0);
     /* within 2 pixels of the centre of one: itself, 4 + 4 neighbours; the next ones lie on the
      * edge */
@@ -74,8 +71,7 @@ static void work_is_counted(void)
     ctx->reference.lambda_noise = 0;
     /* a response with three slopes, 17 products, and each attempted step's response with 3
      * products */
-    o.touch_sweeps = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_sweeps = 1);
     (void)press(ctx, 0);
     const uint64_t moved = touch_macs(ctx, 1) - strengths - RANK - (4 * covered * RANK + 17 * RANK);
     CHECK_EQUAL(moved % RANK, 0);
@@ -91,11 +87,8 @@ static void units_do_not_matter(void)
     eits_context *ctx = set_up(&made, &c);
     eits_touch first[2], found[2];
     uint32_t count;
-    eits_options o = *eits_get_options(ctx);
     /* not the discs' own: the radius is a compromise of data and expectation */
-    o.touch_seed_radius_mm = 8;
-    o.touch_radius_weight = R(3e-4);
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_seed_radius_mm = 8, o.touch_radius_weight = R(3e-4));
     (void)press(ctx, 1);
     CHECK_EQUAL(eits_find_touches(ctx, first, 2, &count), EITS_OK);
     CHECK_EQUAL(count, 2);
@@ -144,13 +137,9 @@ static void explained_is_what_leaving_out_costs(void)
     small_model made;
     small_context c;
     eits_context *ctx = set_up(&made, &c);
-    eits_options o = *eits_get_options(ctx);
     eits_real atom[RANK];
     double atoms[4 * RANK], y[RANK];
-    o.touch_sweeps = 0;
-    o.touch_threshold = 0;
-    o.touch_seed_radius_mm = 12;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_sweeps = 0, o.touch_threshold = 0, o.touch_seed_radius_mm = 12);
     memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
     CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     ctx->info.stop = EITS_STOP_ITERATIONS; /* an image made by hand, the empty peak the highest */
@@ -195,12 +184,8 @@ static void each_touch_must_exceed_the_detection_threshold(void)
     small_context c;
     eits_context *ctx = set_up(&made, &c);
     dense d = dense_of(&c.model);
-    eits_options o = *eits_get_options(ctx);
-    o.touch_sweeps = 0;
-    o.touch_min_fraction = 0;
-    o.lambda_noise_factor = 0;
-    o.detection_factor = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_sweeps = 0, o.touch_min_fraction = 0, o.lambda_noise_factor = 0,
+                   o.detection_factor = 1);
     const eits_disc weak = {33, -3, 9, R(0.02), 1};
     eits_real atom[RANK];
     (void)eits_disc_atom(ctx, &ctx->scratch, &weak, atom, NULL);
@@ -231,15 +216,10 @@ static void radius_by_the_data_or_by_the_noise(void)
         small_model made;
         small_context c;
         eits_context *ctx = set_up(&made, &c);
-        eits_options o = *eits_get_options(ctx);
         eits_touch found[2];
         uint32_t count;
-        o.touch_radius_weight = 0;
-        o.touch_seed_radius_mm = 9;
-        o.touch_change_s_per_m = 0;
-        o.max_touches = 1;
-        o.touch_sweeps = 60;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.touch_radius_weight = 0, o.touch_seed_radius_mm = 9,
+                       o.touch_change_s_per_m = 0, o.max_touches = 1, o.touch_sweeps = 60);
         const eits_disc disc = {-25, 2, 12, R(0.05), 1};
         (void)eits_disc_atom(ctx, &ctx->scratch, &disc, ctx->frame.y, NULL);
         for (int i = 0; i < RANK; ++i)

@@ -16,20 +16,23 @@ typedef struct bench {
     small_context c;
 } bench;
 
+static bench b;
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
 static eits_context *set_up(bench *b, double follow_mm)
 {
+    tear_down(b);
     b->made = small_model_make((small_spec){.rank = 3, .side = 3});
     small_context_open(&b->c, &b->made, 0);
     eits_options o = *eits_get_options(b->c.ctx);
     o.follow_mm = (eits_real)follow_mm;
     CHECK_EQUAL(eits_set_options(b->c.ctx, &o), EITS_OK);
     return b->c.ctx;
-}
-
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
 }
 
 static eits_touch at(double x, double y)
@@ -39,7 +42,6 @@ static eits_touch at(double x, double y)
 
 static void ids_follow_moves_and_not_jumps(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 10);
     eits_touch t = at(0, 0);
     eits_track(ctx, &t, 1);
@@ -62,14 +64,12 @@ static void ids_follow_moves_and_not_jumps(void)
     eits_forget(ctx);
     eits_track(ctx, &t, 1);
     CHECK_EQUAL(t.id, 4);
-    tear_down(&b);
 }
 
 /* Two that pass each other: nearness says which is which, whatever the order in which they
  * are listed. */
 static void crossing(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 25);
     for (int k = 0; k <= 20; ++k) {
         const eits_touch right = at(-50 + 5 * k, 4), left = at(50 - 5 * k, -4);
@@ -78,14 +78,12 @@ static void crossing(void)
         CHECK_EQUAL(both[k % 2].id, 1);
         CHECK_EQUAL(both[1 - k % 2].id, 2);
     }
-    tear_down(&b);
 }
 
 /* The nearest pairs first: the one that moved little keeps its id, though another is within reach
  * as well. */
 static void nearest_first(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 30);
     eits_touch first[3] = {at(0, 0), at(20, 0), at(40, 0)};
     eits_track(ctx, first, 3);
@@ -101,12 +99,10 @@ static void nearest_first(void)
     eits_touch more[2] = {at(89, 1), at(87.5, 1)}; /* one splits: the nearer half keeps the id */
     eits_track(ctx, more, 2);
     CHECK(more[1].id == 4 && more[0].id == 5);
-    tear_down(&b);
 }
 
 static void all_of_a_full_house(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 5);
     uint32_t ids[EITS_MAX_TOUCHES];
     for (int round = 0; round < 5; ++round) {
@@ -127,12 +123,10 @@ static void all_of_a_full_house(void)
         }
     }
     CHECK_EQUAL(ctx->tracker.next_id, EITS_MAX_TOUCHES + 1);
-    tear_down(&b);
 }
 
 static void following_may_be_off(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 0);
     eits_touch t = at(1, 2);
     eits_track(ctx, &t, 1);
@@ -141,25 +135,22 @@ static void following_may_be_off(void)
     t.x_mm += R(0.01);
     eits_track(ctx, &t, 1);
     CHECK_EQUAL(t.id, 2);
-    tear_down(&b);
 }
 
 static void zero_is_never_an_id(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 5);
     ctx->tracker.next_id = UINT32_MAX - 1;
     eits_touch t[4] = {at(0, 0), at(50, 0), at(0, 50), at(50, 50)};
     eits_track(ctx, t, 4);
     CHECK(t[0].id == UINT32_MAX - 1 && t[1].id == UINT32_MAX && t[2].id == 1 && t[3].id == 2);
-    tear_down(&b);
 }
 
 /* From data to ids: a disc that moves keeps its id, is lifted and comes back with a new one, jumps
  * and is another. */
 static void through_the_whole_core(void)
 {
-    bench b;
+    tear_down(&b);
     b.made = small_model_make((small_spec){.rank = 64, .side = 20, .shape = SMALL_WAVES});
     small_context_open(&b.c, &b.made, 0);
     eits_context *ctx = b.c.ctx;
@@ -187,7 +178,6 @@ static void through_the_whole_core(void)
         CHECK_NEAR(hypot((double)touch.x_mm - frames[k].x, (double)touch.y_mm - frames[k].y), 0,
                    0.1);
     }
-    tear_down(&b);
 }
 
 int main(void)
@@ -199,5 +189,6 @@ int main(void)
     all_of_a_full_house();
     following_may_be_off();
     zero_is_never_an_id();
+    tear_down(&b);
     return checks_report("touch ids");
 }

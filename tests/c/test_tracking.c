@@ -14,26 +14,26 @@ typedef struct bench {
     small_context c;
 } bench;
 
-/* A 120 mm square around the origin; a frame whose S'y is ten times that of noise. */
-static eits_context *set_up(bench *b, uint32_t confirm, uint32_t hold, double smooth)
-{
-    b->made = small_model_make((small_spec){.rank = 8, .side = 20});
-    small_context_open(&b->c, &b->made, 0);
-    eits_context *ctx = b->c.ctx;
-    eits_options o = *eits_get_options(ctx);
-    o.track_confirm = confirm;
-    o.track_hold = hold;
-    o.track_smooth = (eits_real)smooth;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    ctx->info.lambda_max = 10;
-    ctx->info.lambda_noise = 1;
-    return ctx;
-}
+static bench b;
 
 static void tear_down(bench *b)
 {
     small_context_close(&b->c);
     small_model_free(&b->made);
+}
+
+/* A 120 mm square around the origin; a frame whose S'y is ten times that of noise. */
+static eits_context *set_up(bench *b, uint32_t confirm, uint32_t hold, double smooth)
+{
+    tear_down(b);
+    b->made = small_model_make((small_spec){.rank = 8, .side = 20});
+    small_context_open(&b->c, &b->made, 0);
+    eits_context *ctx = b->c.ctx;
+    CHANGE_OPTIONS(ctx, o.track_confirm = confirm, o.track_hold = hold,
+                   o.track_smooth = (eits_real)smooth);
+    ctx->info.lambda_max = 10;
+    ctx->info.lambda_noise = 1;
+    return ctx;
 }
 
 /* Its own S'y is 10 sqrt(explained) times the noise's: faint from 0.009 down; above 0.05 a birth
@@ -67,7 +67,6 @@ static uint32_t one(eits_context *ctx, eits_touch *reported, double x, double ex
 /* Sure ones at once, others once they were found as often as is asked, on end. */
 static void tracks_start_once_confirmed(void)
 {
-    bench b;
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 3, 0, 0);
     CHECK_EQUAL(one(ctx, t, 0, 0.5), 1);
@@ -96,13 +95,11 @@ static void tracks_start_once_confirmed(void)
     eits_forget(ctx);
     ctx->info.lambda_noise = 0; /* unknown: nothing is tentative for it */
     CHECK_EQUAL(one(ctx, t, 60, 0.2), 1);
-    tear_down(&b);
 }
 
 /* A track_start has to be found again near by; one that is known may move further. */
 static void reach(void)
 {
-    bench b;
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 2, 0, 0); /* follow_mm 25 */
     CHECK_EQUAL(one(ctx, t, 0, 0.005), 0);
@@ -118,14 +115,12 @@ static void reach(void)
     t[1] = at(27, 0, 0.5);
     CHECK_EQUAL(eits_track(ctx, t, 2), 2);
     CHECK(t[0].id == 2 && t[1].id == 1);
-    tear_down(&b);
 }
 
 /* A clear touch that is lifted is gone at once, though its id is kept for a while; a faint one is
  * reported meanwhile. */
 static void tracks_end_after_the_hold(void)
 {
-    bench b;
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 2, 2, 0);
     for (int k = 0; k < 10; ++k)
@@ -154,13 +149,11 @@ static void tracks_end_after_the_hold(void)
     CHECK_EQUAL(none(ctx, t), 0); /* found three times only: it may have been noise */
     CHECK_EQUAL(one(ctx, t, 0, 0.005), 1);
     CHECK_EQUAL(t[0].id, 4);
-    tear_down(&b);
 }
 
 /* Held touches never take the place of found ones. */
 static void a_full_house(void)
 {
-    bench b;
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 0, 5, 0);
     for (int round = 0; round < 5; ++round) {
@@ -176,7 +169,6 @@ static void a_full_house(void)
     CHECK_EQUAL(eits_track(ctx, t, EITS_MAX_TOUCHES), EITS_MAX_TOUCHES);
     CHECK(t[0].id == 17 && t[EITS_MAX_TOUCHES - 1].id == 32);
     CHECK_EQUAL(none(ctx, t), 0);
-    tear_down(&b);
 }
 
 /* Noise of the place that the filter expects; how far it is off on average, found and reported. */
@@ -202,7 +194,6 @@ static void jitter(eits_context *ctx, double speed, double explained, double *fo
 
 static void smoothing(void)
 {
-    bench b;
     double found, still, moving, clear;
     eits_context *ctx = set_up(&b, 0, 2, 0.66);
     jitter(ctx, 0, 0.02, &found, &still);
@@ -221,13 +212,11 @@ static void smoothing(void)
         CHECK_EQUAL(one(ctx, t, 3 * (k % 2), 0.5), 1);
         CHECK_NEAR(t[0].x_mm, 3 * (k % 2), 0.2);
     }
-    tear_down(&b);
 }
 
 /* Radius and strength follow the gain of the place; explained is the frame's own. */
 static void smooth_strengths(void)
 {
-    bench b;
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 0, 2, 0.66);
     for (int k = 0; k < 20; ++k)
@@ -241,7 +230,6 @@ static void smooth_strengths(void)
     CHECK_NEAR(t[0].radius_mm, 9 + 2 * gain, 1e-5);
     CHECK_NEAR(t[0].strength_s_per_m_mm2, 1 + 2 * gain, 1e-5);
     CHECK_NEAR(t[0].explained, 0.02, 1e-8);
-    tear_down(&b);
 }
 
 /* Two fingers that pass one another keep their ids by where they are going; without that the
@@ -249,7 +237,6 @@ static void smooth_strengths(void)
 static void passing(void)
 {
     for (int smooth = 0; smooth < 2; ++smooth) {
-        bench b;
         eits_touch t[EITS_MAX_TOUCHES];
         eits_context *ctx = set_up(&b, 0, 2, smooth ? 0.66 : 0);
         for (int k = 0; k <= 10; ++k) {
@@ -259,7 +246,6 @@ static void passing(void)
         }
         const uint32_t right = t[0].x_mm > 0 ? t[0].id : t[1].id;
         CHECK_EQUAL(right, smooth ? 1 : 2);
-        tear_down(&b);
     }
 }
 
@@ -267,7 +253,6 @@ static void passing(void)
 static void held_in_motion(void)
 {
     for (int axis = 0; axis < 2; ++axis) {
-        bench b;
         eits_touch t[EITS_MAX_TOUCHES];
         const eits_real *along = axis ? &t[0].y_mm : &t[0].x_mm,
                         *across = axis ? &t[0].x_mm : &t[0].y_mm;
@@ -285,7 +270,6 @@ static void held_in_motion(void)
         }
         CHECK(*along > 57);
         CHECK_EQUAL(none(ctx, t), 0);
-        tear_down(&b);
     }
 }
 
@@ -294,7 +278,6 @@ static void extremes(void)
 {
     static const double huge[] = {0, 1e-30, 1e30};
     for (int k = 0; k < 27; ++k) {
-        bench b;
         eits_touch t[EITS_MAX_TOUCHES];
         eits_context *ctx = set_up(&b, 0, 3, huge[k % 3]);
         ctx->options.follow_mm = (eits_real)huge[k / 3 % 3];
@@ -307,14 +290,12 @@ static void extremes(void)
                       eits_is_finite(t[l].radius_mm) && eits_is_finite(t[l].strength_s_per_m_mm2) &&
                       t[l].id != 0);
         }
-        tear_down(&b);
     }
 }
 
 /* Switched on and off between frames: off, touches are as they were found. */
 static void switched(void)
 {
-    bench b;
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 2, 2, 0.66);
     for (int k = 0; k < 6; ++k) {
@@ -328,7 +309,6 @@ static void switched(void)
     CHECK_EQUAL(none(ctx, t), 0);
     CHECK_EQUAL(one(ctx, t, 6, 0.5), 1);
     CHECK_EQUAL(t[0].id, 2);
-    tear_down(&b);
 }
 
 int main(void)
@@ -343,5 +323,6 @@ int main(void)
     held_in_motion();
     extremes();
     switched();
+    tear_down(&b);
     return checks_report("track in time");
 }

@@ -24,19 +24,22 @@ typedef struct bench {
     small_context c;
 } bench;
 
-static eits_context *set_up(bench *b, small_spec spec, int prepared)
-{
-    memset(b, 0, sizeof *b);
-    b->made = small_model_make(spec);
-    small_context_open(&b->c, &b->made, prepared);
-    small_new_data(b->c.ctx, 61);
-    return b->c.ctx;
-}
+static bench b;
 
 static void tear_down(bench *b)
 {
     small_context_close(&b->c);
     small_model_free(&b->made);
+}
+
+static eits_context *set_up(bench *b, small_spec spec, int prepared)
+{
+    tear_down(b);
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make(spec);
+    small_context_open(&b->c, &b->made, prepared);
+    small_new_data(b->c.ctx, 61);
+    return b->c.ctx;
 }
 
 static eits_options with(const eits_context *ctx, eits_solver solver, uint32_t iterations,
@@ -85,7 +88,7 @@ static void looking_always_gives_the_bits_of_fista(void)
         for (int sign = 0; sign < 3; ++sign) {
             for (int prepared = 0; prepared < 2; ++prepared) {
                 for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
-                    bench b[2];
+                    bench b[2] = {0};
                     for (int solver = 0; solver < 2; ++solver) {
                         eits_context *ctx = set_up(&b[solver],
                                                    (small_spec){.rank = RANK,
@@ -115,7 +118,7 @@ static void looking_always_recovers_like_fista(void)
 {
     static const double factors[] = {1.0 / 3, 1.0 / 16, 1e-9};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
-        bench b[2];
+        bench b[2] = {0};
         for (int solver = 0; solver < 2; ++solver) {
             eits_context *ctx = set_up(
                 &b[solver],
@@ -136,7 +139,6 @@ static void a_wild_run_ends_as_zero(void)
     static const double factors[] = {1e-4, 1e-12, 1e-36};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
         for (int sign = 0; sign < 3; ++sign) {
-            bench b;
             eits_context *ctx = set_up(
                 &b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]}, 0);
             const eits_info info =
@@ -145,7 +147,6 @@ static void a_wild_run_ends_as_zero(void)
             CHECK(info.nonzeros == 0 && info.step_halvings == 8 && info.residual == info.data_norm);
             for (int j = 0; j < N; ++j)
                 CHECK(eits_get_coefficients(ctx)[j] == 0 && eits_get_image(ctx)[j] == 0);
-            tear_down(&b);
         }
     }
 }
@@ -157,7 +158,6 @@ static void the_optimum_is_that_of_all_columns(void)
     for (int sign = 0; sign < 3; ++sign) {
         for (int asked = 0; asked < 2; ++asked) {
             for (uint32_t every = 1; every <= 50; every += 7) {
-                bench b;
                 eits_context *ctx = set_up(&b, RANDOM, (int)(every % 2));
                 eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, asked ? 50000 : 20000,
                                       (eits_sign)sign, 0.03);
@@ -175,7 +175,6 @@ static void the_optimum_is_that_of_all_columns(void)
                 CHECK(info.nonzeros >= 3);
                 dense_free(&d);
                 free(x), free(y);
-                tear_down(&b);
             }
         }
     }
@@ -185,7 +184,7 @@ static void the_optimum_is_that_of_all_columns(void)
 static void same_bits_in_every_layout(void)
 {
     for (int storage = 0; storage < 4; ++storage) {
-        bench b[4];
+        bench b[4] = {0};
         for (int way = 0; way < 4; ++way) {
             eits_context *ctx = set_up(
                 &b[way], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
@@ -203,7 +202,7 @@ static void same_bits_in_every_layout(void)
 /* Rows left out and the drift of the gain: the same projections as FISTA's. */
 static void beside_a_basis(void)
 {
-    bench b[2];
+    bench b[2] = {0};
     for (int solver = 0; solver < 2; ++solver) {
         eits_context *ctx = set_up(&b[solver], RANDOM, 0);
         eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
@@ -229,7 +228,6 @@ static void beside_a_basis(void)
  * coefficients. */
 static void warm_starts(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM, 1);
     eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, 20000, EITS_SIGN_BOTH, 0.03);
     const eits_info cold = solve(ctx, o);
@@ -239,13 +237,11 @@ static void warm_starts(void)
     CHECK_EQUAL(warm.iterations, 1);
     CHECK(warm.gap_rel <= cold.gap_rel + R(200 * EPS));
     CHECK_EQUAL(warm.nonzeros, cold.nonzeros);
-    tear_down(&b);
 }
 
 /* On the identity with one positive datum the working set is that one column. */
 static void work_is_counted(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, (small_spec){.rank = 16, .side = 4, .shape = SMALL_IDENTITY}, 0);
     const uint64_t whole = 16 * 16, column = 16;
     eits_zero(ctx->frame.y, 16);
@@ -263,19 +259,16 @@ static void work_is_counted(void)
     o.gap_rel = R(1e-30); /* a look at 6 likewise, and a gap at 5 and at the end */
     o.iterations = 9;
     CHECK_EQUAL(solve(ctx, o).macs, whole + whole + 7 * column + 9 * column + 2 * whole);
-    tear_down(&b);
 }
 
 static void refused_options(void)
 {
-    bench b;
     eits_context *ctx = set_up(&b, RANDOM, 0);
     CHECK_EQUAL(eits_get_options(ctx)->solver,
                 EITS_SOLVER_FISTA); /* what a file of format 1.0 has */
     eits_options o = *eits_get_options(ctx);
     o.solver = (eits_solver)(EITS_SOLVER_ACTIVE_SET + 1);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
-    tear_down(&b);
 }
 
 /* The same peaks in the same order, of the columns around the active ones alone. */
@@ -283,7 +276,6 @@ static void violations_nearby(void)
 {
     static const uint32_t active[] = {0, 30, 31, N - 1};
     for (uint32_t count = 0; count <= 4; ++count) {
-        bench b;
         eits_context *ctx = set_up(&b, RANDOM, 0);
         eits_nearby near = eits_nearby_none(ctx);
         uint32_t expected[N], wanted = 0, most = 0;
@@ -309,7 +301,6 @@ static void violations_nearby(void)
         CHECK_EQUAL(eits_list_violations(ctx, &ctx->scratch, R(0.2), &near), wanted);
         CHECK(memcmp(expected, ctx->scratch.index, wanted * sizeof *expected) == 0);
         CHECK(wanted >= (count < 3 ? count : count - 1)); /* each has a peak, two share theirs */
-        tear_down(&b);
     }
 }
 
@@ -327,7 +318,6 @@ static void zeros_at_rest_are_pruned(void)
     static const eits_sign signs[3] = {EITS_SIGN_BOTH, EITS_SIGN_INCREASE, EITS_SIGN_DECREASE};
     for (int s = 0; s < 3; ++s) {
         for (int prepared = 0; prepared < 2; ++prepared) {
-            bench b;
             eits_context *ctx = set_up(&b, RANDOM, prepared);
             ctx->options.sign = signs[s];
             ctx->solver.working_count = COUNT;
@@ -349,7 +339,6 @@ static void zeros_at_rest_are_pruned(void)
                 ++left;
             }
             CHECK_EQUAL(ctx->solver.working_count, left);
-            tear_down(&b);
         }
     }
 }
@@ -367,5 +356,6 @@ int main(void)
     refused_options();
     violations_nearby();
     zeros_at_rest_are_pruned();
+    tear_down(&b);
     return checks_report("working set");
 }
