@@ -66,7 +66,7 @@ def test_the_example_is_installed_and_compared(tmp_path: Path) -> None:
 
 def test_the_page_shows_the_example() -> None:
     page = (ROOT / "docs" / "guide" / "own-method.md").read_text(encoding="utf-8")
-    assert f"```py\n{(EXAMPLE / 'own_method.py').read_text(encoding='utf-8')}```" in page
+    assert "(../../examples/python/own_method/own_method.py)" in page
     table = (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")
     named = '[project.entry-points."eitskin.methods"]\ntruncated-svd = "own_method:family"\n'
     assert named in table and f"```toml\n{named}```" in page
