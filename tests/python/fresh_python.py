@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,12 @@ from pathlib import Path
 import eitskin
 
 MAIN = "import sys\nfrom eitskin.cli.main import main\nsys.exit(main(sys.argv[1:]))\n"
+
+
+def words(*arguments: object) -> list[str]:
+    """A command line's words; a text among ``arguments`` may hold several, as in a shell."""
+    texts = (shlex.split(a) if isinstance(a, str) else [str(a)] for a in arguments)
+    return [word for one in texts for word in one]
 
 
 def without(*packages: str) -> str:

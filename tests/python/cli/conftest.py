@@ -11,6 +11,7 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.frames.frames import save_frames
+from fresh_python import words
 from small_models import session
 
 Refused = Callable[..., str]
@@ -58,7 +59,7 @@ def refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
     def run(code: int, *arguments: object) -> str:
         before = sorted(tmp_path.rglob("*"))
         capsys.readouterr()
-        assert main([str(argument) for argument in arguments]) == code
+        assert main(words(*arguments)) == code
         out, err = capsys.readouterr()
         assert err.endswith("\n") and err.count("\n") == 1, err
         assert err.startswith("eitskin: ") and "Traceback" not in err
@@ -75,7 +76,7 @@ def done(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
 
     def run(*arguments: object) -> str:
         capsys.readouterr()
-        code = main([str(argument) for argument in arguments])
+        code = main(words(*arguments))
         out, err = capsys.readouterr()
         assert (code, err) == (0, "")
         return out

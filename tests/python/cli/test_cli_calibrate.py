@@ -183,20 +183,20 @@ def test_weights_that_do_not_show_are_named(
 def test_refusals(folder: Path, refused: Refused, tmp_path: Path) -> None:
     frames, listed = folder / "weights.npz", folder / "weights.csv"
     assert "1 recordings and 2 lists of weights" in refused(
-        2, "calibrate", frames, "--weights", listed, "--weights", listed
+        2, f"calibrate {frames} --weights {listed} --weights {listed}"
     )
     (tmp_path / "w.csv").write_text("first,weight_g\n50,10\n")
     assert "frames 50 to 50 of the list of weights are not there; it has frames 0 to 49" in refused(
-        8, "calibrate", frames, "--weights", tmp_path / "w.csv"
+        8, f"calibrate {frames} --weights {tmp_path / 'w.csv'}"
     )
     (tmp_path / "w.csv").write_text("first,weight_g\n0,10\n1,20\n")
     assert "2 presses are too few" in refused(
-        8, "calibrate", frames, "--weights", tmp_path / "w.csv"
+        8, f"calibrate {frames} --weights {tmp_path / 'w.csv'}"
     )
     assert (
         "no such frames file"
         in refused(3, "calibrate", tmp_path / "none.npz", "--weights", listed).lower()
     )
     assert "--seed -1 must be 0 or above" in refused(
-        2, "calibrate", frames, "--weights", listed, "--seed", "-1"
+        2, f"calibrate {frames} --weights {listed} --seed -1"
     )

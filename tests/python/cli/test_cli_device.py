@@ -23,7 +23,7 @@ from eitskin.device.ports import Port
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.frames.frames import load_frames
 from eitskin.model.model import Model
-from fresh_python import run_python
+from fresh_python import run_python, words
 from small_models import prebuilt, small_blob
 
 Done = Callable[..., str]
@@ -73,17 +73,7 @@ def test_two_touches_within_two_millimetres_of_the_scene(
 
 def test_image_places_and_picture(done: Done, tmp_path: Path) -> None:
     picture = tmp_path / "images.png"
-    out = done(
-        "stream",
-        "--device",
-        "sim:two_touch",
-        "--mode",
-        "image",
-        "--frames",
-        "20",
-        "--picture",
-        picture,
-    )
+    out = done(f"stream --device sim:two_touch --mode image --frames 20 --picture {picture}")
     errors = [float(error) for error in OFF_BY.findall(out)]
     assert len(errors) == 40 and max(errors) < 2.0
     assert picture.read_bytes()[:8] == PNG and f"picture: {picture}" in out
@@ -115,39 +105,27 @@ def test_stream_for_programs(done: Done, scene: Path) -> None:
 def test_raw_lines_tell_of_the_scan(done: Done, scene: Path) -> None:
     full = done("stream", "--device", f"sim:{scene}", "--mode", "raw", "--frames", "2").splitlines()
     assert all("raw: 208 rows in 20.78 ms" in line and "copied" not in line for line in full[:2])
-    halved = done(
-        "stream",
-        "--device",
-        f"sim:{scene}",
-        "--mode",
-        "raw",
-        "--frames",
-        "2",
-        "--reciprocal",
-        "0",
-        "--tare",
-        "4",
-    )
+    halved = done(f"stream --device sim:{scene} --mode raw --frames 2 --reciprocal 0 --tare 4")
     assert halved.count("raw: 208 rows in 10.38 ms") == halved.count("104 copied") == 2
 
 
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (["--samples", "40"], {"samples": 40}),
-        (["--excitation-hz", "25000"], {"excitation_millihz": 25_000_006}),
-        (["--settle-us", "40"], {"settle_us": 40}),
-        (["--frame-period-us", "60000"], {"frame_period_us": 60_000}),
-        (["--reciprocal", "4"], {"check_every": 4}),
-        (["--full"], {"check_every": 1}),
+        ("--samples 40", {"samples": 40}),
+        ("--excitation-hz 25000", {"excitation_millihz": 25_000_006}),
+        ("--settle-us 40", {"settle_us": 40}),
+        ("--frame-period-us 60000", {"frame_period_us": 60_000}),
+        ("--reciprocal 4", {"check_every": 4}),
+        ("--full", {"check_every": 1}),
     ],
 )
 def test_scan_options_reach_the_board(
-    options: list[str], expected: dict[str, int], done: Done, scene: Path, tmp_path: Path
+    options: str, expected: dict[str, int], done: Done, scene: Path, tmp_path: Path
 ) -> None:
     """What a recording says of the board was asked after the scan was set."""
     run = tmp_path / "run.eits"
-    done("record", "--device", f"sim:{scene}", "-o", run, "--frames", "1", *options)
+    done("record", "--device", f"sim:{scene}", "-o", run, "--frames", "1", options)
     board = strict(done("info", "--device", f"file:{run}", "--json"))["board"]
     assert {name: board[name] for name in expected} == expected
 
@@ -249,18 +227,7 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
 def test_a_slow_line_is_not_overrun(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with behind_a_port(board_of(scene)) as port:
         assert (
-            main(
-                [
-                    "stream",
-                    "--device",
-                    f"serial:{port}?baud=115200",
-                    "--mode",
-                    "image",
-                    "--frames",
-                    "4",
-                    "--json",
-                ]
-            )
+            main(words(f"stream --device serial:{port}?baud=115200 --mode image --frames 4 --json"))
             == 0
         )
         out, err = capsys.readouterr()
@@ -342,19 +309,7 @@ def test_model_upload(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture
         )
         assert "needs the board's model" in capsys.readouterr().err
         assert (
-            main(
-                [
-                    "stream",
-                    "--device",
-                    f"serial:{port}",
-                    "--mode",
-                    "image",
-                    "--frames",
-                    "1",
-                    "--model",
-                    str(model),
-                ]
-            )
+            main(words(f"stream --device serial:{port} --mode image --frames 1 --model {model}"))
             == 0
         )
         # touches are millimetres already

@@ -67,28 +67,28 @@ def write_skin(
             "disk",
             16,
             "adjacent",
-            [],
+            "",
             {"protocol_rows": 208, "folded_rows": 104, "rank": 64, "storage": "f32"},
         ),
         (
             "disk",
             32,
             "adjacent",
-            ["--storage", "i8"],
+            "--storage i8",
             {"protocol_rows": 928, "folded_rows": 464, "rank": 64, "storage": "i8"},
         ),
         (
             "L",
             16,
             "opposite",
-            ["--rank", "20", "--storage", "f16"],
+            "--rank 20 --storage f16",
             {"protocol_rows": 192, "rank": 20, "storage": "f16"},
         ),
         (
             "clockwise L",
             8,
             "adjacent",
-            ["--data", "log-ratio", "--samples", "3"],
+            "--data log-ratio --samples 3",
             {"protocol_rows": 40, "rank": 20, "data": "log-ratio"},
         ),
     ],
@@ -97,13 +97,13 @@ def test_build_info_verify(
     outline: str,
     count: int,
     kind: str,
-    options: list[str],
+    options: str,
     expected: dict[str, object],
     done: Done,
     tmp_path: Path,
 ) -> None:
     skin, model = write_skin(tmp_path, outline, count, kind), tmp_path / "palm.eitm"
-    built = json.loads(done("model", "build", skin, "-o", model, "--json", *QUICK, *options))
+    built = json.loads(done("model", "build", skin, "-o", model, "--json", *QUICK, options))
     assert tuple(built) == FACTS
     assert json.loads(done("model", "info", model, "--json")) == built
     assert built == built | expected
@@ -141,19 +141,7 @@ def test_a_clockwise_outline_is_the_same_skin(done: Done, tmp_path: Path) -> Non
 def test_touch_change_and_regularisation_reach_the_model(done: Done, tmp_path: Path) -> None:
     skin, path = write_skin(tmp_path), tmp_path / "x.eitm"
     facts = json.loads(
-        done(
-            "model",
-            "build",
-            skin,
-            "-o",
-            path,
-            "--json",
-            "--touch-change",
-            "2",
-            "--regularisation",
-            "0.1",
-            *QUICK,
-        )
+        done(f"model build {skin} -o {path} --json --touch-change 2 --regularisation 0.1", *QUICK)
     )
     assert facts["defaults"]["touch_change_s_per_m"] == 0.04
     assert facts["lipschitz"] == pytest.approx(1 / 1.1, rel=2e-4)

@@ -286,14 +286,7 @@ def test_the_whole_way(done: Done, tmp_path: Path) -> None:
     output, picture = tmp_path / "out.npz", tmp_path / "out.png"
     facts = json.loads(
         done(
-            "reconstruct",
-            frames_path,
-            "--model",
-            model_file,
-            "-o",
-            output,
-            "--picture",
-            picture,
+            f"reconstruct {frames_path} --model {model_file} -o {output} --picture {picture}",
             "--json",
         )
     )

@@ -115,17 +115,7 @@ def test_record_says_how_much(done: Done, scene: Path, tmp_path: Path) -> None:
     assert facts["packets"] == sum(p.type not in (PacketType.RECORDING,) for p in packets(path)) - 1
     assert len([p for p in packets(path) if p.type == PacketType.RAW]) == 16 + 3
     again = json.loads(
-        done(
-            "record",
-            "--device",
-            f"sim:{scene}",
-            "-o",
-            path,
-            "--seconds",
-            "0.1",
-            "--overwrite",
-            "--json",
-        )
+        done(f"record --device sim:{scene} -o {path} --seconds 0.1 --overwrite --json")
     )
     assert again["frames"] == 3
 
@@ -148,20 +138,13 @@ def test_the_hosts_images_are_the_boards(done: Done, run: Path) -> None:
 
 @pytest.mark.parametrize(
     "options",
-    [
-        ["--cold"],
-        ["--no-track"],
-        ["--iterations", "9"],
-        ["--sign", "both"],
-        ["--tare", "1"],
-        ["--reciprocal", "0"],
-    ],
+    ["--cold", "--no-track", "--iterations 9", "--sign both", "--tare 1", "--reciprocal 0"],
 )
 def test_whatever_the_solver_was_told(
-    options: list[str], done: Done, scene: Path, tmp_path: Path
+    options: str, done: Done, scene: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "run.eits"
-    done("record", "--device", f"sim:{scene}", "-o", path, *QUIETLY, *options)
+    done("record", "--device", f"sim:{scene}", "-o", path, *QUIETLY, options)
     assert json.loads(done("replay", path, "--check", "--json"))["same"] == FRAMES
 
 

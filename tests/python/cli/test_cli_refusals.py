@@ -29,25 +29,22 @@ USAGE, FILE, CONFIG, GEOMETRY, MODEL, PROTOCOL, FRAME, EXTRA, VERIFICATION = ran
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["recnstruct"], "COMMAND: 'recnstruct' is unknown; did you mean 'reconstruct'?"),
-        (["model"], "required: ACTION"),
-        (["model", "build", "x.toml"], "required: -o/--output"),
+        ("recnstruct", "COMMAND: 'recnstruct' is unknown; did you mean 'reconstruct'?"),
+        ("model", "required: ACTION"),
+        ("model build x.toml", "required: -o/--output"),
         (
-            ["model", "build", "x.toml", "-o", "x", "--storage", "f64"],
+            "model build x.toml -o x --storage f64",
             "--storage: 'f64' is unknown; did you mean 'f16'?",
         ),
-        (["model", "build", "x.toml", "-o", "x", "--rank", "many"], "invalid int value: 'many'"),
-        (["model", "info", "--verbose"], "unrecognized arguments: --verbose"),
-        (["reconstruct"], "required: FRAMES.npz"),
-        (
-            ["reconstruct", "x.npz", "--engine", "gpu"],
-            "--engine: 'gpu' is unknown; known are: c, c64, numpy",
-        ),
-        (["reconstruct", "x.npz", "--gap", "1e"], "invalid float value: '1e'"),
+        ("model build x.toml -o x --rank many", "invalid int value: 'many'"),
+        ("model info --verbose", "unrecognized arguments: --verbose"),
+        ("reconstruct", "required: FRAMES.npz"),
+        ("reconstruct x.npz --engine gpu", "--engine: 'gpu' is unknown; known are: c, c64, numpy"),
+        ("reconstruct x.npz --gap 1e", "invalid float value: '1e'"),
     ],
 )
-def test_arguments_that_cannot_be_parsed(refused: Refused, arguments: list[str], text: str) -> None:
-    line = refused(USAGE, *arguments)
+def test_arguments_that_cannot_be_parsed(refused: Refused, arguments: str, text: str) -> None:
+    line = refused(USAGE, arguments)
     assert text in line and line.endswith("--help")
 
 
@@ -109,13 +106,7 @@ def test_models_that_cannot_be_read(
         line = refused(
             MODEL,
             *command,
-            frames_file,
-            "--model",
-            path,
-            "-o",
-            output,
-            "--picture",
-            tmp_path / "out.png",
+            f"{frames_file} --model {path} -o {output} --picture {tmp_path / 'out.png'}",
         )
     assert str(path) in line and text in line and ";" in line
 
@@ -239,7 +230,7 @@ def test_frames_files_that_cannot_be_read(
     }
     path = changed_frames(**({"voltage_v": FIRST, "frame_name": np.array(["a"])} | empty | changes))
     line = refused(
-        code, "reconstruct", path, "-o", tmp_path / "out.npz", "--picture", tmp_path / "out.png"
+        code, f"reconstruct {path} -o {tmp_path / 'out.npz'} --picture {tmp_path / 'out.png'}"
     )
     assert str(path) in line and text in line
 
@@ -305,14 +296,12 @@ def test_a_description_that_is_no_text(refused: Refused, tmp_path: Path) -> None
 def test_missing_files(refused: Refused, tmp_path: Path, frames_file: Path) -> None:
     none, output = tmp_path / "none", tmp_path / "out"
     assert "no such skin description; check the path" in refused(
-        FILE, "model", "build", none, "-o", output
+        FILE, f"model build {none} -o {output}"
     )
     assert "no such model; check the path" in refused(FILE, "model", "info", none)
     assert "no such model" in refused(FILE, "model", "verify", none)
     assert "no such frames file; check the path" in refused(FILE, "reconstruct", none)
-    assert "no such model" in refused(
-        FILE, "reconstruct", frames_file, "--model", none, "-o", output
-    )
+    assert "no such model" in refused(FILE, f"reconstruct {frames_file} --model {none} -o {output}")
     assert "no such skin description" in refused(FILE, "compare", "--skin", none)
 
 
@@ -379,56 +368,54 @@ def test_a_folder_that_cannot_be_written(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["--iterations", "0"], "--iterations 0 is out of range; use 1 to 1000000"),
-        (["--iterations", "-5"], "--iterations -5 is out of range"),
-        (["--iterations", "2000000"], "--iterations 2000000 is out of range"),
-        (["--mac-limit", "0"], "--mac-limit 0 is out of range; use 1 to 4294967295"),
-        (["--gap", "0"], "--gap 0 is out of range"),
-        (["--gap", "1.5"], "--gap 1.5 is out of range"),
-        (["--gap", "nan"], "--gap nan is out of range"),
-        (["--saturation-v", "-1"], "--saturation-v -1 must be above 0"),
-        (["--saturation-v", "inf"], "saturation_v = inf is out of range"),
-        (["--only", "test-s3-99"], "no frame is named 'test-s3-99'; did you mean 'test-s3-"),
+        ("--iterations 0", "--iterations 0 is out of range; use 1 to 1000000"),
+        ("--iterations -5", "--iterations -5 is out of range"),
+        ("--iterations 2000000", "--iterations 2000000 is out of range"),
+        ("--mac-limit 0", "--mac-limit 0 is out of range; use 1 to 4294967295"),
+        ("--gap 0", "--gap 0 is out of range"),
+        ("--gap 1.5", "--gap 1.5 is out of range"),
+        ("--gap nan", "--gap nan is out of range"),
+        ("--saturation-v -1", "--saturation-v -1 must be above 0"),
+        ("--saturation-v inf", "saturation_v = inf is out of range"),
+        ("--only test-s3-99", "no frame is named 'test-s3-99'; did you mean 'test-s3-"),
     ],
 )
 def test_options_of_reconstruct(
-    arguments: list[str], text: str, refused: Refused, frames_file: Path
+    arguments: str, text: str, refused: Refused, frames_file: Path
 ) -> None:
-    assert text in refused(USAGE, "reconstruct", frames_file, *arguments)
+    assert text in refused(USAGE, "reconstruct", frames_file, arguments)
 
 
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["--rank", "-1"], "rank = -1 is out of range"),
-        (["--rank", "2000"], "rank = 2000 is out of range"),
-        (["--pixels", "2"], "2 pixels across is out of range"),
-        (["--pixels", "512"], "pixels are more than a model's 65535"),
-        (["--elements", "99"], "--elements 99 is out of range"),
-        (["--elements", "600000"], "--elements 600000 is out of range"),
-        (["--touch-change", "-1"], "--touch-change -1 is out of range"),
-        (["--touch-change", "nan"], "--touch-change nan is out of range"),
-        (["--regularisation", "-1", "--elements", "800", "--pixels", "8"], "regularisation"),
-        (["skin.toml"], "name a SKIN.toml, or give --paper: one of the two"),
+        ("--rank -1", "rank = -1 is out of range"),
+        ("--rank 2000", "rank = 2000 is out of range"),
+        ("--pixels 2", "2 pixels across is out of range"),
+        ("--pixels 512", "pixels are more than a model's 65535"),
+        ("--elements 99", "--elements 99 is out of range"),
+        ("--elements 600000", "--elements 600000 is out of range"),
+        ("--touch-change -1", "--touch-change -1 is out of range"),
+        ("--touch-change nan", "--touch-change nan is out of range"),
+        ("--regularisation -1 --elements 800 --pixels 8", "regularisation"),
+        ("skin.toml", "name a SKIN.toml, or give --paper: one of the two"),
     ],
 )
 def test_options_of_model_build(
-    arguments: list[str], text: str, refused: Refused, tmp_path: Path
+    arguments: str, text: str, refused: Refused, tmp_path: Path
 ) -> None:
-    assert text in refused(
-        USAGE, "model", "build", "--paper", "-o", tmp_path / "out.eitm", *arguments
-    )
+    assert text in refused(USAGE, f"model build --paper -o {tmp_path / 'out.eitm'}", arguments)
 
 
 def test_neither_a_skin_nor_the_paper(refused: Refused, tmp_path: Path) -> None:
     assert "name a SKIN.toml, or give --paper" in refused(
-        USAGE, "model", "build", "-o", tmp_path / "out.eitm"
+        USAGE, f"model build -o {tmp_path / 'out.eitm'}"
     )
 
 
-@pytest.mark.parametrize("arguments", [["--snr-db", "-30"], ["--snr-db", "nan"], ["--seed", "-1"]])
-def test_options_of_the_demo(arguments: list[str], refused: Refused, tmp_path: Path) -> None:
-    assert "demo:" in refused(USAGE, "demo", "--picture", tmp_path / "out.png", *arguments)
+@pytest.mark.parametrize("arguments", ["--snr-db -30", "--snr-db nan", "--seed -1"])
+def test_options_of_the_demo(arguments: str, refused: Refused, tmp_path: Path) -> None:
+    assert "demo:" in refused(USAGE, "demo", "--picture", tmp_path / "out.png", arguments)
 
 
 # ---- extras ----
