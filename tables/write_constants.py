@@ -10,10 +10,8 @@ from write_c import comment
 
 
 def c_constants(tables: Tables) -> Iterator[tuple[str, Lines]]:
-    """A header a room that C has."""
+    """A header a room."""
     for room in tables["constants"]["room"]:
-        if room.get("numpy_only"):
-            continue
         yield room.get("header", f"csrc/src/{room['name']}/constants.h"), _header(room)
 
 

@@ -10,20 +10,23 @@
  *     untouched COUNT     take the reference from as many frames, until one is refused
  *     frames COUNT    reconstruct as many
  *     solve COUNT     as many vectors of reduced data, by the solver alone
- *     forget
+ *     drives COUNT STEP   as many scans by the fast path, each drive STEP after the last, and by
+ * the solver what the fast path trusts forget
  *
  * A frame's line says why the solve stopped, iterations, MACs and instructions of the solve and of
  * the touches, instructions of the gestures made of them, the stack that they took, the image's
- * CRC-32, info and touches. Floats are printed as bits: there is nothing to round. */
+ * CRC-32, info and touches; a drive's line the instructions of the fast path, the stack, and its
+ * touches. Floats are printed as bits: there is nothing to round. */
 #include "eitskin/eitskin.h"
 
 #include <stdio.h>
 #include <string.h>
 
-enum { MAX_MODEL = 2048 * 1024, MAX_WORKSPACE = 1024 * 1024, MAX_ROWS = 4096 };
+enum { MAX_MODEL = 2048 * 1024, MAX_WORKSPACE = 1024 * 1024, MAX_ROWS = 4096, MAX_FAST = 65536 };
 
 static _Alignas(16) uint8_t model_bytes[MAX_MODEL];
 static _Alignas(16) uint8_t workspace[MAX_WORKSPACE];
+static _Alignas(16) uint8_t fast_memory[MAX_FAST];
 static float frame[MAX_ROWS], reduced_data[EITS_MAX_RANK];
 static eits_model model;
 static eits_context *ctx;
@@ -33,7 +36,7 @@ static eits_gestures gestures;
 static eits_event events[EITS_MAX_EVENTS];
 static FILE *numbers;
 
-enum { FRAME_US = 20833 }; /* 48 frames a second */
+enum { FRAME_US = 20833, ROW_US = 100 }; /* 48 frames a second */
 
 #ifdef EITS_BARE
 /* CMSDK timer 0 at 25 MHz counts down; QEMU's -icount shift=6 makes it 1.6 ticks an instruction. */
@@ -257,6 +260,75 @@ static int solve_one(unsigned k, int reduced)
     return 1;
 }
 
+/* One drive of the frame at hand. */
+static void play_drive(eits_fast *fast, uint32_t drive, uint32_t time_us)
+{
+    eits_real volts[EITS_FAST_ROWS];
+    eits_fast_touch touches[EITS_FAST_TOUCHES];
+    uint32_t count, found = 0;
+    const uint16_t *rows = eits_fast_rows(fast, drive, &count);
+    for (uint32_t i = 0; i < count; ++i)
+        volts[i] = frame[rows[i]];
+    volatile uint32_t *const painted = lowest_painted();
+    paint_stack(painted);
+    start_timer();
+    const eits_status status = eits_fast_drive(fast, drive, volts, count, time_us);
+    const unsigned long instructions = instructions_since_start();
+    (void)eits_fast_touches(fast, touches, EITS_FAST_TOUCHES, &found);
+    printf("drive %lu status %d fast %lu stack %lu touches %lu", (unsigned long)drive, (int)status,
+           instructions, stack_used(painted), (unsigned long)found);
+    for (uint32_t k = 0; k < found; ++k) {
+        const eits_fast_touch *t = touches + k;
+        printf(" %lu:%lu:%08lx:%08lx:%08lx:%08lx:%08lx", (unsigned long)t->id,
+               (unsigned long)t->confirmed, bits_of(t->x_mm), bits_of(t->y_mm),
+               bits_of(t->vx_mm_per_s), bits_of(t->vy_mm_per_s), bits_of(t->strength_s_per_m_mm2));
+    }
+    printf("\n");
+}
+
+/* What the solver says of the scan goes back to the fast path. */
+static void end_scan(eits_fast *fast)
+{
+    eits_touch touches[EITS_MAX_TOUCHES];
+    uint32_t state = 0, found = 0;
+    start_timer();
+    const eits_status status = eits_fast_align(fast, frame, model.n_rows, frame, &state);
+    const unsigned long align = instructions_since_start();
+    unsigned long confirm = 0;
+    if ((state & EITS_FAST_TRUSTED) != 0) {
+        (void)eits_reconstruct(ctx, frame, model.n_rows, NULL, NULL);
+        (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &found);
+        start_timer();
+        (void)eits_fast_confirm(fast, touches, found);
+        confirm = instructions_since_start();
+    }
+    printf("scan status %d align %lu confirm %lu state %lu frame %08lx\n", (int)status, align,
+           confirm, (unsigned long)state,
+           (unsigned long)eits_crc32(0, frame, (size_t)model.n_rows * sizeof frame[0]));
+}
+
+static int play_scans(unsigned count, unsigned step)
+{
+    eits_fast *fast;
+    const size_t need = eits_fast_size(&model);
+    eits_status status =
+        need <= MAX_FAST ? eits_fast_init(fast_memory, need, ctx, &fast) : EITS_E_WORKSPACE;
+    if (status == EITS_OK)
+        status = eits_fast_begin(fast);
+    printf("fast status %d workspace %lu\n", (int)status, (unsigned long)need);
+    for (unsigned k = 0; k < count; ++k) {
+        if (!read_numbers(frame, model.n_rows))
+            return fail("frames.f32 is short");
+        if (status != EITS_OK)
+            continue;
+        const uint32_t drives = eits_fast_drives(fast), drive_us = ROW_US * model.n_rows / drives;
+        for (uint32_t n = 0; n < drives; ++n)
+            play_drive(fast, n * step % drives, (k * drives + n) * drive_us);
+        end_scan(fast);
+    }
+    return 1;
+}
+
 /* One line of the script; 0 ends the run. */
 static int obey(const char *word, FILE *script)
 {
@@ -283,6 +355,8 @@ static int obey(const char *word, FILE *script)
         eits_forget(ctx);
         return 1;
     }
+    if (strcmp(word, "drives") == 0)
+        return fscanf(script, "%u %u", &a, &b) == 2 && play_scans(a, b);
     const int reduced = strcmp(word, "solve") == 0;
     if ((!reduced && strcmp(word, "frames") != 0) || fscanf(script, "%u", &a) != 1)
         return fail("unknown word");

@@ -11,6 +11,7 @@
  *     diagnostics.h  what is wrong with a frame, by name
  *     solve.h        from the data to an image
  *     touch.h        from the image to touches; force.h: how hard they press
+ *     fast.h         touches after each drive, before the frame is whole
  *     gesture.h      from touches in time to taps, swipes, pinches; zone.h: named zones pressed
  *     batch.h        many frames at once, on a host
  *     link.h         the packets between a board and a host
@@ -40,6 +41,7 @@
 #include "eitskin/batch.h"
 #include "eitskin/context.h"
 #include "eitskin/diagnostics.h"
+#include "eitskin/fast.h"
 #include "eitskin/force.h"
 #include "eitskin/frame.h"
 #include "eitskin/gesture.h"

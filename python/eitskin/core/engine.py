@@ -96,6 +96,26 @@ class CoreEngine:
         """The name of the matrix products in use."""
         return str(self._ffi.string(self._lib.eits_kernels_name(self._context)).decode())
 
+    @property
+    def lib(self) -> Any:
+        """The C functions, for what else works on this context."""
+        return self._lib
+
+    @property
+    def ffi(self) -> Any:
+        """cffi's side of them."""
+        return self._ffi
+
+    @property
+    def model(self) -> Any:
+        """The eits_model."""
+        return self._model
+
+    @property
+    def context(self) -> Any:
+        """The eits_context."""
+        return self._context
+
     def _view(self, pointer: Any, count: int) -> npt.NDArray[Any]:
         """An array over ``count`` reals of the context's memory, not a copy."""
         return np.frombuffer(

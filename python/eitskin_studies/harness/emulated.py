@@ -22,6 +22,7 @@ from eitskin.core.results import Options
 from eitskin.errors import UsageError
 from eitskin_studies.harness.emulated_steps import (
     Choose,
+    Drives,
     Load,
     Play,
     Solve,
@@ -38,12 +39,40 @@ BOARD = (
 )
 PROGRAM = Path("tests") / "emulated" / "frames_m7.elf"
 MAX_SECONDS = 300
-STATUS = re.compile(r"(model|choose|quiet) status (-?\d+)(?: workspace (\d+) kernels (\S+))?")
+STATUS = re.compile(
+    r"(model|choose|quiet|fast) status (-?\d+)(?: workspace (\d+)(?: kernels (\S+))?)?"
+)
 LINE = re.compile(
     r"frame (\d+) status (-?\d+) stop (\d+) iterations (\d+) macs (\d+) touchmacs (\d+) solve (\d+)"
     r" touch (\d+) gesture (\d+) stack (\d+) "
     r"image ([0-9a-f]{8}) info (\S+) touches (\d+)(.*)"
 )
+
+DRIVE = re.compile(r"drive (\d+) status (-?\d+) fast (\d+) stack (\d+) touches (.*)")
+SCAN = re.compile(r"scan status (-?\d+) align (\d+) confirm (\d+) state (\d+) frame ([0-9a-f]{8})")
+
+
+@dataclass(frozen=True)
+class EmulatedDrive:
+    """One drive by the fast path, its touches as printed; ``stack_bytes`` the deepest."""
+
+    drive: int
+    status: int
+    instructions: int
+    stack_bytes: int
+    touches: str
+
+
+@dataclass(frozen=True)
+class EmulatedScan:
+    """A frame brought to one instant: instructions of that, and of what the solver's touches then
+    confirm; bits of eits_fast_frame; the CRC-32 of its rows."""
+
+    status: int
+    align_instructions: int
+    confirm_instructions: int
+    state: int
+    frame_crc: int
 
 
 @dataclass(frozen=True)
@@ -80,12 +109,16 @@ class EmulatedFrame:
 @dataclass(frozen=True)
 class EmulatedRun:
     """What a run printed: the last model's workspace in bytes, the name of its kernels, a result a
-    frame, and the statuses of every model, choice of options and tare."""
+    frame, drive and scan, the bytes of the last fast path (0: none), and the statuses of every
+    model, choice of options, tare and fast path."""
 
     workspace_bytes: int
     kernels: str
     frames: tuple[EmulatedFrame, ...]
     statuses: tuple[tuple[str, int], ...]
+    drives: tuple[EmulatedDrive, ...] = ()
+    scans: tuple[EmulatedScan, ...] = ()
+    fast_bytes: int = 0
 
 
 def checkout_root() -> Path:
@@ -217,11 +250,34 @@ def run_steps(
     wanted = sum(len(step.frames_v) for step in steps if isinstance(step, Play)) + sum(
         len(step.data) for step in steps if isinstance(step, Solve)
     )
+    drives = [match.groups() for match in map(DRIVE.match, lines) if match is not None]
+    scans = [match.groups() for match in map(SCAN.match, lines) if match is not None]
+    fast = [match for match in heads if match[1] == "fast"]
+    played = sum(len(step.scans_v) for step in steps if isinstance(step, Drives))
+    short = len(found) != wanted or (len(scans) != played and all(one[2] == "0" for one in fast))
     refused = bool(models) and models[-1][2] != "0"
-    if not models or (not refused and (done.returncode != 0 or len(found) != wanted)):
+    if not models or (not refused and (done.returncode != 0 or short)):
         raise UsageError(f"the emulated board failed: {(done.stdout + done.stderr).strip()[-500:]}")
     statuses = tuple((match[1], int(match[2])) for match in heads)
-    return EmulatedRun(int(models[-1][3]), models[-1][4], tuple(map(_frame, found)), statuses)
+    return EmulatedRun(
+        int(models[-1][3]),
+        models[-1][4],
+        tuple(map(_frame, found)),
+        statuses,
+        tuple(map(_drive, drives)),
+        tuple(map(_scan, scans)),
+        int(fast[-1][3]) if fast else 0,
+    )
+
+
+def _drive(words: Sequence[str]) -> EmulatedDrive:
+    drive, status, instructions, stack = map(int, words[:4])
+    return EmulatedDrive(drive, status, instructions, stack, words[4])
+
+
+def _scan(words: Sequence[str]) -> EmulatedScan:
+    status, align, confirm, state = map(int, words[:4])
+    return EmulatedScan(status, align, confirm, state, int(words[4], 16))
 
 
 def _frame(match: re.Match[str]) -> EmulatedFrame:

@@ -58,12 +58,21 @@ class Solve:
     data: npt.NDArray[Any]
 
 
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """Play scans (k, m), volts, through the fast path, each drive ``step`` after the last; the
+    solver sees what that trusts."""
+
+    scans_v: npt.NDArray[Any]
+    step: int
+
+
 @dataclass(frozen=True)
 class Forget:
     """Forget the warm start and the touches that were followed."""
 
 
-Step = Load | Choose | Mask | TareStep | Play | Solve | Forget
+Step = Load | Choose | Mask | TareStep | Play | Solve | Drives | Forget
 
 
 def write_steps(folder: Path, steps: Sequence[Step], *, portable: bool = False) -> None:
@@ -82,15 +91,19 @@ def write_steps(folder: Path, steps: Sequence[Step], *, portable: bool = False) 
             lines.append("forget")
         else:
             word, values = _numbers_of(step)
-            lines.append(f"{word} {len(values)}")
+            lines.append(
+                f"{word} {len(values)}" + (f" {step.step}" if isinstance(step, Drives) else "")
+            )
             numbers.append(np.asarray(values).astype("<f4").tobytes())
     (folder / "script.txt").write_text("\n".join(lines) + "\n", encoding="ascii")
     (folder / "frames.f32").write_bytes(b"".join(numbers))
 
 
-def _numbers_of(step: TareStep | Play | Solve) -> tuple[str, npt.NDArray[Any]]:
+def _numbers_of(step: TareStep | Play | Solve | Drives) -> tuple[str, npt.NDArray[Any]]:
     if isinstance(step, TareStep):
         return "quiet", step.quiet_v
+    if isinstance(step, Drives):
+        return "drives", step.scans_v
     return ("frames", step.frames_v) if isinstance(step, Play) else ("solve", step.data)
 
 

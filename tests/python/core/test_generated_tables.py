@@ -28,7 +28,6 @@ else:
 
 WIDTHS = ("float32", "float64")
 CONSTANTS = tomllib.loads((ROOT / "tables" / "constants.toml").read_text(encoding="utf-8"))["room"]
-IN_C = [room for room in CONSTANTS if not room.get("numpy_only")]
 
 
 def test_what_is_written_from_the_tables_is_up_to_date() -> None:
@@ -41,7 +40,7 @@ def test_what_is_written_from_the_tables_is_up_to_date() -> None:
     assert done.returncode == 0, f"run  python tables/make_tables.py\n{done.stdout}{done.stderr}"
 
 
-@pytest.mark.parametrize("room", IN_C, ids=[room["name"] for room in IN_C])
+@pytest.mark.parametrize("room", CONSTANTS, ids=[room["name"] for room in CONSTANTS])
 def test_a_constant_is_used_where_its_room_has_it(room: dict[str, Any]) -> None:
     header = ROOT / room.get("header", f"csrc/src/{room['name']}/constants.h")
     others = [path for path in header.parent.glob("*.[ch]") if path != header]

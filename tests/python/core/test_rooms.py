@@ -22,8 +22,12 @@ ROOMS = (
     "evidence",
     "api",
 )
-# know nothing of contexts
-APART = {"link": ("base", "link"), "gesture": ("base", "gesture")}
+# of no stage of a frame; the first two know nothing of contexts
+APART = {
+    "link": ("base", "link"),
+    "gesture": ("base", "gesture"),
+    "fast": ("base", "context", "fast"),
+}
 # which rooms write the fields of each part of a context; api lays out, and starts and ends stages
 OWNERS = {
     "reference": {"frame"},

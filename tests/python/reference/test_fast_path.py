@@ -1,4 +1,4 @@
-"""The fast path's numpy reference on rows in time: touches land, move and lift within a scan."""
+"""The fast path on rows in time: touches land, move and lift within a scan; C against numpy."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eitskin.errors import UsageError
+from eitskin.core.engine import CoreEngine
+from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
+from eitskin.core.results import Reconstruction
+from eitskin.errors import FrameError, UsageError
+from eitskin.model.eitm import encode_model
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.reference.row_gains import row_gains
 from eitskin_studies.experiments import fast_path
 from eitskin_studies.experiments.fast_path.scans import Outcome, Player
 from eitskin_studies.experiments.fast_path.states import States, draw_states
@@ -29,10 +34,54 @@ def solved() -> dict[str, States]:
     }
 
 
-def played(make: Callable[..., Outcome], states: States, k: int, snr_db: float = 60.0) -> Outcome:
+class Twins(Player):
+    """C and numpy side by side."""
+
+    def tare(self, v0: np.ndarray, sigma: float, rng: np.random.Generator) -> None:
+        super().tare(v0, sigma, rng)
+        learned = self.engine.ffi.new("eits_reference_info *")
+        self.engine.lib.eits_get_reference(self.engine.context, learned)
+        v0 = np.array(self.engine.ffi.unpack(learned.v0, len(v0)))
+        gains = row_gains(self.model, np.isfinite(v0), learned.gain * v0)[0]
+        self.path, self.off_mm = FastPath(self.model), 0.0
+        self.path.tare(v0, learned.noise_v, learned.gain * gains)
+
+    def both(self, c: list[FastTouch], numpy: list[FastTouch]) -> list[FastTouch]:
+        if self.engine.dtype == np.float64:
+            assert c == numpy
+        assert [(one.id, one.confirmed) for one in c] == [(one.id, one.confirmed) for one in numpy]
+        for one, other in zip(c, numpy, strict=True):
+            off = np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm)
+            self.off_mm = max(self.off_mm, float(off))
+        return c
+
+    def drive(self, number: int, volts: np.ndarray, time_s: float) -> list[FastTouch]:
+        return self.both(
+            super().drive(number, volts, time_s), self.path.drive(number, volts, time_s)
+        )
+
+    def aligned(self, frame: np.ndarray) -> AlignedFrame:
+        c, numpy = super().aligned(frame), self.path.aligned(frame)
+        assert (c.explained, c.trusted) == (numpy.explained, numpy.trusted)
+        assert self.engine.dtype == np.float32 or c.volts.tobytes() == numpy.volts.tobytes()
+        return c
+
+    def confirm(self, found: Reconstruction) -> list[FastTouch]:
+        info = found.info
+        named = (*info.open_electrodes, *info.bridged_electrodes, *info.noisy_electrodes)
+        return self.both(super().confirm(found), self.path.confirm(found.touches, named))
+
+
+def played(
+    make: Callable[..., Outcome],
+    states: States,
+    k: int,
+    snr_db: float = 60.0,
+    player: Player | None = None,
+) -> Outcome:
     rng = np.random.default_rng([SEED, k])
     sigma = float(np.sqrt(np.mean(states.v0[k] ** 2))) / 10 ** (snr_db / 20)
-    player = Player(*load_prebuilt())
+    player = player or Player(*load_prebuilt())
     player.tare(states.v0[k], sigma, rng)
     return make(player, states, k, rng, sigma)
 
@@ -64,6 +113,18 @@ def test_touches_are_told_soon_where_they_are_and_no_others(
             assert np.median(errors) < 1.5
 
 
+@pytest.mark.parametrize("name", [*SCENES, "light press"])
+def test_numpy_has_the_cores_bits_in_double_and_its_decisions_in_single_width(
+    solved: dict[str, States], name: str
+) -> None:
+    """In single width places are within .1 mm, with faults that frames have yet to name 1 mm."""
+    kind, make = SCENES[name][:2] if name in SCENES else ("presses", SCENES["sudden press"][1])
+    for width in ("float64", "float32"):
+        twins = Twins(*load_prebuilt(), width)
+        played(make, solved[kind], 0, 60.0 if name in SCENES else 40.0, twins)
+        assert twins.off_mm < (1 if "electrode" in name else 0.1)
+
+
 def test_quiet_frames_keep_their_bits_and_hold_no_touch(solved: dict[str, States]) -> None:
     quiet = partial(fast_path._fault, spoil=fast_path._nothing, press=False)
     outcome = played(quiet, solved["presses"], 0)
@@ -85,5 +146,25 @@ def test_light_touches_come_from_whole_frames(solved: dict[str, States]) -> None
 
 
 def test_a_model_without_fields_has_no_fast_path() -> None:
+    model = replace(load_prebuilt()[0], fields=None)
     with pytest.raises(UsageError, match="no fields"):
-        FastPath(replace(load_prebuilt()[0], fields=None))
+        FastPath(model)
+    with pytest.raises(UsageError, match="no fields"):
+        FastCore(CoreEngine(encode_model(model)))
+
+
+def test_what_is_not_a_drive_is_refused() -> None:
+    engine = CoreEngine(load_prebuilt()[1])
+    fast = FastCore(engine)
+    with pytest.raises(FrameError, match="no reference"):
+        fast.begin()
+    quiet = load_prebuilt()[0].golden.reference_v + 1e-6 * np.random.default_rng(1).standard_normal(
+        (8, engine.n_rows)
+    )
+    engine.set_reference(quiet)
+    fast.begin()
+    for number, volts in ((0, np.zeros(12)), (16, np.zeros(13))):
+        with pytest.raises(FrameError, match="fast path"):
+            fast.drive(number, volts, 0.0)
+    with pytest.raises(FrameError, match="fast path"):
+        fast.aligned(np.zeros(7))

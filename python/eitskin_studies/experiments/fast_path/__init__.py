@@ -129,7 +129,7 @@ def _ramp(
 
 
 def _begin(player: Player, rng: np.random.Generator) -> float:
-    rows = player.path.model.protocol.n_rows
+    rows = player.model.protocol.n_rows
     return BEFORE_S + ROW_S * rows * float(rng.uniform())
 
 
@@ -142,7 +142,7 @@ def _played(
     lasts_s: float,
     touches: Sequence[tuple[Keyframes, TrueInTime]],
 ) -> Outcome:
-    scan = Scan.of(player.path, lasts_s)
+    scan = Scan.of(player.fast, lasts_s)
     volts = states.volts(k, [path for path, _ in touches], scan.frames)
     return player.play(
         scan, volts + sigma * rng.standard_normal(len(volts)), [true for _, true in touches]
@@ -228,7 +228,7 @@ def _fault(
     spoil: Spoil,
     press: bool = True,
 ) -> Outcome:
-    scan, paths, truth = Scan.of(player.path, FAULTED_END_S), [], []
+    scan, paths, truth = Scan.of(player.fast, FAULTED_END_S), [], []
     if press:
         place, up_s = states.places[k][0], FAULTED_PRESS_S + 0.03
         paths = [[(FAULTED_PRESS_S, *place, 0.0), (up_s, *place, 1.0), (np.inf, *place, 1.0)]]
@@ -254,8 +254,8 @@ def _glitches(
 
 def _with(player: Player, scan: Scan, rng: np.random.Generator) -> npt.NDArray[np.bool_]:
     """Which rows (t, 2) drive, and measure, with an electrode that fails."""
-    table = player.path.model.protocol.drive_measure[scan.row] == rng.integers(
-        player.path.model.protocol.n_electrodes
+    table = player.model.protocol.drive_measure[scan.row] == rng.integers(
+        player.model.protocol.n_electrodes
     )
     late = scan.time_s[:, None] > FAULT_S
     return np.asarray(table.reshape(-1, 2, 2).any(axis=2) & late)

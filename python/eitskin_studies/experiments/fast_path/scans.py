@@ -9,12 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import LearnedReference
+from eitskin.core.engine import CoreEngine
+from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
+from eitskin.core.results import Reconstruction
 from eitskin.model.model import Model
-from eitskin.reference.row_gains import row_gains
 from eitskin.scoring.matching import GATE_MM
-from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.twins.fast.path import FastPath, FastTouch
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -33,16 +32,16 @@ class Scan:
     frames: int
 
     @classmethod
-    def of(cls, path: FastPath, lasts_s: float) -> Scan:
+    def of(cls, fast: FastCore, lasts_s: float) -> Scan:
         """Whole frames for at least ``lasts_s``."""
-        once = np.concatenate([path.drives[d].rows for d in order(path)])
+        once = np.concatenate([fast.rows[d] for d in order(fast)])
         frames = int(np.ceil(lasts_s / (ROW_S * len(once))))
         return cls(np.tile(once, frames), np.asarray(ROW_S * np.arange(frames * len(once))), frames)
 
 
-def order(path: FastPath) -> list[int]:
+def order(fast: FastCore) -> list[int]:
     """Drives of a frame in time."""
-    count = len(path.drives)
+    count = len(fast.rows)
     return [STEP * k % count for k in range(count)] if count % STEP else list(range(count))
 
 
@@ -69,53 +68,62 @@ class Outcome:
 
 
 class Player:
-    """Plays scans through the fast path with the whole-frame core beside it."""
+    """Plays scans through the C core's fast path, the whole-frame solver beside it, both of
+    ``width``."""
 
-    def __init__(self, model: Model, blob: bytes, *, whole: bool = True) -> None:
-        self.model, self.whole = model, whole
-        self.path = FastPath(model)
-        self.core = Reconstructor(model, engine="c", blob=blob)
+    def __init__(self, model: Model, blob: bytes, width: str = "float32") -> None:
+        self.model, self.engine = model, CoreEngine(blob, width)
+        self.fast = FastCore(self.engine)
 
     def tare(self, v0: FloatArray, sigma: float, rng: np.random.Generator) -> None:
         """Take the reference from noisy frames of ``v0`` (m,) V."""
-        quiet = v0 + sigma * rng.standard_normal((TARE_FRAMES, len(v0)))
-        learned: LearnedReference = self.core.tare(quiet)
-        self.core.forget()
-        mean, usable = quiet.mean(axis=0), np.ones(len(v0), dtype=np.bool_)
-        gains = row_gains(self.model, usable, learned.gain * mean)[0]
-        self.path.tare(mean, learned.noise_v, learned.gain * gains)
+        self.engine.set_reference(v0 + sigma * rng.standard_normal((TARE_FRAMES, len(v0))))
+        self.engine.forget()
+        self.fast.begin()
+
+    def drive(self, number: int, volts: FloatArray, time_s: float) -> list[FastTouch]:
+        """A drive of a scan."""
+        return self.fast.drive(number, volts, time_s)
+
+    def aligned(self, frame: FloatArray) -> AlignedFrame:
+        """The scan at one instant."""
+        return self.fast.aligned(frame)
+
+    def confirm(self, found: Reconstruction) -> list[FastTouch]:
+        """What the solver made of it goes back."""
+        return self.fast.confirm(found.touches)
 
     def play(self, scan: Scan, volts: FloatArray, truth: Sequence[TrueInTime]) -> Outcome:
         """``volts`` (t,) as ``scan`` measured them."""
         out = Outcome(first=[None] * len(truth), errors=[[] for _ in truth])
-        frame, at = np.full(len(self.path.model.protocol.drive_measure), np.nan), 0
-        drives = order(self.path)
+        frame, at = np.full(self.model.protocol.n_rows, np.nan), 0
+        drives = order(self.fast)
         while at < len(volts):
             for number in drives:
-                rows = self.path.drives[number].rows
+                rows = self.fast.rows[number]
                 mine = slice(at, at + len(rows))
                 at += len(rows)
                 end_s = float(scan.time_s[mine][-1]) + ROW_S
                 middle_s = (float(scan.time_s[mine][0]) + end_s) / 2
                 frame[rows] = volts[mine]
-                told = self.path.drive(number, volts[mine], middle_s)
-                if number == drives[-1] and self.whole:
+                told = self.drive(number, volts[mine], middle_s)
+                if number == drives[-1]:
                     told = self._whole_frame(frame, out.frames)
                 _score(out, truth, told, middle_s, end_s)
         return out
 
     def _whole_frame(self, frame: FloatArray, count: Counter[str]) -> list[FastTouch]:
-        aligned = self.path.aligned(frame)
+        aligned = self.aligned(frame)
         count["frames"] += 1
         count["explained"] += aligned.explained
-        count["same"] += np.array_equal(aligned.volts, frame)
+        count["same"] += np.array_equal(aligned.volts, frame.astype(aligned.volts.dtype))
         if not aligned.trusted:
-            return self.path.touches()
-        found = self.core.reconstruct(aligned.volts)
+            return self.fast.touches()
+        found = self.engine.reconstruct(aligned.volts)
         info = found.info
         electrodes = (*info.open_electrodes, *info.bridged_electrodes, *info.noisy_electrodes)
         count["named"] += bool(electrodes) or "outlier" in info.diagnostics_by_name
-        return self.path.confirm(found.touches, electrodes)
+        return self.confirm(found)
 
 
 def _score(

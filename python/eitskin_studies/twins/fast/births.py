@@ -26,7 +26,7 @@ from eitskin.core.constants_table import (
     FAST_STEPS,
 )
 from eitskin_studies.twins.fast.rows import Drive, RowModel
-from eitskin_studies.twins.fast.tracks import lower_solve
+from eitskin_studies.twins.fast.tracks import dot, lower_factor, lower_solve, summed
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -73,36 +73,36 @@ def inverted(h: FloatArray) -> FloatArray | None:
     if not (diagonal > 0).all():
         return None
     scale = 1 / np.sqrt(diagonal)
-    unit = h * np.outer(scale, scale)
-    factor = np.zeros_like(unit)
-    for i in range(len(unit)):
-        for j in range(i):
-            factor[i, j] = (unit[i, j] - factor[i, :j] @ factor[j, :j]) / factor[j, j]
-        square = unit[i, i] - factor[i, :i] @ factor[i, :i]
-        if not square > FAST_SINGULAR:
-            return None
-        factor[i, i] = np.sqrt(square)
+    factor = lower_factor(h * scale[:, None] * scale, np.nan)
+    pivots = np.diag(factor)
+    if not (pivots * pivots > FAST_SINGULAR).all():
+        return None
     half = lower_solve(factor, np.diag(scale))
-    return np.asarray(half.T @ half)
+    return summed(half[:, :, None] * half[:, None, :])
+
+
+def apart(places: FloatArray, place: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which ``places`` (k, 2) are further than FAST_APART_MM from ``place`` (2,)."""
+    x, y = (places - place).T
+    return np.asarray(x * x + y * y > FAST_APART_MM * FAST_APART_MM)
 
 
 def strengths(answers: FloatArray, white: FloatArray, sign: float) -> FloatArray:
     """The least squares of ``white`` (r,) by ``answers`` (k, r), k one or two, none of the wrong
     ``sign``, (k,)."""
-    gram, along = answers @ answers.T, np.maximum(sign * (answers @ white), 0.0)
-    alone = np.array([a / g if g > 0 else 0.0 for a, g in zip(along, np.diag(gram), strict=True)])
-    if len(answers) == 1:
-        return np.asarray(sign * alone)
-    cross, (first, second) = gram[0, 1], np.diag(gram)
-    det, toward = first * second - cross**2, sign * (answers @ white)
-    if det > FAST_SINGULAR * first * second:
-        both = np.array(
-            [second * toward[0] - cross * toward[1], first * toward[1] - cross * toward[0]]
-        )
-        if (both >= 0).all():
-            return np.asarray(sign * both / det)
-    alone[0 if alone[0] * along[0] < alone[1] * along[1] else 1] = 0.0
-    return np.asarray(sign * alone)
+    gram = [dot(g, g) for g in answers]
+    toward = [sign * dot(g, white) for g in answers]
+    alone = [a / g if g > 0 and a > 0 else 0.0 for a, g in zip(toward, gram, strict=True)]
+    if len(answers) == 2:
+        cross, both = dot(answers[0], answers[1]), gram[0] * gram[1]
+        det = both - cross * cross
+        first = gram[1] * toward[0] - cross * toward[1]
+        second = gram[0] * toward[1] - cross * toward[0]
+        if det > FAST_SINGULAR * both and first >= 0 and second >= 0:
+            alone = [first / det, second / det]
+        else:
+            alone[0 if alone[0] * toward[0] < alone[1] * toward[1] else 1] = 0.0
+    return sign * np.array(alone)
 
 
 class Births:
@@ -137,7 +137,7 @@ class Births:
     def _refined(self, held: list[Held], score: FloatArray, places: FloatArray) -> list[Fit]:
         starts = self._peaks(score, places)
         for start in starts:  # where the last drive's search has come to
-            near = np.hypot(*(self._last - start).T) <= FAST_APART_MM
+            near = ~apart(self._last, start)
             if not len(places) and near.any():
                 start[:] = self._last[int(np.argmax(near))]
         fits = [self._refine(held, np.vstack([places, start])) for start in starts]
@@ -153,25 +153,28 @@ class Births:
     def _explained_at_cells(self, one: Held, places: FloatArray) -> FloatArray:
         """What a touch at each cell (n,) would explain of a drive's chi^2, beside those at
         ``places`` (k, 2)."""
-        answer, white = lower_solve(one.factor, self._at_cells(one.drive)), one.white
+        answer, white = lower_solve(one.factor, self._at_cells(one.drive)), one.white[:, None]
+        along = summed(answer * white)
         for place in places:
             known = lower_solve(one.factor, self.model.answer(one.drive, *place)[0][0])
-            energy = float(known @ known)
+            energy = dot(known, known)
             if energy > 0:
-                white = white - (known @ white) / energy * known
-                answer = answer - np.outer(known, known @ answer) / energy
-        along, energies = np.maximum(self.sign * (white @ answer), 0.0), (answer**2).sum(axis=0)
-        return np.where(energies > 0, along**2 / np.maximum(energies, 1e-300), 0.0)
+                answer = answer - summed(known[:, None] * answer) / energy * known[:, None]
+                size = dot(known, one.white) / energy
+                along = summed(answer * white) - size * summed(answer * known[:, None])
+        along, own = self.sign * along, summed(answer * answer)
+        tells = (along > 0) & (own > 0)
+        return np.where(tells, along * along / np.where(tells, own, 1.0), 0.0)
 
     def _peaks(self, score: FloatArray, places: FloatArray) -> FloatArray:
         """The greatest cells, apart from each other and from ``places``, (c, 2) mm."""
         score, centres = score.copy(), self.model.centres_mm[self.cells]
         found = np.zeros((0, 2))
         for place in places:
-            score[np.hypot(*(centres - place).T) <= FAST_APART_MM] = 0.0
+            score[~apart(centres, place)] = 0.0
         while len(found) < FAST_STARTS and score.max() > 0:
             best = centres[int(np.argmax(score))]
-            score[np.hypot(*(centres - best).T) <= FAST_APART_MM] = 0.0
+            score[~apart(centres, best)] = 0.0
             found = np.vstack([found, best])
         return found
 
@@ -187,23 +190,29 @@ class Births:
             answers = np.array([lower_solve(one.factor, raw.T).T for raw, _ in seen])
             g, slopes = answers[:, 0], answers[:, 1:]
             c = strengths(g, one.white, self.sign)
-            rest = one.white - c @ g
-            strength[n], left[n] = c, rest @ rest
-            score += float(one.white @ one.white) - left[n]
+            rest, energy = one.white.copy(), dot(one.white, one.white)
             for i in range(k):
-                without = one.white.copy()
-                for other in range(k):
-                    if other != i:
-                        without -= strengths(g[[other]], one.white, self.sign)[0] * g[other]
-                own[i] += float(without @ without) - left[n]
+                rest -= c[i] * g[i]
+            strength[n], left[n] = c, dot(rest, rest)
+            score += energy - left[n]
+            for i in range(k):
+                without = energy
+                if k == 2:  # what the other leaves alone
+                    other = g[1 - i]
+                    alone = strengths(other[None], one.white, self.sign)[0]
+                    without += (alone * dot(other, other) - 2 * dot(other, one.white)) * alone
+                own[i] += without - left[n]
             jac, variance = (c[:, None, None] * slopes).reshape(2 * k, -1), np.zeros(k)
-            basis = np.zeros((0, len(rest)))
+            basis: list[FloatArray] = []
             for i in np.flatnonzero(c).tolist():
-                free = g[i] - basis.T @ (basis @ g[i])
-                variance[i] = 1 / float(free @ free)
-                basis = np.vstack([basis, free * np.sqrt(variance[i])])
-            jac = jac - jac @ basis.T @ basis
-            h, b = h + jac @ jac.T, b + jac @ rest
+                free = g[i]
+                for unit in basis:
+                    free = free - dot(unit, free) * unit
+                variance[i] = 1 / dot(free, free)
+                basis.append(free * np.sqrt(variance[i]))
+            for unit in basis:
+                jac = jac - summed(jac * unit, axis=1)[:, None] * unit
+            h, b = h + summed(jac[:, None] * jac, axis=2), b + summed(jac * rest, axis=1)
         return Fit(places, strength, left, score, own, h, b, variance)
 
     def _refine(self, held: list[Held], places: FloatArray) -> Fit | None:
@@ -212,10 +221,10 @@ class Births:
         for _ in range(min(FAST_STEPS, max(1, FAST_ANSWERS // (len(held) * len(places)) - 1))):
             if fit is None:
                 return None
-            damped = inverted(fit.h + FAST_DAMPING * np.diag(np.diag(fit.h)))
+            damped = inverted(fit.h + np.diag(FAST_DAMPING * np.diag(fit.h)))
             if damped is None:
                 return fit
-            step = shorter * (damped @ fit.b).reshape(-1, 2)
+            step = shorter * summed(damped * fit.b, axis=1).reshape(-1, 2)
             length = float(np.abs(step).max())
             if length > FAST_MAX_STEP_MM:
                 step, length = step * (FAST_MAX_STEP_MM / length), FAST_MAX_STEP_MM

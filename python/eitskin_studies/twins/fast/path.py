@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from eitskin.core.constants_table import (
     FAST_AMBIGUOUS,
-    FAST_APART_MM,
     FAST_BIRTH,
     FAST_BIRTH_ERROR,
     FAST_BORN_MM,
@@ -55,38 +54,27 @@ from eitskin.core.constants_table import (
     FAST_UNEXPLAINED,
 )
 from eitskin.core.diagnostics_table import Touch
+from eitskin.core.fast import AlignedFrame, FastTouch
 from eitskin.model.model import Model
-from eitskin_studies.twins.fast.births import Births, Fit, Held, inverted
+from eitskin_studies.twins.fast.births import Births, Fit, Held, apart, inverted
 from eitskin_studies.twins.fast.rows import RowModel, drives_of
-from eitskin_studies.twins.fast.tracks import SIZE, VX, VY, C, Innovation, Tracks, X, Y, lower_solve
+from eitskin_studies.twins.fast.tracks import (
+    SIZE,
+    VX,
+    VY,
+    C,
+    Innovation,
+    Tracks,
+    X,
+    Y,
+    dot,
+    lower_solve,
+    summed,
+)
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 _MEMORY = 32  # drives of which it is known whether they were explained
-
-
-@dataclass(frozen=True)
-class FastTouch:
-    """A touch as told after a drive, for the middle of that drive: mm, mm/s, S/m mm^2."""
-
-    id: int
-    x_mm: float
-    y_mm: float
-    vx_mm_per_s: float
-    vy_mm_per_s: float
-    strength_s_per_m_mm2: float
-    confirmed: bool
-
-
-@dataclass(frozen=True, eq=False)
-class AlignedFrame:
-    """A frame (m,) in V as if all its rows had been measured with its last drive; whether every
-    drive of it is accounted for; and whether what the whole-frame solver says of it is to be told:
-    it is, or drives have not been for some frames."""
-
-    volts: FloatArray
-    explained: bool
-    trusted: bool
 
 
 @dataclass(eq=False)
@@ -130,8 +118,8 @@ class FastPath:
         """Begin without touches: the untouched frame ``v0`` (m,) V, the rows' noise, and model
         volts per measured volt of each row (m,)."""
         self._v0, self._noise_v, self._gain = v0, noise_v, gain
-        self._sigma = noise_v * float(np.sqrt(np.mean(gain**2)))
-        self._drift, self._time_s = 0.0, np.nan
+        self._sigma = noise_v * float(np.sqrt(dot(gain, gain) / len(gain)))
+        self._drift, self._time_us = 0.0, -1
         self.tracks, self._known = Tracks(), list[_Known]()
         self._held, self._quiet, self._waited, self._glitched = list[Held](), 0, 0, False
         self._first: FloatArray | None = None
@@ -144,7 +132,7 @@ class FastPath:
 
     def drive(self, number: int, volts: FloatArray, time_s: float) -> list[FastTouch]:
         """The rows (r,) in V of drive ``number``, nan where there is none, measured about
-        ``time_s``; returns what touches the skin."""
+        ``time_s``, which counts by microseconds; returns what touches the skin."""
         drive = self.drives[number]
         v0 = self._v0[drive.rows]
         used = np.isfinite(volts) & np.isfinite(v0) & ~self._masked[drive.rows]
@@ -153,9 +141,10 @@ class FastPath:
         z = self._gain[drive.rows] * np.where(used, volts - (1 + self._drift) * v0, 0.0)
         used &= np.abs(z) < FAST_FAR * self._sigma
         z = np.where(used, z, 0.0)
-        if self._time_s < time_s:
-            self.tracks.predict(time_s - self._time_s)
-        self._time_s = time_s
+        time_us = round(1e6 * time_s)
+        if 0 <= self._time_us < time_us:
+            self.tracks.predict((time_us - self._time_us) * 1e-6)
+        self._time_us = time_us
         self._past[number] = _Past()
         self._changed = False
         explained = self._look(number, z, used)
@@ -204,12 +193,16 @@ class FastPath:
             return self._find_births()
         if self._quiet >= FAST_QUIET:
             self._held = []
+        left = z.copy()
         for known, strength, answer in zip(
             self._known, tracks.state[:, C], answers[:, 0], strict=True
         ):
-            energy = (strength / self._sigma) ** 2 * float(answer @ answer)
-            known.energy += (energy - known.energy) / FAST_ENERGY_DRIVES
-        self._follow_drift(z - tracks.state[:, C] @ answers[:, 0], used, along)
+            ratio = float(strength) / self._sigma
+            known.energy += (ratio * ratio * dot(answer, answer) - known.energy) / (
+                FAST_ENERGY_DRIVES
+            )
+            left -= strength * answer
+        self._follow_drift(left, along)
         tracks.update(seen)
         return True
 
@@ -223,7 +216,7 @@ class FastPath:
     ) -> Innovation | None:
         """The rows without one that is a glitch, or without a drift of the gain, where that and no
         touch explains them."""
-        own = seen.e**2 / (seen.factor**2).sum(axis=1)
+        own = seen.e**2 / summed(seen.factor**2, axis=1)
         worst = int(np.argmax(own))
         if own[worst] > FAST_GLITCH and not self._glitched:
             without = used.copy()
@@ -234,21 +227,20 @@ class FastPath:
                 return rest
         self._glitched = False
         drift = lower_solve(seen.factor, along)
-        energy = float(drift @ drift)
+        energy = dot(drift, drift)
         if not energy > 0:
             return None
-        size = float(drift @ seen.white) / energy
-        rest = replace(seen, white=seen.white - size * drift)
-        if not (rest.chi2 < FAST_NEWS and abs(size) < FAST_MAX_DRIFT):
+        size = dot(drift, seen.white) / energy
+        if not (seen.chi2 - size * size * energy < FAST_NEWS and abs(size) < FAST_MAX_DRIFT):
             return None
         self._drift += FAST_DRIFT_STEP * size
-        return rest
+        return replace(seen, white=seen.white - size * drift)
 
-    def _follow_drift(self, left: FloatArray, used: BoolArray, along: FloatArray) -> None:
-        """A little of what is left along v0 is drift of the gain."""
-        energy = float(along @ along)
+    def _follow_drift(self, left: FloatArray, along: FloatArray) -> None:
+        """A little of what is ``left`` along v0 is drift of the gain."""
+        energy = dot(along, along)
         if energy > 0:
-            self._drift += FAST_GAIN_STEP * float(along @ np.where(used, left, 0.0)) / energy
+            self._drift += FAST_GAIN_STEP * dot(along, left) / energy
 
     # ---- births ----
 
@@ -278,7 +270,7 @@ class FastPath:
         if fits:
             self._first = fits[0].places if len(held) > 1 else None
             spoiled, left = int(np.argmax(fits[0].left)), fits[0].left
-            if left[spoiled] > max(FAST_NEWS, left.sum() / 2) and spoiled < len(held) - 1:
+            if left[spoiled] > max(FAST_NEWS, float(summed(left)) / 2) and spoiled < len(held) - 1:
                 del self._held[1 + spoiled]
                 self._first = None
         return False
@@ -287,8 +279,8 @@ class FastPath:
         """The best of ``fits`` is born where it is believed, with the first drive or without."""
         if not fits:
             return False
-        others = [fit.score for fit in fits[1:] if _apart(fit.places[-1], fits[0].places[-1:])]
-        lead = fits[0].score - max(others, default=0.0)
+        others = [fit.score for fit in fits[1:] if apart(fit.places[-1:], fits[0].places[-1]).all()]
+        lead = fits[0].score - max([0.0, *others])
         for drives in (held, self._held) if len(fits[0].places) == 1 else (held,):
             fit = fits[0] if drives is held else self._births.fit(drives, fits[0].places)
             if fit is not None and self._believed(fit, lead, drives):
@@ -302,15 +294,17 @@ class FastPath:
         inverse = inverted(best.h)
         if inverse is None:
             return False
-        left, kappa = float(best.left.sum()), _excess(best, held)
+        left, kappa = float(summed(best.left)), _excess(best, held)
+        on = self.tracks.state[[known.on for known in self._known], :2]  # others give way
         spread = max(float(np.trace(inverse[i : i + 2, i : i + 2])) for i in range(0, 2 * k, 2))
         return bool(
             (best.own > FAST_BIRTH * kappa).all()
-            and left < 12 * j + 4 * np.sqrt(24 * j) + FAST_BIRTH_ERROR**2 * best.score
-            and kappa * spread < FAST_SPREAD_MM**2
+            and left
+            < 12 * j + 4 * np.sqrt(24 * j) + FAST_BIRTH_ERROR * FAST_BIRTH_ERROR * best.score
+            and kappa * spread < FAST_SPREAD_MM * FAST_SPREAD_MM
             and lead > max(FAST_BIRTH, FAST_AMBIGUOUS * best.own[-1])
             and all(
-                _apart(place, np.vstack([best.places[:i], self.tracks.state[:, :2]]))
+                apart(np.vstack([best.places[:i], on]), place).all()
                 for i, place in enumerate(best.places)
             )
         )
@@ -319,6 +313,9 @@ class FastPath:
         kappa, inverse = _excess(fit, held), inverted(fit.h)
         assert inverse is not None
         for i, (x_mm, y_mm) in enumerate(fit.places):
+            for k in reversed(range(len(self.tracks))):
+                if not apart(self.tracks.state[k : k + 1, :2], fit.places[i])[0]:
+                    self._forget(k)
             strength, p = fit.strength[-1, i], np.zeros((SIZE, SIZE))
             p[:2, :2] = kappa * inverse[2 * i : 2 * i + 2, 2 * i : 2 * i + 2]
             p[C, C] = kappa * fit.variance[i]
@@ -357,7 +354,8 @@ class FastPath:
             elif strength > FAST_ON * tracks.peak[k] and known.energy > 2 * FAST_FAINT:
                 known.on = True
             known.off_drives = 0 if known.on else known.off_drives + 1
-            if known.off_drives > FAST_GONE or not self.rows.on_skin(state[X], state[Y]):
+            on_skin = np.isfinite(state).all() and self.rows.on_skin(state[X], state[Y])
+            if known.off_drives > FAST_GONE or not on_skin:
                 self._forget(k)
             elif not known.on:
                 state[VX:] = 0.0
@@ -379,7 +377,7 @@ class FastPath:
                 continue
             for drive, was in zip(self.drives, then, strict=True):
                 change = now[C] * self.rows.answer(drive, now[X], now[Y])[0][0]
-                change -= was[C] * self.rows.answer(drive, was[X], was[Y])[0][0]
+                change = change - was[C] * self.rows.answer(drive, was[X], was[Y])[0][0]
                 out[drive.rows] += change / self._gain[drive.rows]
         explained = all(past.explained for past in self._past) and not self._held
         self._unexplained_frames = 0 if explained else self._unexplained_frames + 1
@@ -387,9 +385,10 @@ class FastPath:
 
     def _moved(self, k: int, now: FloatArray, then: FloatArray) -> bool:
         variance = np.diag(self.tracks.p)[SIZE * k : SIZE * k + 3]
-        far = max(FAST_MOVED_MM, FAST_MOVED_SD * float(np.sqrt(variance[:2].sum())))
+        far = max(FAST_MOVED_MM, FAST_MOVED_SD * float(np.sqrt(variance[0] + variance[1])))
         much = max(FAST_MOVED_STRENGTH * abs(now[C]), FAST_MOVED_SD * float(np.sqrt(variance[C])))
-        moved = np.hypot(*(then[:, :2] - now[:2]).T) > far
+        x, y = (then[:, :2] - now[:2]).T
+        moved = x * x + y * y > far * far
         return bool((moved | (np.abs(then[:, C] - now[C]) > much)).any())
 
     def confirm(self, found: Iterable[Touch], electrodes: Iterable[int] = ()) -> list[FastTouch]:
@@ -402,9 +401,10 @@ class FastPath:
         free = np.ones(len(places), dtype=np.bool_)
         for k in reversed(range(len(self.tracks))):
             known, state = self._known[k], self.tracks.state[k]
-            distance = np.where(free, np.hypot(*(places - state[:2]).T), np.inf)
-            nearest = int(np.argmin(distance)) if len(places) else -1
-            if nearest >= 0 and distance[nearest] < FAST_CONFIRM_MM:
+            x, y = (places - state[:2]).T
+            square = np.where(free, x * x + y * y, np.inf)
+            nearest = int(np.argmin(square)) if len(places) else -1
+            if nearest >= 0 and square[nearest] < FAST_CONFIRM_MM * FAST_CONFIRM_MM:
                 free[nearest], known.confirmed, known.frames_missed = False, True, 0
                 continue
             known.frames_missed += 1
@@ -418,11 +418,13 @@ class FastPath:
         """Touches that two frames on end have found and no drive."""
         before, self._seeds = self._seeds, []
         for place, c in zip(places, strength, strict=True):
-            if _apart(place, np.array(before).reshape(-1, 2)):
+            if apart(np.array(before).reshape(-1, 2), place).all():
                 if len(self._seeds) < FAST_MAX_TOUCHES:
                     self._seeds.append((float(place[0]), float(place[1])))
                 continue
-            if len(self.tracks) == FAST_MAX_TOUCHES or not _apart(place, self.tracks.state[:, :2]):
+            if len(self.tracks) == FAST_MAX_TOUCHES:
+                continue
+            if not apart(self.tracks.state[:, :2], place).all():
                 continue
             sd = [FAST_SEED_MM, FAST_SEED_MM, FAST_SEED_STRENGTH * c] + [FAST_FIRST_SPEED] * 2
             self.tracks.add(np.array([*place, c, 0.0, 0.0]), np.diag(np.array(sd) ** 2))
@@ -430,12 +432,8 @@ class FastPath:
             self._next_id += 1
 
 
-def _apart(place: FloatArray, others: FloatArray) -> bool:
-    return bool((np.hypot(*(others - place).T) > FAST_APART_MM).all())
-
-
 def _excess(fit: Fit, held: Sequence[Held]) -> float:
     """What is left of chi^2 for each degree of freedom, at least 1."""
     k = len(fit.places)
     freedom = sum(one.rows for one in held) - k * (len(held) + 2)
-    return max(1.0, float(fit.left.sum()) / max(1, freedom))
+    return max(1.0, float(summed(fit.left)) / max(1, freedom))

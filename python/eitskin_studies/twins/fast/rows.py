@@ -11,6 +11,7 @@ import numpy.typing as npt
 from eitskin.core.constants_table import FAST_SOFT_RADIUS
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
+from eitskin_studies.twins.fast.tracks import summed
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -52,22 +53,24 @@ class RowModel:
         columns = fields.columns[:, : 2 * electrodes].astype(np.float64)
         self._x, self._y = columns[:, :electrodes], columns[:, electrodes:]
         self._volts, self._table = fields.volts, model.protocol.drive_measure.astype(np.int64)
-        self.centres_mm = model.grid.centres_mm()
-        self._rho2 = (FAST_SOFT_RADIUS * model.defaults.touch_seed_radius_mm) ** 2
+        self._grid, self.centres_mm = model.grid, model.grid.centres_mm()
+        radius = FAST_SOFT_RADIUS * model.defaults.touch_seed_radius_mm
+        self._rho2 = radius * radius
 
     def answer(self, drive: Drive, x_mm: float, y_mm: float) -> tuple[FloatArray, bool]:
         """The rows' answer to a touch there and its derivatives by x and y (3, r), V per S/m mm^2
         and that per mm; and whether the place is on the skin."""
-        to_x, to_y = (self.centres_mm - (x_mm, y_mm)).T
-        left = 1 - (to_x**2 + to_y**2) / self._rho2
+        left, to_x, to_y = self._near(x_mm, y_mm)
         near = np.flatnonzero(left > 0)
         if not len(near):
             return np.zeros((3, len(drive.rows))), False
         left, to_x, to_y = left[near], to_x[near], to_y[near]
-        weights = np.array([left**2, 4 / self._rho2 * left * to_x, 4 / self._rho2 * left * to_y])
-        sums = weights.sum(axis=1)
-        seen = weights @ self._products(drive, near) / sums[0]
-        seen[1:] -= sums[1:, None] / sums[0] * seen[0]
+        slope = 4 * self._grid.pixel_mm / self._rho2
+        weights = np.array([left * left, slope * left * to_x, slope * left * to_y])
+        seen = summed(weights[:, :, None] * self._products(drive, near), axis=1)
+        sums = summed(weights, axis=1)
+        seen[0] *= 1 / sums[0]
+        seen[1:] = (seen[1:] - sums[1:, None] * seen[0]) * (1 / sums[0])
         return self._over_rows(drive, seen), True
 
     def at_pixels(self, drive: Drive, pixels: IntArray) -> FloatArray:
@@ -87,5 +90,12 @@ class RowModel:
 
     def on_skin(self, x_mm: float, y_mm: float) -> bool:
         """Whether a pixel's centre is near enough to answer."""
-        to_x, to_y = (self.centres_mm - (x_mm, y_mm)).T
-        return bool((to_x**2 + to_y**2 < self._rho2).any())
+        return bool((self._near(x_mm, y_mm)[0] > 0).any())
+
+    def _near(self, x_mm: float, y_mm: float) -> FloatArray:
+        """1 - d^2 / rho^2 of each pixel, and where it is from the place, in pixels (3, n)."""
+        side = self._grid.pixel_mm
+        at = (np.array([x_mm, y_mm]) - self._grid.origin_mm) / side
+        to_x, to_y = (self._grid.index + 0.5 - at).T
+        left = 1 - side * side / self._rho2 * (to_x * to_x + to_y * to_y)
+        return np.array([left, to_x, to_y])

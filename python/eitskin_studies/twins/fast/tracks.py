@@ -25,18 +25,40 @@ BoolArray = npt.NDArray[np.bool_]
 X, Y, C, VX, VY, SIZE = range(6)
 
 
+def summed(terms: FloatArray, axis: int = 0) -> FloatArray:
+    """Their sum along ``axis``, one after another as C adds them; BLAS has an order of its own."""
+    if terms.shape[axis] == 0:
+        return np.asarray(terms.sum(axis=axis))
+    return np.asarray(np.add.accumulate(terms, axis=axis).take(-1, axis=axis))
+
+
+def dot(a: FloatArray, b: FloatArray) -> float:
+    """a'b of two vectors, in order."""
+    return float(summed(a * b))
+
+
 def lower_solve(factor: FloatArray, right: FloatArray) -> FloatArray:
     """L^-1 times ``right`` (r,) or (r, k), L the lower triangle ``factor`` (r, r)."""
     out = right.copy()
     for i in range(len(factor)):
-        out[i] = (out[i] - factor[i, :i] @ out[:i]) / factor[i, i]
+        out[i] = (out[i] - summed((factor[i, :i] * out[:i].T).T)) / factor[i, i]
     return out
+
+
+def lower_factor(s: FloatArray, otherwise: float) -> FloatArray:
+    """L with L L' = ``s`` (r, r); a pivot that is not positive is ``otherwise``."""
+    factor = np.zeros_like(s)
+    for j in range(len(s)):
+        left = s[j:, j] - summed(factor[j:, :j] * factor[j, :j], axis=1)
+        factor[j, j] = np.sqrt(left[0] if left[0] > 0 else otherwise)
+        factor[j + 1 :, j] = left[1:] / factor[j, j]
+    return factor
 
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
     """A drive's rows against what was expected: the factor L (r, r) of their covariance S = L L',
-    ``white`` (r,) = L^-1 e, zero where a row is not in use, and ``moved`` (5 k, r) = P H'."""
+    ``white`` (r,) = L^-1 e, zero where a row is not in use, and ``moved`` (r, 5 k) = H P."""
 
     factor: FloatArray
     white: FloatArray
@@ -46,7 +68,7 @@ class Innovation:
     @property
     def chi2(self) -> float:
         """e' S^-1 e."""
-        return float(self.white @ self.white)
+        return dot(self.white, self.white)
 
 
 class Tracks:
@@ -60,14 +82,16 @@ class Tracks:
 
     def predict(self, dt_s: float) -> None:
         """``dt_s`` on: places follow speeds, and all grows less sure."""
-        step = np.eye(SIZE)
-        step[X, VX] = step[Y, VY] = dt_s
-        f, drives = np.kron(np.eye(len(self)), step), dt_s / FAST_DRIVE_S
-        self.state, self.p = self.state @ step.T, f @ self.p @ f.T
-        for k in range(len(self)):
-            noise = np.array([0, 0, FAST_STRENGTH_NOISE * self.peak[k], *[FAST_SPEED_NOISE] * 2])
-            at = np.arange(SIZE) + SIZE * k
-            self.p[at, at] += noise**2 * drives
+        drives, p = dt_s / FAST_DRIVE_S, self.p
+        at = SIZE * np.arange(len(self))
+        self.state[:, [X, Y]] += dt_s * self.state[:, [VX, VY]]
+        for axis in (X, Y):
+            p[at + axis] += dt_s * p[at + VX + axis]
+        for axis in (X, Y):
+            p[:, at + axis] += dt_s * p[:, at + VX + axis]
+        p[at + C, at + C] += (FAST_STRENGTH_NOISE * self.peak) ** 2 * drives
+        for speed in (VX, VY):
+            p[at + speed, at + speed] += FAST_SPEED_NOISE**2 * drives
 
     def loosened(self, strength: float, place_mm: float) -> FloatArray:
         """The covariance (5 k, 5 k) where each touch may have changed by these at once, the
@@ -84,22 +108,29 @@ class Tracks:
         """``z`` (r,), where it is ``used`` (r,), its noise, and each touch's answers (k, 3, r)."""
         strength = self.state[:, C]
         given = strength[:, None] * answers[:, 0]
-        e = np.where(used, z - given.sum(axis=0), 0.0)
-        variance = sigma**2 + np.where(used, ((FAST_MODEL_ERROR * given) ** 2).sum(axis=0), 0.0)
-        h = np.zeros((len(z), len(self), SIZE))
-        h[:, :, C] = answers[:, 0].T
-        for axis in (X, Y):
-            h[:, :, axis] = (strength[:, None] * answers[:, 1 + axis]).T
-        rows = np.where(used[:, None, None], h, 0.0).reshape(len(z), -1)
-        moved = self.p @ rows.T
-        factor = np.asarray(np.linalg.cholesky(rows @ moved + np.diag(variance)), np.float64)
+        e = np.where(used, z - summed(given), 0.0)
+        error = summed((FAST_MODEL_ERROR * given) ** 2)
+        slopes = strength[:, None, None] * answers[:, 1:]
+        h = np.where(used, np.concatenate([slopes, answers[:, :1]], axis=1), 0.0)  # (k, 3, r)
+        moved = np.zeros((len(z), len(self.p)))
+        for k in range(len(self)):
+            for way in (X, Y, C):
+                moved += h[k, way][:, None] * self.p[SIZE * k + way]
+        seen = moved.reshape(len(z), len(self), SIZE)[:, :, :3].transpose(1, 2, 0)
+        s = summed(summed(h[:, :, :, None] * seen[:, :, None, :], axis=1))
+        at = np.arange(len(z))
+        s[at, at] = sigma * sigma + np.where(used, s[at, at] + error, 0.0)
+        factor = lower_factor(s, sigma * sigma)
         return Innovation(factor, lower_solve(factor, e), moved, e)
 
     def update(self, seen: Innovation) -> None:
         """Believe the rows."""
-        gain = lower_solve(seen.factor, seen.moved.T).T
-        self.state = self.state + (gain @ seen.white).reshape(-1, SIZE)
-        self.p = self.p - gain @ gain.T
+        left, state = seen.moved.copy(), self.state.reshape(-1)
+        for i, white in enumerate(seen.white):
+            w = left[i] / seen.factor[i, i]
+            left[i + 1 :] -= seen.factor[i + 1 :, i, None] * w
+            state += white * w
+            self.p -= w[:, None] * w
 
     def add(self, state: FloatArray, p: FloatArray) -> None:
         """A touch of ``state`` (5,) and covariance ``p`` (5, 5)."""

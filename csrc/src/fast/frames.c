@@ -1,0 +1,174 @@
+/* Whole frames beside the drives: brought to one instant by the touches before they are solved, and
+ * what the solver finds then confirms, ends and begins touches. */
+#include "fast/fast.h"
+
+/* Where touch k was, and how strong, when a drive was last measured; with no strength, as it is,
+ * where it was not there. */
+static const eits_real *was(const fast_drive *d, uint32_t k, const eits_real *now,
+                            eits_real spare[FAST_WAYS])
+{
+    if (d->there[k])
+        return d->then[k];
+    spare[FAST_X] = now[FAST_X];
+    spare[FAST_Y] = now[FAST_Y];
+    spare[FAST_C] = 0;
+    return spare;
+}
+
+/* Whether touch k went far, or changed much, since any of the drives. */
+static int has_moved(const eits_fast *fast, uint32_t k)
+{
+    const uint32_t at = FAST_SIZE * k;
+    const eits_real *now = fast->state + at;
+    const eits_real place = eits_sqrt(fast->p[at][at] + fast->p[at + 1][at + 1]);
+    const eits_real strength = eits_sqrt(fast->p[at + FAST_C][at + FAST_C]);
+    eits_real far = EITS_FAST_MOVED_SD * place, much = EITS_FAST_MOVED_SD * strength;
+    const eits_real least = EITS_FAST_MOVED_STRENGTH * eits_fabs(now[FAST_C]);
+    far = far > EITS_FAST_MOVED_MM ? far : EITS_FAST_MOVED_MM;
+    much = much > least ? much : least;
+    for (uint32_t n = 0; n < fast->drives; ++n) {
+        eits_real spare[FAST_WAYS];
+        const eits_real *then = was(&fast->drive[n], k, now, spare);
+        const eits_real dx = then[FAST_X] - now[FAST_X], dy = then[FAST_Y] - now[FAST_Y];
+        if (dx * dx + dy * dy > far * far || eits_fabs(then[FAST_C] - now[FAST_C]) > much)
+            return 1;
+    }
+    return 0;
+}
+
+static void align_touch(eits_fast *fast, uint32_t k, eits_real *aligned)
+{
+    const eits_real *now = fast->state + FAST_SIZE * k;
+    const size_t rows = fast->most_rows;
+    for (uint32_t n = 0; n < fast->drives; ++n) {
+        const fast_drive *d = &fast->drive[n];
+        eits_real spare[FAST_WAYS], *before = fast->answer + FAST_WAYS * rows;
+        const eits_real *then = was(d, k, now, spare);
+        (void)eits_fast_answer(fast, n, now, fast->answer);
+        (void)eits_fast_answer(fast, n, then, before);
+        for (uint32_t i = 0; i < d->count; ++i) {
+            const uint32_t row = fast->row[d->first + i];
+            const eits_real change = now[FAST_C] * fast->answer[i] - then[FAST_C] * before[i];
+            aligned[row] += change / fast->gain[row];
+        }
+    }
+}
+
+eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t length,
+                            eits_real *aligned, uint32_t *state)
+{
+    if (fast == NULL || volts == NULL || aligned == NULL || state == NULL)
+        return EITS_E_ARGUMENT;
+    if (length != fast->model->n_rows)
+        return EITS_E_FRAME_LENGTH;
+    if (!fast->begun)
+        return EITS_E_NO_REFERENCE;
+    eits_copy(aligned, volts, length);
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        if (has_moved(fast, k))
+            align_touch(fast, k, aligned);
+    }
+    int explained = fast->held_count == 0;
+    for (uint32_t n = 0; n < fast->drives; ++n)
+        explained &= fast->drive[n].explained;
+    fast->unexplained_frames = explained ? 0 : fast->unexplained_frames + 1;
+    *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
+    if (explained || fast->unexplained_frames > EITS_FAST_FRAMES)
+        *state |= (uint32_t)EITS_FAST_TRUSTED;
+    return EITS_OK;
+}
+
+/* The nearest of those found that no touch has taken, within EITS_FAST_CONFIRM_MM; `count` where
+ * there is none. */
+static uint32_t nearest(const eits_real *place, const eits_touch *found, const uint8_t *taken,
+                        uint32_t count)
+{
+    uint32_t best = count;
+    eits_real least = fast_square(EITS_FAST_CONFIRM_MM);
+    for (uint32_t n = 0; n < count; ++n) {
+        const eits_real dx = found[n].x_mm - place[0], dy = found[n].y_mm - place[1];
+        const eits_real square = dx * dx + dy * dy;
+        if (!taken[n] && square < least) {
+            least = square;
+            best = n;
+        }
+    }
+    return best;
+}
+
+static void mask_named(eits_fast *fast)
+{
+    const uint8_t *states = fast->ctx->rows.electrode;
+    for (uint32_t i = 0; i < fast->model->n_rows; ++i) {
+        const uint8_t *row = eits_row(fast->ctx, i);
+        fast->masked[i] = (states[row[0]] | states[row[1]] | states[row[2]] | states[row[3]]) != 0;
+    }
+}
+
+static int near_any(const eits_real *place, const eits_real (*others)[2], uint32_t count)
+{
+    for (uint32_t k = 0; k < count; ++k) {
+        if (!fast_apart(place, others[k]))
+            return 1;
+    }
+    return 0;
+}
+
+static int near_known(const eits_fast *fast, const eits_real *place)
+{
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        if (!fast_apart(place, fast->state + FAST_SIZE * k))
+            return 1;
+    }
+    return 0;
+}
+
+/* Touches that two frames on end have found and no drive. */
+static void seed(eits_fast *fast, const eits_touch *found, const uint8_t *taken, uint32_t count)
+{
+    const uint32_t known = fast->seeds;
+    eits_real before[EITS_FAST_MAX_TOUCHES][2];
+    memcpy(before, fast->seed, sizeof before);
+    fast->seeds = 0;
+    for (uint32_t n = 0; n < count; ++n) {
+        const eits_real c = found[n].strength_s_per_m_mm2;
+        const eits_real state[FAST_SIZE] = {found[n].x_mm, found[n].y_mm, c, 0, 0};
+        if (taken[n])
+            continue;
+        if (!near_any(state, (const eits_real(*)[2])before, known)) {
+            if (fast->seeds < EITS_FAST_MAX_TOUCHES)
+                eits_copy(fast->seed[fast->seeds++], state, 2);
+            continue;
+        }
+        if (fast->count == EITS_FAST_MAX_TOUCHES || near_known(fast, state))
+            continue;
+        const eits_real place = fast_square(EITS_FAST_SEED_MM);
+        const eits_real speed = fast_square(EITS_FAST_FIRST_SPEED);
+        const eits_real variance[FAST_SIZE] = {
+            place, place, fast_square(EITS_FAST_SEED_STRENGTH * c), speed, speed};
+        eits_fast_add(fast, state, variance, 0);
+        fast->known[fast->count - 1].energy = 4 * EITS_FAST_FAINT;
+        fast->known[fast->count - 1].confirmed = 1;
+    }
+}
+
+eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count)
+{
+    uint8_t taken[EITS_MAX_TOUCHES] = {0};
+    if (fast == NULL || (found == NULL && count > 0) || count > EITS_MAX_TOUCHES)
+        return EITS_E_ARGUMENT;
+    mask_named(fast);
+    for (uint32_t k = fast->count; k-- > 0;) {
+        fast_known *known = &fast->known[k];
+        const uint32_t n = nearest(fast->state + FAST_SIZE * k, found, taken, count);
+        if (n < count) {
+            taken[n] = 1;
+            known->confirmed = 1;
+            known->frames_missed = 0;
+        } else if (++known->frames_missed >= EITS_FAST_LOST_FRAMES && known->on) {
+            eits_fast_forget(fast, k);
+        }
+    }
+    seed(fast, found, taken, count);
+    return EITS_OK;
+}

@@ -1,0 +1,206 @@
+/* A drive's rows: believed, put down to something else than touches, or held until a touch explains
+ * them. The order of the questions is that of their cost, and of how often they are answered. */
+#include "fast/fast.h"
+
+/* z of the drive's rows in the model's volts, where they are used, and the direction in which a
+ * drift of the gain moves them; how many are used. A dead row is an electrode's doing. */
+static uint32_t take_rows(eits_fast *fast, const fast_drive *d, const eits_real *volts)
+{
+    const eits_real *v0 = fast->ctx->reference.v0;
+    uint32_t used = 0;
+    for (uint32_t i = 0; i < d->count; ++i) {
+        const uint32_t row = fast->row[d->first + i];
+        const eits_real size = eits_fabs(v0[row]);
+        int use = eits_is_finite(volts[i]) && eits_is_finite(v0[row]) && !fast->masked[row];
+        if (use && eits_fabs(volts[i]) < EITS_FAST_DEAD * size &&
+            size > EITS_FAST_DEAD_NOISE * fast->noise_v)
+            use = 0;
+        const eits_real z = use ? fast->gain[row] * (volts[i] - (1 + fast->drift) * v0[row]) : R(0);
+        use = use && eits_fabs(z) < EITS_FAST_FAR * fast->sigma;
+        fast->used[i] = (uint8_t)use;
+        fast->z[i] = use ? z : 0;
+        fast->along[i] = use ? fast->gain[row] * v0[row] : 0;
+        used += (uint32_t)use;
+    }
+    return used;
+}
+
+/* Without one row that is a glitch, known touches explain the others. */
+static int is_glitch(eits_fast *fast, uint32_t rows)
+{
+    uint32_t worst = 0;
+    eits_real greatest = 0;
+    for (uint32_t i = 0; i < rows; ++i) {
+        const eits_real *line = fast_line(fast->factor, i);
+        const eits_real own = fast_square(fast->e[i]) / fast_dot(line, line, i + 1);
+        if (own > greatest) {
+            greatest = own;
+            worst = i;
+        }
+    }
+    if (!(greatest > EITS_FAST_GLITCH) || fast->glitched)
+        return 0;
+    fast->used[worst] = 0;
+    if (eits_fast_innovate(fast, rows) < EITS_FAST_NEWS)
+        return 1;
+    fast->used[worst] = 1;
+    (void)eits_fast_innovate(fast, rows);
+    return 0;
+}
+
+/* Without a small drift of the gain they do. */
+static int is_drift(eits_fast *fast, uint32_t rows)
+{
+    eits_real *drift = fast->spare;
+    eits_copy(drift, fast->along, rows);
+    fast_whiten(fast->factor, drift, rows);
+    const eits_real energy = fast_dot(drift, drift, rows);
+    if (!(energy > 0))
+        return 0;
+    const eits_real size = fast_dot(drift, fast->white, rows) / energy;
+    const eits_real left = fast_dot(fast->white, fast->white, rows) - size * size * energy;
+    if (!(left < EITS_FAST_NEWS && eits_fabs(size) < EITS_FAST_MAX_DRIFT))
+        return 0;
+    fast_axpy(fast->white, -size, drift, rows);
+    fast->drift += EITS_FAST_DRIFT_STEP * size;
+    return 1;
+}
+
+/* What the known touches may have done at once; chi^2 as it is then. Where that does not explain
+ * the rows either, the touches stay as sure as they were. */
+static eits_real with_changes(eits_fast *fast, uint32_t rows, eits_real chi2)
+{
+    const eits_real strength[2] = {EITS_FAST_STRENGTH_JUMP, EITS_FAST_CHANGE};
+    const eits_real place_mm[2] = {0, EITS_FAST_CHANGE_MM};
+    eits_real kept[FAST_NUMBERS];
+    for (uint32_t how = 0; how < 2 && fast->count > 0 && !(chi2 < EITS_FAST_NEWS); ++how) {
+        for (uint32_t i = 0; i < FAST_SIZE * fast->count; ++i)
+            kept[i] = fast->p[i][i];
+        eits_fast_loosen(fast, strength[how], place_mm[how]);
+        chi2 = eits_fast_innovate(fast, rows);
+        fast->changed = how == 1 && chi2 < EITS_FAST_NEWS; /* perhaps within the drive */
+        if (!(chi2 < EITS_FAST_NEWS)) {
+            for (uint32_t i = 0; i < FAST_SIZE * fast->count; ++i)
+                fast->p[i][i] = kept[i];
+        }
+    }
+    return chi2;
+}
+
+/* What touches explain of the rows, averaged; and a little of what is left along v0 is drift of the
+ * gain. */
+static void learn(eits_fast *fast, uint32_t rows)
+{
+    eits_real *left = fast->spare;
+    eits_copy(left, fast->z, rows);
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        const eits_real *g = fast->answer + FAST_WAYS * (size_t)fast->most_rows * k;
+        const eits_real c = fast->state[FAST_SIZE * k + FAST_C];
+        const eits_real energy = fast_square(c / fast->sigma) * fast_dot(g, g, rows);
+        fast->known[k].energy += (energy - fast->known[k].energy) / EITS_FAST_ENERGY_DRIVES;
+        fast_axpy(left, -c, g, rows);
+    }
+    const eits_real energy = fast_dot(fast->along, fast->along, rows);
+    if (energy > 0)
+        fast->drift += EITS_FAST_GAIN_STEP * fast_dot(fast->along, left, rows) / energy;
+}
+
+/* Believe the rows, or wait; whether they are accounted for. */
+static int look(eits_fast *fast, uint32_t drive, const eits_real *volts)
+{
+    const fast_drive *d = &fast->drive[drive];
+    const uint32_t rows = d->count, used = take_rows(fast, d, volts);
+    for (uint32_t k = 0; k < fast->count; ++k)
+        (void)eits_fast_answer(fast, drive, fast->state + FAST_SIZE * k,
+                               fast->answer + FAST_WAYS * (size_t)fast->most_rows * k);
+    eits_real chi2 = eits_fast_innovate(fast, rows);
+    if (chi2 < EITS_FAST_NEWS) {
+        fast->glitched = 0;
+    } else {
+        fast->glitched = (uint32_t)is_glitch(fast, rows);
+        if (fast->glitched || is_drift(fast, rows)) {
+            eits_fast_update(fast, rows);
+            return 1;
+        }
+        chi2 = with_changes(fast, rows, chi2);
+    }
+    const int news = !(chi2 < EITS_FAST_NEWS);
+    if (news || fast->held_count > 0)
+        eits_fast_wait(fast, drive, used, news);
+    if (news)
+        return eits_fast_find_births(fast);
+    if (fast->quiet >= EITS_FAST_QUIET)
+        fast->held_count = 0;
+    learn(fast, rows);
+    eits_fast_update(fast, rows);
+    return 1;
+}
+
+/* Which touches are on, and which have gone. */
+static void update_known(eits_fast *fast)
+{
+    for (uint32_t k = fast->count; k-- > 0;) {
+        fast_known *known = &fast->known[k];
+        eits_real *state = fast->state + FAST_SIZE * k;
+        const eits_real strength = fast->sign * state[FAST_C];
+        known->peak = strength > known->peak ? strength : known->peak;
+        if (!(strength >= EITS_FAST_OFF * known->peak && known->energy >= EITS_FAST_FAINT))
+            known->on = 0;
+        else if (strength > EITS_FAST_ON * known->peak && known->energy > 2 * EITS_FAST_FAINT)
+            known->on = 1;
+        known->off_drives = known->on ? 0 : known->off_drives + 1;
+        if (known->off_drives > EITS_FAST_GONE || !eits_fast_on_skin(fast, state) ||
+            !eits_all_finite(state, FAST_SIZE))
+            eits_fast_forget(fast, k);
+        else if (!known->on)
+            state[FAST_VX] = state[FAST_VY] = 0;
+    }
+}
+
+eits_status eits_fast_drive(eits_fast *fast, uint32_t drive, const eits_real *volts, uint32_t count,
+                            uint32_t time_us)
+{
+    if (fast == NULL || volts == NULL || drive >= fast->drives || count != fast->drive[drive].count)
+        return EITS_E_ARGUMENT;
+    if (!fast->begun)
+        return EITS_E_NO_REFERENCE;
+    fast_drive *d = &fast->drive[drive];
+    const uint32_t gone_us = time_us - fast->time_us;
+    if (fast->timed && gone_us > 0 && gone_us < UINT32_MAX / 2)
+        eits_fast_predict(fast, (eits_real)gone_us * R(1e-6));
+    fast->time_us = time_us;
+    fast->timed = 1;
+    fast->changed = 0;
+    for (uint32_t k = 0; k < EITS_FAST_MAX_TOUCHES; ++k)
+        d->there[k] = 0;
+    const int explained = look(fast, drive, volts);
+    d->explained = (uint8_t)(explained && !fast->changed);
+    fast->unexplained = fast->unexplained << 1 | (uint32_t)!explained;
+    update_known(fast);
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        d->there[k] = 1;
+        eits_copy(d->then[k], fast->state + FAST_SIZE * k, FAST_WAYS);
+    }
+    return EITS_OK;
+}
+
+eits_status eits_fast_touches(const eits_fast *fast, eits_fast_touch *touches, uint32_t room,
+                              uint32_t *count)
+{
+    if (fast == NULL || touches == NULL || count == NULL)
+        return EITS_E_ARGUMENT;
+    *count = 0;
+    for (uint32_t k = 0; k < fast->count && *count < room; ++k) {
+        const fast_known *known = &fast->known[k];
+        const eits_real *state = fast->state + FAST_SIZE * k;
+        if (known->on)
+            touches[(*count)++] = (eits_fast_touch){.id = known->id,
+                                                    .confirmed = known->confirmed,
+                                                    .x_mm = state[FAST_X],
+                                                    .y_mm = state[FAST_Y],
+                                                    .vx_mm_per_s = state[FAST_VX],
+                                                    .vy_mm_per_s = state[FAST_VY],
+                                                    .strength_s_per_m_mm2 = state[FAST_C]};
+    }
+    return EITS_OK;
+}

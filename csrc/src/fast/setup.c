@@ -1,0 +1,177 @@
+/* Memory of the fast path, and how it begins. */
+#include "fast/fast.h"
+
+/* What the protocol's table says of drives: how many there are, and the most rows of one. */
+typedef struct shape {
+    uint32_t drives, most_rows;
+} shape;
+
+static int same_drive(const eits_model *model, uint32_t a, uint32_t b)
+{
+    return memcmp(model->protocol + 4 * (size_t)a, model->protocol + 4 * (size_t)b, 2) == 0;
+}
+
+/* Rows of the drive that row i is of, before it and from it on. */
+static void count_rows(const eits_model *model, uint32_t i, uint32_t *before, uint32_t *after)
+{
+    *before = *after = 0;
+    for (uint32_t j = 0; j < model->n_rows; ++j) {
+        if (same_drive(model, i, j))
+            ++*(j < i ? before : after);
+    }
+}
+
+static int is_cell(const eits_pixel *pixel)
+{
+    return pixel->ix % 2 == 0 && pixel->iy % 2 == 0;
+}
+
+static shape shape_of(const eits_model *model)
+{
+    shape s = {0, 0};
+    for (uint32_t i = 0; i < model->n_rows; ++i) {
+        uint32_t before, after;
+        count_rows(model, i, &before, &after);
+        s.drives += before == 0;
+        s.most_rows = after > s.most_rows ? after : s.most_rows;
+    }
+    return s;
+}
+
+/* The next of the memory that is handed out, all zero. */
+static void *take(uint8_t **next, size_t bytes)
+{
+    uint8_t *taken = *next;
+    *next += EITS_ALIGN16(bytes);
+    return taken;
+}
+
+static eits_real *take_reals(uint8_t **next, size_t count)
+{
+    return take(next, count * sizeof(eits_real));
+}
+
+/* EITS_FAST_SIZE counts what is taken here. */
+static void lay_out(uint8_t *next, const eits_model *model, shape s, eits_fast *fast)
+{
+    const size_t rows = s.most_rows, triangle = EITS_FAST_TRIANGLE(rows);
+    const size_t cells = EITS_FAST_CELLS(model->nx, model->ny);
+    fast->drive = take(&next, s.drives * sizeof *fast->drive);
+    fast->row = take(&next, model->n_rows * sizeof *fast->row);
+    fast->cell = take(&next, cells * sizeof *fast->cell);
+    fast->masked = take(&next, model->n_rows);
+    fast->used = take(&next, rows);
+    fast->gain = take_reals(&next, model->n_rows);
+    eits_real **const of_rows[] = {&fast->z, &fast->along, &fast->e, &fast->white, &fast->spare};
+    for (size_t k = 0; k < sizeof of_rows / sizeof of_rows[0]; ++k)
+        *of_rows[k] = take_reals(&next, rows);
+    fast->answer = take_reals(&next, EITS_FAST_MAX_TOUCHES * FAST_WAYS * rows);
+    fast->moved = take_reals(&next, FAST_NUMBERS * rows);
+    fast->factor = take_reals(&next, triangle);
+    fast->score = take_reals(&next, cells);
+    fast->pair_score = take_reals(&next, cells);
+    for (uint32_t n = 0; n < EITS_FAST_HELD; ++n) {
+        fast->held[n].white = take_reals(&next, rows);
+        fast->held[n].factor = take_reals(&next, triangle);
+    }
+}
+
+size_t eits_fast_size(const eits_model *model)
+{
+    if (model == NULL || model->fields.at.data == NULL)
+        return 0;
+    const shape s = shape_of(model);
+    if (s.most_rows > EITS_FAST_MAX_ROWS)
+        return 0;
+    return EITS_FAST_SIZE(model->n_rows, s.drives, s.most_rows, model->nx, model->ny);
+}
+
+/* The drives' rows, in the order of the table, and the cells. */
+static void list(eits_fast *fast)
+{
+    const eits_model *model = fast->model;
+    uint32_t row = 0;
+    for (uint32_t i = 0; i < model->n_rows; ++i) {
+        uint32_t before, after;
+        count_rows(model, i, &before, &after);
+        if (before > 0)
+            continue;
+        const uint8_t *electrodes = model->protocol + 4 * (size_t)i;
+        fast->drive[fast->drives++] = (fast_drive){.first = (uint16_t)row,
+                                                   .count = (uint16_t)after,
+                                                   .plus = electrodes[0],
+                                                   .minus = electrodes[1]};
+        for (uint32_t j = i; j < model->n_rows; ++j) {
+            if (same_drive(model, i, j))
+                fast->row[row++] = (uint16_t)j;
+        }
+    }
+    for (uint32_t j = 0; j < model->n_pixels; ++j) {
+        if (is_cell(&model->pixel[j]))
+            fast->cell[fast->cells++] = (uint16_t)j;
+    }
+}
+
+eits_status eits_fast_init(void *memory, size_t size, const eits_context *ctx, eits_fast **fast)
+{
+    if (memory == NULL || ctx == NULL || fast == NULL || eits_fast_size(ctx->model) == 0)
+        return EITS_E_ARGUMENT;
+    if (size < eits_fast_size(ctx->model) || (uintptr_t)memory % 16 != 0)
+        return EITS_E_WORKSPACE;
+    const shape s = shape_of(ctx->model);
+    eits_fast *made = memory;
+    memset(memory, 0, eits_fast_size(ctx->model));
+    lay_out((uint8_t *)memory + EITS_FAST_STATE, ctx->model, s, made);
+    made->ctx = ctx;
+    made->model = ctx->model;
+    made->most_rows = s.most_rows;
+    made->rho2 =
+        fast_square(EITS_FAST_SOFT_RADIUS * (eits_real)ctx->model->defaults->touch_seed_radius_mm);
+    made->next_id = 1;
+    list(made);
+    *fast = made;
+    return EITS_OK;
+}
+
+eits_status eits_fast_begin(eits_fast *fast)
+{
+    if (fast == NULL)
+        return EITS_E_ARGUMENT;
+    const eits_reference *reference = &fast->ctx->reference;
+    fast->begun = 0;
+    if (!reference->ready || !(reference->noise_v > 0))
+        return EITS_E_NO_REFERENCE;
+    const uint32_t rows = fast->model->n_rows;
+    eits_real energy = 0;
+    for (uint32_t i = 0; i < rows; ++i) {
+        fast->gain[i] = reference->gain * reference->row_gain[i];
+        fast->masked[i] = 0;
+        energy += fast->gain[i] * fast->gain[i];
+    }
+    fast->noise_v = reference->noise_v;
+    fast->sigma = reference->noise_v * eits_sqrt(energy / (eits_real)rows);
+    fast->sign = fast->ctx->options.sign == EITS_SIGN_DECREASE ? R(-1) : R(1);
+    fast->drift = 0;
+    fast->count = fast->held_count = fast->quiet = fast->waited = fast->seeds = 0;
+    fast->timed = fast->unexplained = fast->unexplained_frames = fast->glitched = 0;
+    for (uint32_t n = 0; n < fast->drives; ++n) {
+        fast->drive[n].explained = 1;
+        for (uint32_t k = 0; k < EITS_FAST_MAX_TOUCHES; ++k)
+            fast->drive[n].there[k] = 0;
+    }
+    fast->begun = 1;
+    return EITS_OK;
+}
+
+uint32_t eits_fast_drives(const eits_fast *fast)
+{
+    return fast == NULL ? 0 : fast->drives;
+}
+
+const uint16_t *eits_fast_rows(const eits_fast *fast, uint32_t drive, uint32_t *count)
+{
+    if (fast == NULL || count == NULL || drive >= fast->drives)
+        return NULL;
+    *count = fast->drive[drive].count;
+    return fast->row + fast->drive[drive].first;
+}

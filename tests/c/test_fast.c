@@ -1,0 +1,581 @@
+/* The fast path on drives made by a sum of its own: touches that come, move, change and go, what
+ * else rows may do, frames beside them, and what is refused. */
+#include "base/half.h"
+#include "check.h"
+#include "fast/fast.h"
+#include "small_model.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DRIVE_US = 1300, MAX_FINGERS = 7, SIDE = 24 };
+#define NOISE 2e-5
+
+typedef struct finger {
+    double x_mm, y_mm, strength;
+} finger;
+
+typedef struct bench {
+    small_model small;
+    small_context skin;
+    void *memory;
+    size_t size;
+    void *aligned;
+    eits_fast *fast;
+    eits_real quiet[SMALL_ROWS], frame[SMALL_ROWS];
+    double sigma, gain_drift; /* V; of all voltages */
+    uint32_t now_us, next;
+    uint64_t random;
+    finger on[MAX_FINGERS];
+    uint32_t fingers;
+} bench;
+
+static void tare(bench *b, eits_sign sign)
+{
+    eits_options options = *eits_get_options(b->skin.ctx);
+    options.sign = sign;
+    CHECK_EQUAL(eits_set_options(b->skin.ctx, &options), EITS_OK);
+    small_reference(&b->skin.model, 1.0, b->quiet);
+    double square = 0;
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        square += (double)b->quiet[i] * (double)b->quiet[i];
+    b->sigma = NOISE * sqrt(square / SMALL_ROWS);
+    CHECK_EQUAL(eits_reference_begin(b->skin.ctx, 16), EITS_OK);
+    for (uint32_t k = 0; k < 16; ++k) {
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b->frame[i] =
+                (eits_real)((double)b->quiet[i] + b->sigma * 2 * small_random(&b->random));
+        CHECK_EQUAL(eits_reference_add(b->skin.ctx, b->frame, SMALL_ROWS), EITS_OK);
+    }
+    CHECK_EQUAL(eits_reference_finish(b->skin.ctx), EITS_OK);
+}
+
+static bench *bench_open(eits_sign sign)
+{
+    bench *b = calloc(1, sizeof *b);
+    if (b == NULL)
+        abort();
+    b->random = 3;
+    b->small = small_model_make(
+        (small_spec){.rank = 12, .side = SIDE, .round = 1, .shape = SMALL_WHITENED, .fields = 1});
+    small_context_open(&b->skin, &b->small, 0);
+    tare(b, sign);
+    b->size = eits_fast_size(&b->skin.model);
+    b->aligned = small_aligned(&b->memory, b->size);
+    CHECK_EQUAL(eits_fast_init(b->aligned, b->size, b->skin.ctx, &b->fast), EITS_OK);
+    CHECK_EQUAL(eits_fast_begin(b->fast), EITS_OK);
+    return b;
+}
+
+static void bench_close(bench *b)
+{
+    small_context_close(&b->skin);
+    small_model_free(&b->small);
+    free(b->memory);
+    free(b);
+}
+
+static double field(const bench *b, uint32_t pixel, uint32_t plus, uint32_t minus, int y)
+{
+    const uint16_t *column =
+        (const uint16_t *)b->skin.model.fields.at.data + (size_t)pixel * SMALL_FIELDS_STRIDE;
+    const uint32_t from = y ? SMALL_ELECTRODES : 0;
+    return (double)eits_half_to_float(column[from + plus]) -
+           (double)eits_half_to_float(column[from + minus]);
+}
+
+/* What a finger does to a row, V, from the definition: a mean of E_drive . E_measure. */
+static double answer(const bench *b, uint32_t i, finger at)
+{
+    const eits_model *m = &b->skin.model;
+    const uint8_t *row = m->protocol + 4 * (size_t)i;
+    const double rho = 1.2 * (double)m->defaults->touch_seed_radius_mm;
+    double sum = 0, weights = 0;
+    for (uint32_t j = 0; j < m->n_pixels; ++j) {
+        const double dx =
+            (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * (double)m->pixel_mm - at.x_mm;
+        const double dy =
+            (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * (double)m->pixel_mm - at.y_mm;
+        const double left = 1 - (dx * dx + dy * dy) / (rho * rho);
+        const double weight = left > 0 ? left * left : 0;
+        weights += weight;
+        sum += weight * (field(b, j, row[0], row[1], 0) * field(b, j, row[2], row[3], 0) +
+                         field(b, j, row[0], row[1], 1) * field(b, j, row[2], row[3], 1));
+    }
+    const double gain =
+        (double)b->skin.ctx->reference.gain * (double)b->skin.ctx->reference.row_gain[i];
+    return -(double)m->fields.volts * at.strength * sum / weights / gain;
+}
+
+/* Strengths are in units that give rows of some hundred times the noise. */
+static double unit(const bench *b)
+{
+    double square = 0;
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        square += pow(answer(b, i, (finger){0, 0, 1}), 2);
+    return 300 * b->sigma / sqrt(square / SMALL_ROWS);
+}
+
+static void put(bench *b, uint32_t n, double x_mm, double y_mm, double strength)
+{
+    b->on[n] = (finger){x_mm, y_mm, strength * unit(b)};
+    b->fingers = b->fingers > n ? b->fingers : n + 1;
+}
+
+/* The next drive's rows as the fingers are now, into the frame. */
+static void measure(bench *b)
+{
+    uint32_t count = 0;
+    const uint16_t *rows = eits_fast_rows(b->fast, b->next, &count);
+    for (uint32_t i = 0; i < count; ++i) {
+        double v = (double)b->quiet[rows[i]] * (1 + b->gain_drift);
+        for (uint32_t k = 0; k < b->fingers; ++k)
+            v += answer(b, rows[i], b->on[k]);
+        b->frame[rows[i]] = (eits_real)(v + b->sigma * 2 * small_random(&b->random));
+    }
+}
+
+/* Gives the frame's rows of the next drive. */
+static void give(bench *b)
+{
+    eits_real volts[EITS_FAST_ROWS];
+    uint32_t count = 0;
+    const uint16_t *rows = eits_fast_rows(b->fast, b->next, &count);
+    for (uint32_t i = 0; i < count; ++i)
+        volts[i] = b->frame[rows[i]];
+    b->now_us += DRIVE_US;
+    CHECK_EQUAL(eits_fast_drive(b->fast, b->next, volts, count, b->now_us), EITS_OK);
+    b->next = (b->next + 3) % eits_fast_drives(b->fast);
+}
+
+static void drives(bench *b, uint32_t count)
+{
+    for (; count > 0; --count) {
+        measure(b);
+        give(b);
+    }
+}
+
+static uint32_t told(const bench *b, eits_fast_touch *touches)
+{
+    uint32_t count = 99;
+    CHECK_EQUAL(eits_fast_touches(b->fast, touches, EITS_FAST_TOUCHES, &count), EITS_OK);
+    for (uint32_t k = 0; k < count && count <= EITS_FAST_TOUCHES; ++k)
+        CHECK(eits_is_finite(touches[k].x_mm) && eits_is_finite(touches[k].y_mm) &&
+              eits_is_finite(touches[k].vx_mm_per_s) && eits_is_finite(touches[k].vy_mm_per_s) &&
+              eits_is_finite(touches[k].strength_s_per_m_mm2));
+    return count;
+}
+
+/* Each finger is told of once, within `near_mm`, and nothing else. */
+static void check_told(const bench *b, double near_mm)
+{
+    eits_fast_touch touches[EITS_FAST_TOUCHES];
+    const uint32_t count = told(b, touches);
+    CHECK_EQUAL(count, b->fingers);
+    for (uint32_t n = 0; n < b->fingers; ++n) {
+        double least = 1e9;
+        for (uint32_t k = 0; k < count; ++k) {
+            const double off = hypot((double)touches[k].x_mm - b->on[n].x_mm,
+                                     (double)touches[k].y_mm - b->on[n].y_mm);
+            least = off < least ? off : least;
+        }
+        CHECK_NEAR(least, 0, near_mm);
+    }
+}
+
+static uint32_t align(bench *b, eits_real *aligned)
+{
+    uint32_t state = 99;
+    CHECK_EQUAL(eits_fast_align(b->fast, b->frame, SMALL_ROWS, aligned, &state), EITS_OK);
+    return state;
+}
+
+static void confirm(bench *b, const double (*places)[2], uint32_t count)
+{
+    eits_touch found[EITS_MAX_TOUCHES];
+    memset(found, 0, sizeof found);
+    for (uint32_t k = 0; k < count; ++k) {
+        found[k].x_mm = (eits_real)places[k][0];
+        found[k].y_mm = (eits_real)places[k][1];
+        found[k].strength_s_per_m_mm2 = (eits_real)unit(b);
+    }
+    CHECK_EQUAL(eits_fast_confirm(b->fast, found, count), EITS_OK);
+}
+
+static void test_nothing_touches(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_real aligned[SMALL_ROWS];
+    for (uint32_t k = 0; k < 40; ++k) {
+        drives(b, 8);
+        CHECK_EQUAL(align(b, aligned), EITS_FAST_EXPLAINED | EITS_FAST_TRUSTED);
+        CHECK(memcmp(aligned, b->frame, sizeof aligned) == 0);
+        confirm(b, NULL, 0);
+    }
+    check_told(b, 0);
+    bench_close(b);
+}
+
+static void test_a_finger(eits_sign sign)
+{
+    bench *b = bench_open(sign);
+    const double way = sign == EITS_SIGN_DECREASE ? -1 : 1;
+    eits_fast_touch touch[EITS_FAST_TOUCHES];
+    eits_real aligned[SMALL_ROWS];
+    b->now_us = 0xFFFFFF00u; /* the clock wraps */
+    drives(b, 16);
+    put(b, 0, 20, 11, way);
+    drives(b, 6);
+    check_told(b, 1.0);
+    (void)told(b, touch);
+    const uint32_t id = touch[0].id;
+    CHECK(id == 1 && !touch[0].confirmed && (double)touch[0].strength_s_per_m_mm2 * way > 0);
+    /* rows that were measured before it came are made as if it had been there */
+    CHECK_EQUAL(align(b, aligned), 0);
+    CHECK(memcmp(aligned, b->frame, sizeof aligned) != 0);
+    drives(b, 8);
+    CHECK(align(b, aligned) & EITS_FAST_TRUSTED);
+    confirm(b, (const double[][2]){{21, 10}}, 1);
+    drives(b, 24);
+    (void)told(b, touch);
+    CHECK_EQUAL(touch[0].confirmed, 1);
+    check_told(b, 0.2);
+    CHECK_EQUAL(align(b, aligned), EITS_FAST_EXPLAINED | EITS_FAST_TRUSTED);
+    CHECK(memcmp(aligned, b->frame, sizeof aligned) == 0);
+    for (uint32_t k = 0; k < 60; ++k) { /* 300 mm/s */
+        b->on[0].x_mm -= 0.39;
+        drives(b, 1);
+    }
+    check_told(b, 1.5);
+    (void)told(b, touch);
+    CHECK_EQUAL(touch[0].id, id);
+    CHECK_NEAR(touch[0].vx_mm_per_s, -300, 60);
+    CHECK(align(b, aligned) & EITS_FAST_TRUSTED);
+    CHECK(memcmp(aligned, b->frame, sizeof aligned) != 0);
+    b->fingers = 0;
+    drives(b, 4);
+    CHECK_EQUAL(told(b, touch), 0);
+    put(b, 0, b->on[0].x_mm, b->on[0].y_mm, way); /* on again before it is forgotten */
+    drives(b, 6);
+    check_told(b, 1.0);
+    CHECK_EQUAL(b->fast->count, 1);
+    b->fingers = 0;
+    drives(b, EITS_FAST_GONE + 12);
+    CHECK_EQUAL(b->fast->count, 0);
+    bench_close(b);
+}
+
+static void test_two_at_once(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    drives(b, 8);
+    put(b, 0, 22, 38, 3);
+    put(b, 1, -40, -24, 3);
+    drives(b, 16);
+    check_told(b, 1.0);
+    bench_close(b);
+}
+
+static void test_several_fingers(void)
+{
+    static const double places[][2] = {{22, 38}, {-40, -24}, {34, -18}, {-5, -44}, {-30, 20}};
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_fast_touch touches[EITS_FAST_TOUCHES];
+    uint32_t count;
+    drives(b, 8);
+    for (uint32_t n = 0; n < 5; ++n)
+        put(b, n, places[n][0], places[n][1], 1);
+    for (b->fingers = 1; b->fingers <= 2; ++b->fingers) {
+        drives(b, 24);
+        check_told(b, 1.0);
+    }
+    b->fingers = 5; /* five rows a drive are too few for three: frames tell of the others */
+    confirm(b, places, 5);
+    confirm(b, places, 5);
+    drives(b, 40);
+    check_told(b, 1.0);
+    CHECK_EQUAL(eits_fast_touches(b->fast, touches, 2, &count), EITS_OK);
+    CHECK_EQUAL(count, 2);
+    put(b, 5, 0, 2, 1); /* one too many */
+    drives(b, 40);
+    CHECK_EQUAL(b->fast->count, EITS_FAST_TOUCHES);
+    b->fingers = 5;
+    confirm(b, places + 3, 2); /* frames do not show the first three */
+    confirm(b, places + 3, 2);
+    CHECK_EQUAL(told(b, touches), 2);
+    memmove(b->on, b->on + 3, 2 * sizeof b->on[0]);
+    b->fingers = 2;
+    drives(b, 40);
+    check_told(b, 0.5);
+    bench_close(b);
+}
+
+/* Rows that no touch changes: nothing is told, and a finger is found all the same. */
+static void spoil_glitch(bench *b)
+{
+    if (b->now_us / DRIVE_US % 11 == 0)
+        b->frame[eits_fast_rows(b->fast, b->next, &(uint32_t){0})[2]] +=
+            (eits_real)(500 * b->sigma);
+}
+
+static void spoil_missing(bench *b)
+{
+    b->frame[7] = (eits_real)NAN;
+    b->frame[13] = (eits_real)INFINITY;
+    b->frame[23] = (eits_real)1e30;
+}
+
+static void spoil_dead(bench *b)
+{
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+        if (b->skin.model.protocol[4 * i + 2] == 3)
+            b->frame[i] = 0;
+    }
+}
+
+static void spoil_drift(bench *b)
+{
+    b->gain_drift = fmin(b->gain_drift + 2e-6, 4e-4);
+}
+
+static void test_other_things_than_touches(void)
+{
+    void (*const spoils[])(bench *) = {spoil_glitch, spoil_missing, spoil_dead, spoil_drift};
+    for (size_t how = 0; how < sizeof spoils / sizeof spoils[0]; ++how) {
+        bench *b = bench_open(EITS_SIGN_INCREASE);
+        for (uint32_t k = 0; k < 264; ++k) {
+            if (k == 200) {
+                check_told(b, 0);
+                put(b, 0, 12, -20, 1);
+            }
+            measure(b);
+            spoils[how](b);
+            give(b);
+        }
+        check_told(b, 1.0);
+        bench_close(b);
+    }
+}
+
+/* Noise that no touch explains: little is told, none for long, and nothing breaks. */
+static void test_rows_without_sense(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_fast_touch touches[EITS_FAST_TOUCHES];
+    uint32_t drives_told = 0;
+    for (uint32_t k = 0; k < 400; ++k) {
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b->frame[i] = (eits_real)((double)b->quiet[i] * (1 + 1e-2 * small_random(&b->random)));
+        give(b);
+        drives_told += told(b, touches) > 0;
+    }
+    CHECK(drives_told < 20);
+    CHECK_EQUAL(align(b, b->frame), EITS_FAST_TRUSTED * 0);
+    CHECK_EQUAL(align(b, b->frame), EITS_FAST_TRUSTED);
+    bench_close(b);
+}
+
+static void test_frames_begin_and_end_touches(void)
+{
+    static const double far[][2] = {{-40, 0}, {40, 0},  {0, 40},  {0, -40},
+                                    {0, 0},   {28, 28}, {-28, 28}};
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_fast_touch touches[EITS_FAST_TOUCHES];
+    confirm(b, far, 1);
+    CHECK_EQUAL(told(b, touches), 0); /* one frame is not enough */
+    confirm(b, far, 1);
+    CHECK_EQUAL(told(b, touches), 1);
+    CHECK_EQUAL(touches[0].confirmed, 1);
+    CHECK_NEAR(touches[0].x_mm, -40, 1e-4);
+    confirm(b, (const double[][2]){{-40, 4}, {-40, -4}}, 2); /* one of them is beside it */
+    confirm(b, (const double[][2]){{-40, 4}, {-40, -4}}, 2);
+    CHECK_EQUAL(told(b, touches), 1);
+    confirm(b, far, 7); /* more than there is room for */
+    confirm(b, far, 7);
+    CHECK_EQUAL(told(b, touches), EITS_FAST_TOUCHES);
+    confirm(b, far, 0);
+    CHECK_EQUAL(told(b, touches), EITS_FAST_TOUCHES); /* one frame does not end them */
+    confirm(b, far, 0);
+    CHECK_EQUAL(told(b, touches), 0);
+    confirm(b, far, 1);
+    confirm(b, far, 1);
+    drives(b, 24); /* rows do not bear it out */
+    CHECK_EQUAL(told(b, touches), 0);
+    bench_close(b);
+}
+
+/* Rows of an electrode that a frame named are left out, until none is named. */
+static void test_named_electrodes(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    uint8_t *states = b->skin.ctx->rows.electrode;
+    states[3] = 1;
+    confirm(b, NULL, 0);
+    for (uint32_t k = 0; k < 32; ++k) {
+        measure(b);
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+            if (memchr(b->skin.model.protocol + 4 * i, 3, 4) != NULL)
+                b->frame[i] += (eits_real)(300 * b->sigma * small_random(&b->random));
+        }
+        give(b);
+        check_told(b, 0);
+        CHECK_EQUAL(b->fast->unexplained, 0);
+    }
+    states[3] = 0;
+    confirm(b, NULL, 0);
+    CHECK_EQUAL(b->fast->masked[0] | b->fast->masked[39], 0);
+    bench_close(b);
+}
+
+static void test_a_clock_that_stands_or_goes_back(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    put(b, 0, -14, 8, 1);
+    drives(b, 16);
+    const eits_real sure = b->fast->p[0][0];
+    for (uint32_t k = 0; k < 16; ++k) {
+        b->now_us -= k % 2 == 0 ? DRIVE_US : 2 * DRIVE_US;
+        drives(b, 1);
+    }
+    CHECK(b->fast->p[0][0] < sure);
+    check_told(b, 0.5);
+    b->now_us += 60000000; /* a minute: the touch may be anywhere, and is found again */
+    drives(b, 24);
+    check_told(b, 1.0);
+    bench_close(b);
+}
+
+static void test_a_touch_that_leaves_the_skin(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    put(b, 0, 40, 0, 1);
+    drives(b, 16);
+    check_told(b, 0.5);
+    b->fast->state[FAST_X] = 500;
+    drives(b, 1);
+    CHECK_EQUAL(b->fast->count, 0);
+    drives(b, 16);
+    check_told(b, 0.5);
+    b->fast->state[FAST_VX] = (eits_real)NAN;
+    drives(b, 1);
+    CHECK_EQUAL(b->fast->count, 0);
+    drives(b, 16);
+    check_told(b, 0.5);
+    b->fast->next_id = UINT32_MAX; /* numbers begin again at 1 */
+    put(b, 1, -30, 20, 1);
+    drives(b, 16);
+    CHECK_EQUAL(b->fast->next_id, 1);
+    bench_close(b);
+}
+
+static void test_answers_and_their_slopes(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    const uint32_t stride = b->fast->most_rows;
+    eits_real out[FAST_WAYS * EITS_FAST_ROWS];
+    const finger at = {13.7, -21.2, 1};
+    const eits_real place[2] = {(eits_real)at.x_mm, (eits_real)at.y_mm};
+    for (uint32_t d = 0; d < eits_fast_drives(b->fast); ++d) {
+        uint32_t count;
+        const uint16_t *rows = eits_fast_rows(b->fast, d, &count);
+        CHECK_EQUAL(count, 5);
+        CHECK(eits_fast_answer(b->fast, d, place, out));
+        for (uint32_t i = 0; i < count; ++i) {
+            const double gain = (double)b->fast->gain[rows[i]], h = 1e-3;
+            const finger right = {at.x_mm + h, at.y_mm, 1}, left = {at.x_mm - h, at.y_mm, 1};
+            const finger above = {at.x_mm, at.y_mm + h, 1}, below = {at.x_mm, at.y_mm - h, 1};
+            const double want = gain * answer(b, rows[i], at), size = gain * unit(b) * b->sigma;
+            CHECK_NEAR(out[i], want, 1e-4 * fabs(want) + 1e-12 * size);
+            CHECK_NEAR(out[stride + i],
+                       gain * (answer(b, rows[i], right) - answer(b, rows[i], left)) / (2 * h),
+                       1e-3 * fabs(want));
+            CHECK_NEAR(out[2 * stride + i],
+                       gain * (answer(b, rows[i], above) - answer(b, rows[i], below)) / (2 * h),
+                       1e-3 * fabs(want));
+        }
+    }
+    CHECK_EQUAL(eits_fast_answer(b->fast, 0, (const eits_real[]){900, 0}, out), 0);
+    CHECK_EQUAL(out[0] == 0 && out[2 * stride] == 0, 1);
+    bench_close(b);
+}
+
+static void test_what_is_refused(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_fast *made = NULL;
+    eits_model *model = &b->skin.model;
+    eits_real volts[SMALL_ROWS] = {0};
+    eits_fast_touch touches[EITS_FAST_TOUCHES];
+    eits_touch found[1];
+    uint32_t count = 0, state;
+    uint8_t *memory = b->aligned;
+    memset(found, 0, sizeof found);
+    CHECK_EQUAL(b->size, EITS_FAST_SIZE(SMALL_ROWS, SMALL_ELECTRODES, 5, SIDE, SIDE));
+    CHECK((uint8_t *)(b->fast->held[EITS_FAST_HELD - 1].factor) + EITS_REALS(15) ==
+          memory + b->size); /* the last that is laid out */
+    CHECK_EQUAL(eits_fast_size(NULL), 0);
+    CHECK_EQUAL(eits_fast_init(NULL, b->size, b->skin.ctx, &made), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_init(memory, b->size, NULL, &made), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_init(memory, b->size, b->skin.ctx, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_init(memory, b->size - 1, b->skin.ctx, &made), EITS_E_WORKSPACE);
+    CHECK_EQUAL(eits_fast_init(memory + 8, b->size, b->skin.ctx, &made), EITS_E_WORKSPACE);
+    CHECK_EQUAL(eits_fast_drives(NULL), 0);
+    CHECK_EQUAL(eits_fast_drives(b->fast), SMALL_ELECTRODES);
+    CHECK(eits_fast_rows(NULL, 0, &count) == NULL && eits_fast_rows(b->fast, 0, NULL) == NULL);
+    CHECK(eits_fast_rows(b->fast, 8, &count) == NULL);
+    CHECK_EQUAL(eits_fast_drive(NULL, 0, volts, 5, 0), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_drive(b->fast, 0, NULL, 5, 0), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_drive(b->fast, 8, volts, 5, 0), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_drive(b->fast, 0, volts, 4, 0), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_touches(NULL, touches, 5, &count), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_touches(b->fast, NULL, 5, &count), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_touches(b->fast, touches, 5, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_align(NULL, volts, SMALL_ROWS, volts, &state), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_align(b->fast, NULL, SMALL_ROWS, volts, &state), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_align(b->fast, volts, SMALL_ROWS, NULL, &state), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_align(b->fast, volts, SMALL_ROWS, volts, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_align(b->fast, volts, 39, volts, &state), EITS_E_FRAME_LENGTH);
+    CHECK_EQUAL(eits_fast_confirm(NULL, found, 0), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_confirm(b->fast, NULL, 1), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_confirm(b->fast, NULL, 0), EITS_OK);
+    CHECK_EQUAL(eits_fast_confirm(b->fast, found, EITS_MAX_TOUCHES + 1), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_begin(NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_set(b->skin.ctx, b->quiet, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_fast_begin(b->fast), EITS_E_NO_REFERENCE); /* of unknown noise */
+    CHECK_EQUAL(eits_reference_begin(b->skin.ctx, 4), EITS_OK);
+    CHECK_EQUAL(eits_fast_begin(b->fast), EITS_E_NO_REFERENCE); /* not yet */
+    CHECK_EQUAL(eits_fast_drive(b->fast, 0, volts, 5, 0), EITS_E_NO_REFERENCE);
+    CHECK_EQUAL(eits_fast_align(b->fast, volts, SMALL_ROWS, volts, &state), EITS_E_NO_REFERENCE);
+    /* one drive of all rows, and none of fields */
+    uint8_t table[4 * SMALL_ROWS];
+    memcpy(table, model->protocol, sizeof table);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        memcpy(table + 4 * i, table, 2);
+    model->protocol = table;
+    CHECK_EQUAL(eits_fast_size(model), 0);
+    CHECK_EQUAL(eits_fast_init(memory, b->size, b->skin.ctx, &made), EITS_E_ARGUMENT);
+    model->fields.at.data = NULL;
+    CHECK_EQUAL(eits_fast_size(model), 0);
+    CHECK(made == NULL);
+    bench_close(b);
+}
+
+int main(void)
+{
+    test_answers_and_their_slopes();
+    test_nothing_touches();
+    test_a_finger(EITS_SIGN_INCREASE);
+    test_a_finger(EITS_SIGN_DECREASE);
+    test_two_at_once();
+    test_several_fingers();
+    test_other_things_than_touches();
+    test_rows_without_sense();
+    test_frames_begin_and_end_touches();
+    test_named_electrodes();
+    test_a_clock_that_stands_or_goes_back();
+    test_a_touch_that_leaves_the_skin();
+    test_what_is_refused();
+    return checks_report("fast");
+}
