@@ -24,11 +24,7 @@ from eitskin.device.wire.packets import (
     SolvedImage,
     SolvedTouches,
 )
-from eitskin.device.wire.payloads import (
-    MalformedPacket,
-    pack,
-    parse,
-)
+from eitskin.device.wire.payloads import MalformedPacket, pack, parse
 from eitskin.skin.protocol import adjacent
 from made_payloads import build_image, build_raw, build_touches
 

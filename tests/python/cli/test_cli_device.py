@@ -88,11 +88,8 @@ def test_stream_for_programs(done: Done, scene: Path) -> None:
     assert numbers == list(range(numbers[0], numbers[0] + FRAMES))
     assert [frame["time_s"] for frame in frames] == pytest.approx(0.05 * np.arange(FRAMES))
     for frame in frames:
-        assert (
-            len(frame["voltage_v"]) == 208
-            and len(frame["quality"]) == 208
-            and len(frame["image_s_per_m"]) == 812
-        )
+        assert len(frame["voltage_v"]) == 208 and len(frame["quality"]) == 208
+        assert len(frame["image_s_per_m"]) == 812
         assert frame["touches"][0]["error_mm"] < 3.0 and frame["touches"][0]["id"] == 1
         assert frame["true"] == [{"x_mm": -40.0, "y_mm": 10.0, "radius_mm": 9.0, "contrast": 9.0}]
         assert frame["info"]["status"] == 0 and frame["info"]["iterations"] >= 1
@@ -140,9 +137,8 @@ def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
     assert {info["iterations"] for info in infos("--iterations", "7")} == {7}
     assert {info["stop"] for info in infos("--gap", "0.05", "--iterations", "1000")} == {"gap"}
     warm, cold = infos("--iterations", "10", "--warm"), infos("--iterations", "10", "--cold")
-    assert (
-        warm[0]["gap_rel"] == cold[0]["gap_rel"] and warm[-1]["gap_rel"] < 0.5 * cold[-1]["gap_rel"]
-    )
+    assert warm[0]["gap_rel"] == cold[0]["gap_rel"]
+    assert warm[-1]["gap_rel"] < 0.5 * cold[-1]["gap_rel"]
     other = infos("--sign", "decrease", "--iterations", "3", "--ignore", "all")
     assert other[0]["nonzeros"] != infos("--iterations", "3")[0]["nonzeros"]
     assert all(info["diagnostics"] == [] for info in other)
@@ -202,10 +198,8 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
         device = f"serial:{port}"
         assert main(["stream", "--device", device, "--frames", "3", "-v"]) == 0
         out, err = capsys.readouterr()
-        assert (
-            "leave the skin untouched: taking the reference from 16 frames" in err
-            and "touch it" in err
-        )
+        assert "leave the skin untouched: taking the reference from 16 frames" in err
+        assert "touch it" in err
         assert all(
             line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (below-threshold)")
             for line in out.splitlines()[:3]
@@ -343,12 +337,8 @@ def test_flash_prints_what_it_runs_and_runs_it(
     flash = ["flash", "--image", str(image), "--tool", "st-flash"]
     assert main([*flash, "--dry-run"]) == 0
     planned = capsys.readouterr().out.splitlines()
-    assert (
-        not log.exists()
-        and str(image) in planned[0]
-        and "0x08000000" in planned[0]
-        and "0x08040000" in planned[1]
-    )
+    assert not log.exists() and str(image) in planned[0] and "0x08000000" in planned[0]
+    assert "0x08040000" in planned[1]
     assert main(flash) == 0
     out, err = capsys.readouterr()
     folders = re.compile(r"/eitskin-flash-\w+/")  # of each run its own
@@ -415,9 +405,8 @@ def test_frames_of_a_recording_give_the_boards_touches(
     frames = load_frames(exported)
     assert frames.n_frames == FRAMES and len(frames.reference_voltage_v) == 16
     model: Model = prebuilt()[0]
-    assert (
-        frames.protocol.hash == model.protocol.hash and frames.meta["board"]["board"] == "simulated"
-    )
+    assert frames.protocol.hash == model.protocol.hash
+    assert frames.meta["board"]["board"] == "simulated"
     board = json_lines(done("replay", run, "--json"))[:-1]
     host = strict(done("reconstruct", exported, "--track", "--json"))["frames"]
     assert [[t["x_mm"] for t in f["touches"]] for f in host] == [

@@ -40,10 +40,8 @@ def test_two_touches_within_two_millimetres_of_the_scene(
     assert lines[20].endswith(
         "; 0 gaps (0 packets missing), 0 dropped here, 0 dropped by the board"
     )
-    assert (
-        lines[21].startswith("solve and touches on the board: p50 ")
-        and "40 of 40 touches found, 0 false" in lines[22]
-    )
+    assert lines[21].startswith("solve and touches on the board: p50 ")
+    assert "40 of 40 touches found, 0 false" in lines[22]
 
 
 @needs_image
@@ -90,22 +88,16 @@ def test_the_emulated_boards_images_are_this_hosts(
     capsys.readouterr()
     assert main(["replay", str(path), "--check", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert (
-        facts["same_bits"]
-        and facts["images"] == facts["touches"] == 8
-        and facts["untold"] == facts["alone"] == 0
-    )
+    assert facts["same_bits"] and facts["images"] == facts["touches"] == 8
+    assert facts["untold"] == facts["alone"] == 0
 
 
 @needs_image
 def test_the_demos_touches_on_the_emulated_board() -> None:
     result = run_board_demo("emu:demo")
     assert result.check.as_dict()["same_bits"] and result.check.compared == 3
-    assert (
-        result.matching.hits == 3
-        and max(result.matching.distances_mm) < 2.0
-        and result.matching.false_touches == 0
-    )
+    assert result.matching.hits == 3 and max(result.matching.distances_mm) < 2.0
+    assert result.matching.false_touches == 0
     text = to_text(result)
     assert "nucleo_f767zi, firmware 0.1.0" in text and "same bits: yes, 3 images" in text
     json.dumps(to_json(result), allow_nan=False)

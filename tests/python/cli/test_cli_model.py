@@ -107,11 +107,8 @@ def test_build_info_verify(
     assert tuple(built) == FACTS
     assert json.loads(done("model", "info", model, "--json")) == built
     assert built == built | expected
-    assert (
-        built["bytes"] == model.stat().st_size
-        and built["skin"] == "palm"
-        and built["electrodes"] == count
-    )
+    assert built["bytes"] == model.stat().st_size and built["skin"] == "palm"
+    assert built["electrodes"] == count
     assert built["protocol_hash"] == f"{load_skin(skin)[1].hash:016x}"
     assert set(built["defaults"]) == set(asdict(Defaults()))
     assert load_model(model)[0].skin == load_skin(skin)[0]
@@ -192,9 +189,8 @@ def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     )
     (tmp_path / "palm.eitm").write_bytes((tmp_path / "palm.eitm").read_bytes()[:-16])
     broken = run_command([*command, "model", "verify", "palm.eitm"], cwd=tmp_path)
-    assert broken.returncode == 6 and broken.stderr.startswith(
-        "eitskin: palm.eitm: the model is truncated"
-    )
+    assert broken.returncode == 6
+    assert broken.stderr.startswith("eitskin: palm.eitm: the model is truncated")
     wrong = run_command([*command, "model", "verfy"], cwd=tmp_path)
     assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1
     traced = run_command([*command, "--traceback", "model", "info", "none.eitm"], cwd=tmp_path)

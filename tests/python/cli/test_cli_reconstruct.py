@@ -81,16 +81,11 @@ def test_what_is_found_is_said(
     code = main(["reconstruct", str(tmp_path / "spoilt.npz"), "--json"])
     said = capsys.readouterr()
     listed = json.loads(said.out)["frames"]
-    assert (
-        code == 8
-        and "electrodes 2, 6 and 10 open" in listed[3]["refused"]
-        and "electrodes 2, 6 and 10 open" in said.err
-    )
+    assert code == 8 and "electrodes 2, 6 and 10 open" in listed[3]["refused"]
+    assert "electrodes 2, 6 and 10 open" in said.err
     assert listed[1]["info"]["found"][0] == "electrode 5 open" and listed[1]["info"]["masked"] == 52
-    assert listed[2]["info"]["diagnostics"][0] == "outlier" and listed[2]["info"]["outliers"] in (
-        1,
-        2,
-    )
+    assert listed[2]["info"]["diagnostics"][0] == "outlier"
+    assert listed[2]["info"]["outliers"] in (1, 2)
     assert listed[0]["info"]["masked"] == 0 and set(listed[0]["info"]["diagnostics"]) <= {"crowded"}
     main(["reconstruct", str(tmp_path / "spoilt.npz"), "--only", "test-s3-1"])
     assert "found: electrode 5 open" in capsys.readouterr().out
@@ -149,10 +144,8 @@ def test_options_reach_the_solver(
     facts = json.loads(
         done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--mac-limit", "200000")
     )
-    assert (
-        facts["frames"][0]["info"]["stop"] == "macs"
-        and facts["frames"][0]["info"]["macs"] <= 200000
-    )
+    assert facts["frames"][0]["info"]["stop"] == "macs"
+    assert facts["frames"][0]["info"]["macs"] <= 200000
     resting = changed_frames(voltage_v=np.repeat(session().frames_v[:1], 20, axis=0))
     cold = json.loads(done("reconstruct", resting, "--json", "--iterations", "10"))["frames"]
     warm = json.loads(done("reconstruct", resting, "--json", "--iterations", "10", "--warm"))[
@@ -164,17 +157,14 @@ def test_options_reach_the_solver(
         == cold[5]["info"]["gap"]
         > 2 * warm[5]["info"]["gap"]
     )
-    assert (
-        len({frame["touches"][0]["id"] for frame in warm}) == 1
-        and cold[5]["touches"][0]["id"] != cold[0]["touches"][0]["id"]
-    )
+    assert len({frame["touches"][0]["id"] for frame in warm}) == 1
+    assert cold[5]["touches"][0]["id"] != cold[0]["touches"][0]["id"]
     limit = str(0.999 * np.abs(session().frames_v).max())
     masked = json.loads(done("reconstruct", frames_file, "--json", "--saturation-v", limit))
     assert max(frame["info"]["masked"] for frame in masked["frames"]) >= 1
     some = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-4,test-s3-11"))
-    assert [frame["frame"] for frame in some["frames"]] == [4, 11] and some["summary"][
-        "frames"
-    ] == 2
+    assert [frame["frame"] for frame in some["frames"]] == [4, 11]
+    assert some["summary"]["frames"] == 2
 
 
 def test_for_people(done: Done, frames_file: Path) -> None:
@@ -185,11 +175,8 @@ def test_for_people(done: Done, frames_file: Path) -> None:
         == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
     )
     assert text.count("60 iterations (iterations), gap ") == 20
-    assert (
-        "20 frames, 0 refused; median " in text
-        and " of " in lines[-1]
-        and lines[-1].startswith("against the truth of 20")
-    )
+    assert "20 frames, 0 refused; median " in text and " of " in lines[-1]
+    assert lines[-1].startswith("against the truth of 20")
     assert sum(line.startswith("test-s3-") for line in lines) == 20
 
 
@@ -206,10 +193,8 @@ def test_quiet_frames_show_nothing(done: Done, changed_frames: Callable[..., Pat
     assert text.count("none (no change above the noise)") >= 7
     assert "against the truth" not in text
     facts = json.loads(done("reconstruct", path, "--json"))
-    assert "summary" not in facts and {frame["info"]["stop"] for frame in facts["frames"]} <= {
-        "below-threshold",
-        "iterations",
-    }
+    assert "summary" not in facts
+    assert {frame["info"]["stop"] for frame in facts["frames"]} <= {"below-threshold", "iterations"}
 
 
 def test_output_and_picture(done: Done, frames_file: Path, tmp_path: Path) -> None:
@@ -237,10 +222,8 @@ def test_a_bad_frame_among_good_ones(
     out, err = capsys.readouterr()
     facts = json.loads(out)
     assert [frame["refused"] is None for frame in facts["frames"]].count(False) == 2
-    assert (
-        "too many channels" in facts["frames"][3]["refused"]
-        and "zero" in facts["frames"][5]["refused"]
-    )
+    assert "too many channels" in facts["frames"][3]["refused"]
+    assert "zero" in facts["frames"][5]["refused"]
     lines = err.splitlines()
     assert len(lines) == 2 and all(line.startswith(f"eitskin: {path}: frame ") for line in lines)
     with np.load(output) as saved:
@@ -256,10 +239,8 @@ def test_a_reference_of_another_skin_is_warned_of(
     )
     assert main(["reconstruct", str(path)]) == 0
     err = capsys.readouterr().err
-    assert (
-        err.startswith("eitskin: warning: the reference correlates with the model by 0.")
-        and err.count("\n") == 1
-    )
+    assert err.startswith("eitskin: warning: the reference correlates with the model by 0.")
+    assert err.count("\n") == 1
     assert f"eitskin doctor {path}" in err
 
 
@@ -293,11 +274,8 @@ def test_the_whole_way(done: Done, tmp_path: Path) -> None:
     assert facts["model"] == str(model_file)
     summary = facts["summary"]
     assert summary["found"] >= 0.85 * summary["true"] and summary["false"] <= 2
-    assert (
-        summary["position_median_mm"] < 2
-        and summary["miou_image"] > 0.75
-        and summary["miou_touches"] > 0.8
-    )
+    assert summary["position_median_mm"] < 2 and summary["miou_image"] > 0.75
+    assert summary["miou_touches"] > 0.8
     assert picture.read_bytes()[:8] == PNG
     with np.load(output) as saved:
         grid = load_model(model_file)[0].grid

@@ -129,11 +129,8 @@ def test_the_hosts_images_are_the_boards(done: Done, run: Path) -> None:
         == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
     )
     facts = json.loads(done("replay", run, "--check", "--json"))
-    assert (
-        facts["same_bits"]
-        and facts["solver_noted"]
-        and (facts["same"], facts["untold"]) == (FRAMES, 0)
-    )
+    assert facts["same_bits"] and facts["solver_noted"]
+    assert (facts["same"], facts["untold"]) == (FRAMES, 0)
 
 
 @pytest.mark.parametrize(
@@ -166,11 +163,8 @@ def test_one_bit_that_differs_is_found(
     facts = json.loads(out)
     different = facts["different"]
     # what the host makes of a changed raw frame it begins the next one from
-    assert (
-        not facts["same_bits"]
-        and different[0] == 18
-        and (len(different) == 1 or kind == PacketType.RAW)
-    )
+    assert not facts["same_bits"] and different[0] == 18
+    assert len(different) == 1 or kind == PacketType.RAW
     assert err == f"eitskin: {other}: this host's images are not the board's\n"
 
 
@@ -193,12 +187,8 @@ def test_frames_after_a_loss_are_not_called_different(
     done("record", "--device", f"sim:{scene}", "-o", run, "--warm")
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
     facts = json.loads(done("replay", other, "--check", "--json"))
-    assert (
-        facts["different"] == []
-        and facts["same"] == 1
-        and facts["untold"] == FRAMES - 2
-        and facts["alone"] == 1
-    )
+    assert facts["different"] == [] and facts["same"] == 1 and facts["untold"] == FRAMES - 2
+    assert facts["alone"] == 1
 
 
 def test_touches_after_a_loss_are_not_called_different(
@@ -216,11 +206,8 @@ def test_touches_after_a_loss_are_not_called_different(
         alone, tmp_path / "others.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None)
     )
     facts = json.loads(done("replay", other, "--check", "--json"))
-    assert facts["different"] == [] and (facts["same"], facts["untold"], facts["alone"]) == (
-        FRAMES - 1,
-        0,
-        1,
-    )
+    assert facts["different"] == []
+    assert (facts["same"], facts["untold"], facts["alone"]) == (FRAMES - 1, 0, 1)
 
 
 def test_an_image_after_a_loss_is_judged_all_the_same(

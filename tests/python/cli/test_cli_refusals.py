@@ -159,9 +159,8 @@ def test_frames_that_cannot_be_used(
     outputs = ["-o", str(tmp_path / "out.npz"), "--picture", str(tmp_path / "out.png")]
     assert main(["reconstruct", str(path), "--engine", engine, *outputs]) == FRAME
     err = capsys.readouterr().err
-    assert (
-        err.startswith(f"eitskin: {path}: frame 0 (test-s3-0) refused: ") and err.count("\n") == 1
-    )
+    assert err.startswith(f"eitskin: {path}: frame 0 (test-s3-0) refused: ")
+    assert err.count("\n") == 1
     assert text in err
     assert [entry.name for entry in tmp_path.iterdir()] == ["changed.npz"]
 
@@ -249,10 +248,8 @@ def test_another_protocol_names_both_hashes_and_files(
     path = changed_frames(drive_measure=rows)
     line = refused(PROTOCOL, "reconstruct", path, "-o", tmp_path / "out.npz")
     assert str(path) in line and "prebuilt paper skin" in line
-    assert (
-        f"{prebuilt()[0].protocol.hash:016x}" in line
-        and line.count("(16 electrodes, 208 rows)") == 2
-    )
+    assert f"{prebuilt()[0].protocol.hash:016x}" in line
+    assert line.count("(16 electrodes, 208 rows)") == 2
 
 
 # ---- skins ----

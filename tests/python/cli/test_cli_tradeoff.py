@@ -68,9 +68,8 @@ def test_the_recommended_model_is_the_measured_one(
     )
     assert model.defaults.mask_threshold == pytest.approx(one.threshold)
     measured = ModelShop(paper_skin(), adjacent(16)).build(settings).model
-    assert (measured.stored.columns == model.stored.columns).all() and (
-        measured.projection == model.projection
-    ).all()
+    assert (measured.stored.columns == model.stored.columns).all()
+    assert (measured.projection == model.projection).all()
 
 
 def test_recommendations_name_what_bounds_the_rate(done: Done) -> None:

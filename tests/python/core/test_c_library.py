@@ -153,10 +153,7 @@ def test_every_source_is_built(libraries: dict[str, Path], width: str) -> None:
         for name in run(tool("ar"), "t", libraries[width]).split()
     }
     sources = {path.name for path in SOURCES if path.suffix == ".c"}
-    assert sources - members <= {
-        "avx2.c",
-        "m7.c",
-    }  # for one family of processors only
+    assert sources - members <= {"avx2.c", "m7.c"}  # for one family of processors only
     assert members <= sources
 
 

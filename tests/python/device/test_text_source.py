@@ -119,8 +119,7 @@ def test_lines_that_are_no_frames_are_counted_told_once_and_skipped(
     holes[3], holes[40], holes[41], holes[42] = "nan", "", "-inf", "7..5"
     bad = ["Board ready", "\xff\xfe\x00 garbage", short[0], short[1], "", "# a comment"]
     path = written(
-        tmp_path,
-        "\r\n".join([*good[:11], *bad, ",".join(holes), *good[13:]]).encode("latin-1"),
+        tmp_path, "\r\n".join([*good[:11], *bad, ",".join(holes), *good[13:]]).encode("latin-1")
     )
     *items, counters = streamed(f"text:{path}?layout={layout}")
     events = [item for item in items if isinstance(item, LinkEvent)]

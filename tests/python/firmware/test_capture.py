@@ -77,10 +77,8 @@ def test_start_arms_everything(elf: Path) -> None:
     image = capture.image
     assert capture.first - 5000 >= 20
     assert image.read(NDTR) == SAMPLES and image.read(CR) & EN
-    assert (
-        image.read(M0AR) == image.symbols["buffers"]
-        and image.read(M1AR) == image.symbols["buffers"] + 2048
-    )
+    assert image.read(M0AR) == image.symbols["buffers"]
+    assert image.read(M1AR) == image.symbols["buffers"] + 2048
     assert image.read(TIM3_SMCR) == 0x26  # trigger mode, ITR2
     assert image.read(TIM3 + 0x2C) == SLOT_US - 1 and image.read(TIM3 + 0x34) == BURST_US
 
@@ -148,9 +146,8 @@ def test_a_failure_is_told_and_the_scan_goes_on_in_the_same_grid(elf: Path, caus
     ((start, next_start, _, lost),) = capture.bursts
     assert start == capture.first + SLOT_US and lost
     assert next_start >= now + 20 and (next_start - capture.first) % SLOT_US == 0
-    assert (
-        image.read(TIM5_CCR1) == next_start - 1 and image.read(CR) & EN and image.read(ADC_CR2) & 1
-    )
+    assert image.read(TIM5_CCR1) == next_start - 1 and image.read(CR) & EN
+    assert image.read(ADC_CR2) & 1
     told = capture.interrupt(1, next_start + BURST_US)
     assert told == [(next_start, next_start + SLOT_US, 0, False)]
 
@@ -174,11 +171,8 @@ def test_after_stop_nothing_is_told(elf: Path) -> None:
     capture = Capture(elf)
     capture.stop()
     assert capture.interrupt(1, capture.first + BURST_US) == []
-    assert (
-        not capture.image.read(CR) & EN
-        and not capture.image.read(TIM3_CR1)
-        and not capture.image.read(TIM3_SMCR) & 7
-    )
+    assert not capture.image.read(CR) & EN and not capture.image.read(TIM3_CR1)
+    assert not capture.image.read(TIM3_SMCR) & 7
 
 
 @pytest.mark.parametrize(

@@ -81,17 +81,14 @@ def test_places_in_memory(sections: dict[str, tuple[int, int]], symbols: dict[st
         assert ends and address + size <= ends[0], name
     # The stack is at the bottom of DTCM, so that what overflows it meets the MPU's guard, aligned
     # to its 256 bytes.
-    assert (
-        symbols["stack_bottom"] == DTCM
-        and symbols["stack_top"] - symbols["stack_bottom"] >= 8 * 1024
-    )
+    assert symbols["stack_bottom"] == DTCM
+    assert symbols["stack_top"] - symbols["stack_bottom"] >= 8 * 1024
     # DMA works on memory that no cache covers.
     for name in ("buffers", "tx_ring", "rx_ring"):
         assert DTCM <= symbols[name] < DTCM + DTCM_BYTES, name
     # What survives a reset is neither cleared nor painted.
-    assert (
-        symbols["dtcm_start"] >= symbols["crash"] + 28 and symbols["crash"] >= symbols["stack_top"]
-    )
+    assert symbols["dtcm_start"] >= symbols["crash"] + 28
+    assert symbols["crash"] >= symbols["stack_top"]
     assert symbols["workspace_start"] % 16 == 0 and symbols["workspace_start"] >= symbols["bss_end"]
 
 

@@ -150,8 +150,7 @@ def test_commands_need_the_token(server: PageServer, token: str | None) -> None:
 
 
 @pytest.mark.parametrize(
-    "said",
-    ["no json", "[1]", '{"type": "drawn"}', '{"type": "drawn", "number": "x"}'],
+    "said", ["no json", "[1]", '{"type": "drawn"}', '{"type": "drawn", "number": "x"}']
 )
 def test_a_page_that_talks_nonsense_is_let_go(server: PageServer, said: str) -> None:
     with opened(server, TOKEN) as line:

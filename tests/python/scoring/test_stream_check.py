@@ -103,11 +103,8 @@ def test_a_moving_touch_is_where_it_is_at_the_boards_time() -> None:
 def test_a_refused_frame_says_why_and_is_not_scored() -> None:
     look = watcher()
     seen = look.see(touches(status=-5))
-    assert (
-        "refused: " in line(seen)
-        and Frame(seen.frame, seen).message()["refused"]
-        and look.score.frames == 0
-    )
+    assert "refused: " in line(seen) and Frame(seen.frame, seen).message()["refused"]
+    assert look.score.frames == 0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -30,9 +30,8 @@ def same(results: list[Reconstruction]) -> None:
     """Images, coefficients, touches and info, bit for bit."""
     first = results[0]
     for other in results[1:]:
-        assert (other.image == first.image).all() and (
-            other.coefficients == first.coefficients
-        ).all()
+        assert (other.image == first.image).all()
+        assert (other.coefficients == first.coefficients).all()
         assert other.touches == first.touches
         assert other.info == first.info
 
@@ -78,10 +77,8 @@ def test_a_noisy_tare(solver: str, width: str) -> None:
     for frame in s.frames(33, 4, noise=0.01):
         results = [engine.reconstruct(frame) for engine in built]
         same(results)
-        assert (
-            results[0].info.regularisation == pytest.approx(0.05, rel=0.1)
-            and results[0].image.any()
-        )
+        assert results[0].info.regularisation == pytest.approx(0.05, rel=0.1)
+        assert results[0].image.any()
 
 
 @pytest.mark.parametrize("width", ["float32", "float64"])

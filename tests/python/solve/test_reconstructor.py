@@ -484,10 +484,8 @@ def test_results_do_not_change_afterwards() -> None:
     kept = first.image.copy()
     reconstructor.reconstruct(session().frames_v[1])
     assert (first.image == kept).all()
-    assert (
-        first.image.dtype == np.float32
-        and made("c64").reconstruct(session().frames_v[0]).image.dtype == np.float64
-    )
+    assert first.image.dtype == np.float32
+    assert made("c64").reconstruct(session().frames_v[0]).image.dtype == np.float64
 
 
 def test_two_reconstructors_share_nothing() -> None:

@@ -25,18 +25,14 @@ def test_counts_are_exact_and_models_are_kept(tmp_path: Path) -> None:
     first = bench_growth.run(2, tmp_path, points=POINTS)
     kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     again = bench_growth.run(1, tmp_path, points=POINTS)
-    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == kept and len(
-        kept
-    ) == 4
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == kept
+    assert len(kept) == 4
     assert [(p.macs, p.touch_macs) for p in first.points] == [
         (p.macs, p.touch_macs) for p in again.points
     ]
     few, many, one = first.points
-    assert (few.sweep, few.value, few.n_pixels) == (
-        "pixels n",
-        few.n_pixels,
-        few.n_pixels,
-    ) and few.n_pixels < many.n_pixels
+    assert (few.sweep, few.value, few.n_pixels) == ("pixels n", few.n_pixels, few.n_pixels)
+    assert few.n_pixels < many.n_pixels
     assert few.macs < many.macs and one.touch_macs < many.touch_macs and one.value == 1
     assert all(
         p.macs > 3 * p.n_pixels * 20 and p.solve_us > 0 and p.n_rows == 208 for p in first.points
@@ -63,9 +59,8 @@ def test_batches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert [(s.name, s.threads) for s in result.speeds] == [
         ("one after another", 1), ("batch", 1), ("C alone", 1), ("batch", 2), ("C alone", 2),
     ]  # fmt: skip
-    assert result.speeds[0].times == 1.0 and all(
-        0 < s.least_us <= s.us and s.processor_us > 0 for s in result.speeds
-    )
+    assert result.speeds[0].times == 1.0
+    assert all(0 < s.least_us <= s.us and s.processor_us > 0 for s in result.speeds)
     page = tmp_path / "page.md"
     page.write_bytes(PAGE.read_bytes())
     given = ["--frames", "16", "--rounds", "1", "--page", str(page), "--json"]

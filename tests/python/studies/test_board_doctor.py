@@ -64,9 +64,8 @@ def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board() -> Non
     )
     by_name = {finding.name: finding for finding in report.findings}
     assert "electrode 5 open, frame 3: it makes no contact" in by_name["board-electrode-open"].text
-    assert (
-        by_name["board-watchdog"].severity == "note" and "2 packets" in by_name["board-link"].text
-    )
+    assert by_name["board-watchdog"].severity == "note"
+    assert "2 packets" in by_name["board-link"].text
     assert "not-finite" in by_name and report.exit_code == 11
     assert report.repair == "" and not any(finding.repair for finding in report.findings)
     assert not any("import" in text for text in report.lines())
@@ -131,11 +130,8 @@ def test_of_two_tares_the_last_counts() -> None:
     frames = raw_frames()
     order = [True, True, False, False, True, False]
     run = gather(live(raw, quiet) for raw, quiet in zip(frames, order, strict=False))
-    assert (
-        [raw.frame for raw in run.quiet] == [4]
-        and [raw.frame for raw in run.frames] == [5]
-        and run.left_out == 4
-    )
+    assert [raw.frame for raw in run.quiet] == [4] and [raw.frame for raw in run.frames] == [5]
+    assert run.left_out == 4
 
 
 def test_what_a_line_carries() -> None:

@@ -113,10 +113,8 @@ def test_tables_agree_with_the_data(outcome: ExperimentOutcome) -> None:
         assert one["fixed"]["curve"][at] == pytest.approx(one["fixed"]["miou"]["all"]["mean"])
         low, high = one["fixed"]["tuning_range_over_all_values"]
         assert low <= high
-    assert (
-        "2 scenes for each" in outcome.words["conditions"]
-        and "seed 100002" in outcome.words["conditions"]
-    )
+    assert "2 scenes for each" in outcome.words["conditions"]
+    assert "seed 100002" in outcome.words["conditions"]
 
 
 def test_what_is_kept_is_not_computed_again(
@@ -130,11 +128,8 @@ def test_what_is_kept_is_not_computed_again(
     monkeypatch.setattr(measure, "setup_for", never)
     monkeypatch.setattr(workspace, "scenes", never)
     again = algorithms.run(workspace)
-    assert (
-        again.data == outcome.data
-        and again.tables == outcome.tables
-        and again.words == outcome.words
-    )
+    assert again.data == outcome.data and again.tables == outcome.tables
+    assert again.words == outcome.words
 
 
 def test_a_cut_run_goes_on_and_gives_the_same(

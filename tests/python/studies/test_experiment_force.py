@@ -150,12 +150,10 @@ def test_the_sheet_presses_with_what_the_papers_gel_stands() -> None:
 
 
 def test_the_law_is_what_the_page_says() -> None:
-    assert NOMINAL.radius_mm(50) == pytest.approx(4.8, abs=0.05) and NOMINAL.radius_mm(
-        200
-    ) == pytest.approx(7.6, abs=0.05)
-    assert NOMINAL.contrast(50) == pytest.approx(1.9, abs=0.05) and NOMINAL.contrast(
-        200
-    ) == pytest.approx(4.2, abs=0.05)
+    assert NOMINAL.radius_mm(50) == pytest.approx(4.8, abs=0.05)
+    assert NOMINAL.radius_mm(200) == pytest.approx(7.6, abs=0.05)
+    assert NOMINAL.contrast(50) == pytest.approx(1.9, abs=0.05)
+    assert NOMINAL.contrast(200) == pytest.approx(4.2, abs=0.05)
     assert drawn_laws(3, 5)[:2] == drawn_laws(3, 2) != drawn_laws(4, 2)
     spread = np.std(np.log([law.sensitivity_per_gram for law in drawn_laws(1, 400)]))
     assert spread == pytest.approx(0.2, rel=0.1)

@@ -93,14 +93,12 @@ def test_measures_see_what_they_are_for() -> None:
     found = uniformity(one, PROTOCOL, fold)
     # one of 16 larger by 16 %: a standard deviation of 16 sqrt(15) / 16 of a mean that is larger by
     # 1 %
-    assert found.worst == pytest.approx(
-        16 * np.sqrt(15) / 16 / 1.01
-    ) and found.spread == pytest.approx(found.worst / 13)
+    assert found.worst == pytest.approx(16 * np.sqrt(15) / 16 / 1.01)
+    assert found.spread == pytest.approx(found.worst / 13)
     assert found.reciprocity > 0
     shown = deviations_percent(fold.of(one))
-    assert np.unravel_index(np.argmax(shown), shown.shape) == (5, 6) and shown[
-        5, 6
-    ] == pytest.approx(100 * (1.16 / 1.01 - 1))
+    assert np.unravel_index(np.argmax(shown), shown.shape) == (5, 6)
+    assert shown[5, 6] == pytest.approx(100 * (1.16 / 1.01 - 1))
     both = one.copy()
     pairs = PROTOCOL.reciprocal_pairs()
     k = int(np.flatnonzero((pairs.first == fold.row[5, 6]) | (pairs.second == fold.row[5, 6]))[0])
@@ -130,11 +128,8 @@ def test_each_effect_moves_what_physics_says(outcome: ExperimentOutcome) -> None
     half, one, two = (
         spread(outcome, f"electrodes up to {s:g} mm off their places") for s in (0.5, 1, 2)
     )
-    assert (
-        one == pytest.approx(2 * half, rel=0.2)
-        and two == pytest.approx(2 * one, rel=0.2)
-        and half > usual
-    )
+    assert one == pytest.approx(2 * half, rel=0.2) and two == pytest.approx(2 * one, rel=0.2)
+    assert half > usual
     # places and the sheet keep reciprocity, gains and the common mode do not
     for name in (
         "electrodes up to 2 mm off their places",

@@ -42,9 +42,8 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutc
 
 def test_every_lever_is_on_every_set(done: tuple[Path, ExperimentOutcome]) -> None:
     searches, images = done[1].data["searches"], done[1].data["images"]
-    assert set(searches) == {one.name for one in SEARCHES} and set(images) == {
-        one.name for one in IMAGES
-    }
+    assert set(searches) == {one.name for one in SEARCHES}
+    assert set(images) == {one.name for one in IMAGES}
     assert all(set(found) == {RANDOM, *COUNTED} for found in searches.values())
     assert all(
         set(found) == {"threshold", *(f"{snr:g}" for snr in IMAGE_SNRS_DB)}
@@ -77,9 +76,8 @@ def test_a_run_goes_on_where_it_was(
     lines = (folder / "results.jsonl").read_text(encoding="utf-8")
     monkeypatch.setattr(AblationRuns, "_solve", lambda *_: pytest.fail("solved again"))
     again = _run(folder, monkeypatch)
-    assert (
-        again.data == first.data and (folder / "results.jsonl").read_text(encoding="utf-8") == lines
-    )
+    assert again.data == first.data
+    assert (folder / "results.jsonl").read_text(encoding="utf-8") == lines
 
 
 def test_it_fills_its_page(done: tuple[Path, ExperimentOutcome], tmp_path: Path) -> None:

@@ -168,9 +168,8 @@ def test_targets_have_more_scenes() -> None:
 
 def test_wilson_interval() -> None:
     eight = share(8, 10)  # R: binom::binom.wilson(8, 10)
-    assert eight.low == pytest.approx(0.4901625, abs=1e-6) and eight.high == pytest.approx(
-        0.9433178, abs=1e-6
-    )
+    assert eight.low == pytest.approx(0.4901625, abs=1e-6)
+    assert eight.high == pytest.approx(0.9433178, abs=1e-6)
     assert share(0, 5).low == 0 and share(5, 5).high == 1 and math.isnan(share(0, 0).mean)
 
 
@@ -179,11 +178,8 @@ def test_score_of_places() -> None:
     found = [np.array([[1.0, 0.0], [40.0, 3.0]]), np.array([[30.0, 0.0]])]
     one = score(truth, found, [1000, 3000])
     assert (one.exact.hits, one.right.hits, one.recall.hits, one.recall.count) == (1, 2, 2, 3)
-    assert (
-        one.false_a_scene == 0.5
-        and one.median_mm.value == 2.0
-        and (one.kmac, one.most_kmac) == (2.0, 3.0)
-    )
+    assert one.false_a_scene == 0.5 and one.median_mm.value == 2.0
+    assert (one.kmac, one.most_kmac) == (2.0, 3.0)
     assert math.isnan(quantile([], 0.5).value)
 
 
@@ -191,10 +187,8 @@ def test_area_under_roc() -> None:
     assert auc([0.1, 0.4, 0.35, 0.8], [False, False, True, True]) == 0.75
     assert auc([1, 1, 1], [True, False, False]) == 0.5 and math.isnan(auc([1.0], [True]))
     false, true = roc([0.1, 0.4, 0.35, 0.8], [False, False, True, True])
-    assert float(np.trapezoid(true, false)) == pytest.approx(0.75) and (false[-1], true[-1]) == (
-        1,
-        1,
-    )
+    assert float(np.trapezoid(true, false)) == pytest.approx(0.75)
+    assert (false[-1], true[-1]) == (1, 1)
 
 
 def _seen(places: list[tuple[float, float]], explained: list[float]) -> SeenFrame:
@@ -207,10 +201,8 @@ def _seen(places: list[tuple[float, float]], explained: list[float]) -> SeenFram
 def test_features_of_a_frame() -> None:
     two = _seen([(0.0, 0.0), (27.0, 0.0)], [0.5, 0.01])
     assert nearest(two) == pytest.approx(1.5)
-    assert (
-        features(two, nearest(two), 9.0) == pytest.approx((2, 1.5, 1, 0.2, 10, 0.5))
-        and len(FEATURES) == 6
-    )
+    assert features(two, nearest(two), 9.0) == pytest.approx((2, 1.5, 1, 0.2, 10, 0.5))
+    assert len(FEATURES) == 6
     sure = _seen([(0.0, 0.0)], [0.9])
     assert features(sure, nearest(sure), 9.0) == pytest.approx((1, 2, 1, 0.2, 10, 3))
     assert features(_seen([], []), math.inf, 9.0) == (0, 2, 1, 0, 10, 3)
@@ -229,11 +221,8 @@ def _frames(count: int, seed: int) -> list[ScoredFrame]:
 def test_rule_learns_what_matters() -> None:
     rule, test = fit_rule(_frames(1500, 1)), _frames(1500, 2)
     weights = np.abs(rule.weights)
-    assert (
-        rule.weights[3] < 0
-        and weights.argmax() == 3
-        and weights[3] > 5 * np.delete(weights, 3).max()
-    )
+    assert rule.weights[3] < 0 and weights.argmax() == 3
+    assert weights[3] > 5 * np.delete(weights, 3).max()
     shown = calibration(test, rule.says(test))
     assert 0.93 < shown.exact_not_said.mean < 0.99 and shown.exact_said.mean < 0.6
     exact = np.array([one.exact for one in test])

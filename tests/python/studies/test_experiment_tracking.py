@@ -135,10 +135,8 @@ def test_the_best_pairs_may_not_be_the_nearest() -> None:
     distance = np.array([[1.0, 3.0], [2.0, 9.0]])
     assert measured.best_pairs(distance, 10.0) == [(0, 1), (1, 0)]
     assert measured.nearest_pairs(distance, 10.0) == [(0, 0), (1, 1)]
-    assert (
-        measured.best_pairs(distance, 2.5) == [(0, 0)]
-        and measured.best_pairs(np.zeros((0, 2)), 1.0) == []
-    )
+    assert measured.best_pairs(distance, 2.5) == [(0, 0)]
+    assert measured.best_pairs(np.zeros((0, 2)), 1.0) == []
 
 
 def test_a_share_that_cannot_be() -> None:

@@ -59,10 +59,8 @@ def test_each_has_a_title_and_a_page_that_its_command_fills(name: str) -> None:
     experiment = registry.load(name)
     assert experiment.TITLE and callable(experiment.run)
     page = (PAGES / f"{name}.md").read_text(encoding="utf-8")
-    assert (
-        f"`eitskin study {name} -o out/{name}" in page
-        and "<!-- command -->\n<!-- end command -->" not in page
-    )
+    assert f"`eitskin study {name} -o out/{name}" in page
+    assert "<!-- command -->\n<!-- end command -->" not in page
     assert f"[{name}]({name}.md)" in (PAGES / "README.md").read_text(encoding="utf-8")
 
 
@@ -87,15 +85,11 @@ def test_the_command_lists_runs_and_goes_on(
         assert "mean    0.5" in capsys.readouterr().out
     assert small.computed == 1
     assert main(["study", "small", "-o", str(tmp_path / "out"), "--seed", "4", "--json"]) == 0
-    assert (
-        json.loads(capsys.readouterr().out) == {"mean": 0.5, "none": None} and small.computed == 2
-    )
+    assert json.loads(capsys.readouterr().out) == {"mean": 0.5, "none": None}
+    assert small.computed == 2
     text = page.read_text(encoding="utf-8")
-    assert (
-        "| mean | 0.5 |" in text
-        and "old" not in text
-        and "--seed 3 --page docs/results/small.md" in text
-    )
+    assert "| mean | 0.5 |" in text and "old" not in text
+    assert "--seed 3 --page docs/results/small.md" in text
     assert (tmp_path / "pictures" / "small" / "small.png").read_bytes() == b"png"
     assert (tmp_path / "out" / "small.csv").read_text(encoding="utf-8") == "what,value\nmean,0.5\n"
 
@@ -146,9 +140,7 @@ def test_a_torn_line_is_computed_again(tmp_path: Path) -> None:
 
 def test_sets_to_choose_on_are_not_those_that_are_reported() -> None:
     settings = ExperimentSettings(seed=7, share=0.1)
-    assert settings.tuning_seed != settings.seed and (settings.count(40), settings.count(3)) == (
-        4,
-        2,
-    )
+    assert settings.tuning_seed != settings.seed
+    assert (settings.count(40), settings.count(3)) == (4, 2)
     with pytest.raises(UsageError):
         ExperimentSettings(share=101)

@@ -44,9 +44,8 @@ def test_a_page_shows_its_part_of_a_table(page: Path) -> None:
     words = "<!-- words -->\nso \\1\n<!-- end words -->"
     assert page.read_text() == f"text\n<!-- t -->\n{shown}\n<!-- end t -->\n{words}\nend\n"
     fill_marks(page, "other", ({}, {"t": TABLE}))
-    assert (
-        page.read_text().count("| one |") == 2 and "| a | one | .5 (.4 to .6) |" in page.read_text()
-    )
+    assert page.read_text().count("| one |") == 2
+    assert "| a | one | .5 (.4 to .6) |" in page.read_text()
 
 
 def test_what_is_not_there_is_named_and_nothing_is_written(page: Path) -> None:

@@ -28,9 +28,8 @@ def test_presses_never_seen_are_found(taught: Taught) -> None:
     own = taught.report["error_mm"]["held_out_median"]
     assert 0.3 * np.median(error) < own < 3 * np.median(error)
     turn = taught.report["placement"]["turn_deg"]
-    assert (
-        turn == pytest.approx(TRUE.turn_deg, abs=3) and not taught.report["placement"]["mirrored"]
-    )
+    assert turn == pytest.approx(TRUE.turn_deg, abs=3)
+    assert not taught.report["placement"]["mirrored"]
     assert taught.report["notes"][0].startswith("touches have a force: depth")
 
 

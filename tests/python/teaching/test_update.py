@@ -87,12 +87,7 @@ def test_what_is_better_by_chance_is_not_chosen() -> None:
 
 @pytest.mark.parametrize(
     ("change", "verdict"),
-    [
-        ({}, FITS),
-        ({"dried": 0.02}, FITS),
-        ({"dried": 0.2}, UPDATE),
-        ({"dried": 2.0}, TEACH_AGAIN),
-    ],
+    [({}, FITS), ({"dried": 0.02}, FITS), ({"dried": 0.2}, UPDATE), ({"dried": 2.0}, TEACH_AGAIN)],
     ids=["own", "a little drier", "drier", "dry"],
 )
 def test_the_untouched_skin_tells_whether_a_model_fits(
