@@ -6,18 +6,7 @@ from collections.abc import Iterator, Sequence
 from textwrap import wrap
 from typing import Any
 
-from table import (
-    WIDTH,
-    Lines,
-    Table,
-    Tables,
-    enum_of,
-    origin,
-    plain,
-    split_type,
-    types_of,
-    wrapped,
-)
+from table import WIDTH, Lines, Table, Tables, enum_of, origin, plain, split_type, types_of, wrapped
 from write_constants import python_constants
 
 # how Python has a field that is not a plain number: its type, and its value where none is given
@@ -160,11 +149,9 @@ def _options_module(tables: Tables) -> Lines:
             high = _all(enum_of(tables, kind[5:])) if bits else _limit(greatest)
             yield f'    "{name}": ({low}, {high}),'
     yield from ("}", *remark("The names that an option may have, in the order of their numbers."))
-    yield "CHOICES = {"
-    for name, kind, *_ in table["rows"]:
-        if kind.startswith("eits_"):
-            yield f'    "{name}": {types[kind]["python"]},'
-    yield "}"
+    choices = [(row[0], row[1]) for row in table["rows"] if row[1].startswith("eits_")]
+    items = [f'"{name}": {types[kind]["python"]}' for name, kind in choices]
+    yield f"CHOICES = {{{', '.join(items)}}}"
     yield from remark("What a model's own defaults say, by the same names.")
     yield from joined("OF_MODEL = ", [f'"{row[0]}"' for row in rows if row[2] == "model"])
 
@@ -224,9 +211,7 @@ def _dataclass(struct: Table, bases: str = "") -> Lines:
 def _diagnostics_module(tables: Tables) -> Lines:
     types = types_of(tables["diagnostics"])
     yield from _head(
-        "What the core says of a frame.",
-        "diagnostics",
-        "from dataclasses import dataclass",
+        "What the core says of a frame.", "diagnostics", "from dataclasses import dataclass"
     )
     yield from _names(types["eits_diagnostic"], "DIAGNOSTICS")
     yield f"{all_name(types['eits_diagnostic'])} = {_all(types['eits_diagnostic'])}"
@@ -289,10 +274,14 @@ def _layout(struct: Table) -> Lines:
     if len(short) <= WIDTH:
         yield short
         return
-    yield from ("    LAYOUT: ClassVar[Layout] = Layout(", f'        "{struct["c"]}",')
-    pieces = wrap(fields, WIDTH - 12)
-    yield from (f'        "{" " if at else ""}{piece}"' for at, piece in enumerate(pieces[:-1]))
-    yield f'        "{" " if len(pieces) > 1 else ""}{pieces[-1]}",'
+    yield "    LAYOUT: ClassVar[Layout] = Layout("
+    both = f'        "{struct["c"]}", "{fields}"'
+    if len(both) <= WIDTH:
+        yield both
+    else:
+        pieces = wrap(fields, WIDTH - 12)
+        lines = [f'        "{" " if at else ""}{piece}"' for at, piece in enumerate(pieces)]
+        yield from (f'        "{struct["c"]}",', *lines[:-1], f"{lines[-1]},")
     yield "    )"
 
 

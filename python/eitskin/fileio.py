@@ -50,9 +50,7 @@ def write_beside(path: str | Path) -> Iterator[Path]:
     special = target.exists() and not target.is_file()
     try:
         handle, name = tempfile.mkstemp(
-            prefix=f".{target.name}.",
-            suffix=target.suffix,
-            dir=None if special else target.parent,
+            prefix=f".{target.name}.", suffix=target.suffix, dir=None if special else target.parent
         )
         os.close(handle)
     except OSError as error:

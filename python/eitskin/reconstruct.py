@@ -139,10 +139,7 @@ def reconstruct_frames(
 
 
 def check(
-    how: ReconstructSettings,
-    output: Path | None,
-    picture: Path | None,
-    film: Path | None = None,
+    how: ReconstructSettings, output: Path | None, picture: Path | None, film: Path | None = None
 ) -> None:
     """Refuse what cannot be, before any file is read."""
     if check_threads(how.threads) > 1:
@@ -284,12 +281,7 @@ def _one_by_one(
 
 
 def score(
-    model: Model,
-    frames: Frames,
-    results: Results,
-    sign: str,
-    point: Point | None,
-    notes: list[str],
+    model: Model, frames: Frames, results: Results, sign: str, point: Point | None, notes: list[str]
 ) -> dict[int, FrameScore]:
     """The results against the truth, where the frames carry it."""
     if frames.touch_frame is None and frames.truth_mask is None:

@@ -9,12 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.import_options import (
-    add_import_options,
-    read_options,
-    read_protocol,
-    write_layout,
-)
+from eitskin.cli.import_options import add_import_options, read_options, read_protocol, write_layout
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

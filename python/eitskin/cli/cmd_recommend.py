@@ -26,12 +26,7 @@ def add_parser(subparsers: Any) -> None:
     )
     add_wish(parser)
     option(parser, "--board", choices=("f767", "host"), default="f767")
-    option(
-        parser,
-        "--front FRONT.json",
-        "results of your own (eitskin tradeoff run)",
-        Path,
-    )
+    option(parser, "--front FRONT.json", "results of your own (eitskin tradeoff run)", Path)
     option(parser, "--scenes SET", "the set that accuracy is of", default="random")
     option(parser, "--snr-db DB", default=60.0)
     option(parser, "--by", "whose MIoU", choices=("image", "discs"), default="image")

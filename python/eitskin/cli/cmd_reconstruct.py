@@ -66,12 +66,7 @@ def add_parser(subparsers: Any) -> None:
     )
     option(parser, "--saturation-v V", "leave channels at or beyond +-V out", float)
     option(parser, "-o --output OUT.npz", "write images, touches and solver info", Path)
-    option(
-        parser,
-        "--picture FILE",
-        "all frames, the truth where known (PNG, SVG, PDF)",
-        Path,
-    )
+    option(parser, "--picture FILE", "all frames, the truth where known (PNG, SVG, PDF)", Path)
     option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
     option(parser, "--json")
     parser.set_defaults(run=run)

@@ -123,10 +123,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "noise_floor_v": (0, 1e30),
 }
 # The names that an option may have, in the order of their numbers.
-CHOICES = {
-    "sign": SIGNS,
-    "solver": SOLVERS,
-}
+CHOICES = {"sign": SIGNS, "solver": SOLVERS}
 # What a model's own defaults say, by the same names.
 OF_MODEL = (
     "iterations",

@@ -266,12 +266,7 @@ def replayed(
             count += 1
 
 
-_KINDS = {
-    RawFrame: "raw",
-    SolvedImage: "image",
-    SolvedTouches: "touches",
-    FrameEvents: "events",
-}
+_KINDS = {RawFrame: "raw", SolvedImage: "image", SolvedTouches: "touches", FrameEvents: "events"}
 
 
 class Clock:

@@ -97,9 +97,7 @@ def with_eidors_defaults(
     if source.scale is None:
         named["scale"] = 1 / model.gain
     return replace(
-        options,
-        source=replace(source, **named),
-        current_a=options.current_a or model.current_a,
+        options, source=replace(source, **named), current_a=options.current_a or model.current_a
     ), n_electrodes or len(model.electrode_nodes)
 
 

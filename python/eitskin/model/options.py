@@ -6,12 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from eitskin.core.constants_table import (
-    TRACK_CONFIRM,
-    TRACK_DETECTION,
-    TRACK_HOLD,
-    TRACK_SMOOTH,
-)
+from eitskin.core.constants_table import TRACK_CONFIRM, TRACK_DETECTION, TRACK_HOLD, TRACK_SMOOTH
 from eitskin.core.options_table import ALL_TOUCH_FIT, MAX_TOUCHES, OF_MODEL
 from eitskin.core.results import Options
 from eitskin.model.model import GAIN_DRIFT_KEPT, Model

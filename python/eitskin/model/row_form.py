@@ -13,11 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
-    FORM_MAX_NORM,
-    FORM_TOLERANCE,
-    FORM_WEIGHT_TOLERANCE,
-)
+from eitskin.core.constants_table import FORM_MAX_NORM, FORM_TOLERANCE, FORM_WEIGHT_TOLERANCE
 from eitskin.errors import ModelError
 from eitskin.model.storage import StoredMatrix, stride_for
 

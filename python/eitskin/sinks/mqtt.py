@@ -8,15 +8,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from eitskin.errors import SinkError, missing_extra
-from eitskin.sinks.sink import (
-    Dropped,
-    Sink,
-    Source,
-    Told,
-    address,
-    nothing_more,
-    without_password,
-)
+from eitskin.sinks.sink import Dropped, Sink, Source, Told, address, nothing_more, without_password
 
 USAGE = "mqtt://HOST or mqtt://HOST:PORT/topic"
 PORT = 1883

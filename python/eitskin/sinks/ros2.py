@@ -71,10 +71,7 @@ def _whole(first: str, others: dict[str, str]) -> str:
 
 def header(time_ns: int, frame_id: str) -> Table:
     """std_msgs/Header."""
-    return {
-        "stamp": {"sec": time_ns // 10**9, "nanosec": time_ns % 10**9},
-        "frame_id": frame_id,
-    }
+    return {"stamp": {"sec": time_ns // 10**9, "nanosec": time_ns % 10**9}, "frame_id": frame_id}
 
 
 def touch_array(message: Table, time_ns: int, frame_id: str) -> Table:

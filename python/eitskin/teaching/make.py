@@ -88,9 +88,7 @@ def taught_model(
         noise_gain=float(np.float32(noise_gain(projection, decoded))),
         defaults=taught_defaults(grid, lambda_rel),
         golden=Golden(
-            reference,
-            pressed.astype(np.float32),
-            np.zeros(grid.n_pixels, dtype=np.float32),
+            reference, pressed.astype(np.float32), np.zeros(grid.n_pixels, dtype=np.float32)
         ),
         meta={"made_by": f"eitskin {__version__}", **(meta or {})},
     )

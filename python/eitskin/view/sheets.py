@@ -340,12 +340,7 @@ def _axes(figure: Figure, sheet: Sheet, place: tuple[float, float, float, float]
     matplotlib = load_matplotlib()
     with matplotlib.rc_context(STYLE):
         return figure.add_axes(
-            (
-                left / sheet.width,
-                bottom / sheet.height,
-                width / sheet.width,
-                height / sheet.height,
-            )
+            (left / sheet.width, bottom / sheet.height, width / sheet.width, height / sheet.height)
         )
 
 

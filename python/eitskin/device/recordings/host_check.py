@@ -193,11 +193,7 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
             belong together.
     """
     from eitskin.device.client import Device
-    from eitskin.device.recordings.recording import (
-        FileTransport,
-        recorded_kinds,
-        recorded_options,
-    )
+    from eitskin.device.recordings.recording import FileTransport, recorded_kinds, recorded_options
 
     options = recorded_options(path)
     with Device(FileTransport(path)) as device:
@@ -205,10 +201,7 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
         twin = HostTwin(
             known, board_options(known.model, device.board) if options is None else options
         )
-        return (
-            twin.follow(follow(device, recorded_kinds(path))),
-            options is not None,
-        )
+        return (twin.follow(follow(device, recorded_kinds(path))), options is not None)
 
 
 def same_bits(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> bool:

@@ -11,13 +11,7 @@ from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import Stream
-from eitskin.device.wire.packets import (
-    Fault,
-    FrameEvents,
-    RawFrame,
-    SolvedImage,
-    SolvedTouches,
-)
+from eitskin.device.wire.packets import Fault, FrameEvents, RawFrame, SolvedImage, SolvedTouches
 from eitskin.device.wire.payloads import MalformedPacket, parse
 
 _Content = RawFrame | SolvedImage | SolvedTouches | FrameEvents | Fault

@@ -206,8 +206,7 @@ class ReplyPacket(Payload):
     """eits_packet_reply: How the command with this request number ended."""
 
     LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_reply",
-        "request:I command:H status:H detail:2i:pair",
+        "eits_packet_reply", "request:I command:H status:H detail:2i:pair"
     )
     request: int  # of the command that is answered
     command: int  # its packet type
@@ -223,8 +222,7 @@ class RawHead(Payload):
     """
 
     LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_raw",
-        "frame:I time_us:I scan_us:I n_rows:H flags:H",
+        "eits_packet_raw", "frame:I time_us:I scan_us:I n_rows:H flags:H"
     )
     frame: int  # counts scanned frames; wraps
     time_us: int  # when its scan began, on the board's clock; wraps
@@ -375,8 +373,7 @@ class FaultPacket(Payload):
     """eits_packet_fault: A fault that rose or went."""
 
     LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_fault",
-        "code:H raised:H:flag frame:I index:i value:i words:5I:words",
+        "eits_packet_fault", "code:H raised:H:flag frame:I index:i value:i words:5I:words"
     )
     code: int  # eits_fault
     raised: bool  # 1: it is there; 0: it has gone
@@ -391,8 +388,7 @@ class HashesPacket(Payload):
     """eits_packet_hashes: SHA-256 of what the board's flash holds."""
 
     LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_hashes",
-        "request:I model:32s:hash firmware:32s:hash",
+        "eits_packet_hashes", "request:I model:32s:hash firmware:32s:hash"
     )
     request: int  # of the GET_HASHES that asked
     model: bytes  # of the model in use; zero: none
@@ -413,8 +409,7 @@ class StreamCommand(Command):
 
     TYPE: ClassVar[PacketType] = PacketType.STREAM
     LAYOUT: ClassVar[Layout] = Layout(
-        "eits_command_stream",
-        "request:I what:H every:H:one frames:I",
+        "eits_command_stream", "request:I what:H every:H:one frames:I"
     )
     what: int  # bits of eits_stream; 0 stops
     every: int = 1  # every n-th frame, at least 1
@@ -560,8 +555,7 @@ class Settings(Command):
 
     TYPE: ClassVar[PacketType] = PacketType.SETTINGS
     LAYOUT: ClassVar[Layout] = Layout(
-        "eits_command_settings",
-        "request:I settings:I current_limit_ua_rms:I",
+        "eits_command_settings", "request:I settings:I current_limit_ua_rms:I"
     )
     settings: int  # bits of eits_setting
     # at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: as it is

@@ -10,12 +10,7 @@ import numpy as np
 from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.clipping import check_clipping
 from eitskin.frames.doctor.finite import check_finite
-from eitskin.frames.doctor.gain import (
-    check_gain,
-    check_level,
-    check_resemblance,
-    check_unit,
-)
+from eitskin.frames.doctor.gain import check_gain, check_level, check_resemblance, check_unit
 from eitskin.frames.doctor.noise import check_noise
 from eitskin.frames.doctor.numbering import check_numbering
 from eitskin.frames.doctor.order import check_flips, check_frames, check_sign, choose_order
