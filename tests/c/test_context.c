@@ -364,6 +364,67 @@ static void self_test(void)
     small_model_free(&made);
 }
 
+/* Checksums of the set: as they are, nothing is said; one of another core, and the image is right
+ * all the same: refused; another revision's are not looked at. No float64 core has any. */
+static void self_test_sums(void)
+{
+    small_model plain =
+        small_model_make((small_spec){.rank = 12, .side = 6, .shape = SMALL_WHITENED, .fields = 1});
+    small_context c;
+    uint32_t words[1 + EITS_SELF_TEST_SUMS] = {EITS_SELF_TEST_REVISION};
+    eits_real difference;
+    small_context_open(&c, &plain, 0);
+    CHECK_EQUAL(eits_self_test_sums(NULL, words + 1), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_self_test_sums(c.ctx, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_self_test_sums(c.ctx, words + 1), BOTH_WIDTHS(EITS_OK, EITS_E_ARITHMETIC));
+    CHECK_EQUAL(eits_self_test(c.ctx, &difference), EITS_OK);
+    float *golden = (float *)(void *)(small_model_section(&plain, "GOLD", NULL) + 8 * SMALL_ROWS);
+    for (int j = 0; j < 36; ++j)
+        small_put_f32((uint8_t *)(golden + j), (float)eits_get_image(c.ctx)[j]);
+    small_context_close(&c);
+    for (int k = 1; k <= EITS_SELF_TEST_SUMS; ++k) {
+        for (int j = 1; j < k && BOTH_WIDTHS(1, 0); ++j)
+            CHECK(words[k] != words[j]);
+    }
+    static const struct {
+        int word;
+        uint32_t add, size;
+        eits_status opened, told;
+    } cases[] = {
+        {1, 0, sizeof words, EITS_OK, EITS_OK},
+        {1, 1, sizeof words, EITS_OK, BOTH_WIDTHS(EITS_E_ARITHMETIC, EITS_OK)},
+        {EITS_SELF_TEST_SUMS, 1, sizeof words, EITS_OK, BOTH_WIDTHS(EITS_E_ARITHMETIC, EITS_OK)},
+        {0, 1, sizeof words, EITS_OK, EITS_OK}, /* revision */
+        {1, 1, sizeof words - 4, EITS_OK, EITS_OK},
+        {1, 1, 4, EITS_OK, EITS_OK},
+        {1, 0, sizeof words - 1, EITS_E_MODEL_SECTION, EITS_OK},
+        {1, 0, 0, EITS_E_MODEL_SECTION, EITS_OK},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+        words[cases[k].word] += cases[k].add;
+        small_model made = small_model_with_section(&plain, "SUMS", words, cases[k].size);
+        eits_model model;
+        CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), cases[k].opened);
+        if (cases[k].opened == EITS_OK) {
+            small_context_open(&c, &made, (int)k % 2);
+            CHECK_EQUAL(eits_self_test(c.ctx, &difference), cases[k].told);
+            CHECK_NEAR(difference, 0, BOTH_WIDTHS(0, 1e-6));
+            CHECK_NEAR(c.ctx->reference.v0[3], c.model.golden.reference[3], 0);
+            CHECK(c.ctx->options.iterations == model.defaults->iterations);
+            small_context_close(&c);
+        }
+        small_model_free(&made);
+        words[cases[k].word] -= cases[k].add;
+    }
+    memset(small_model_section(&plain, "GOLD", NULL), 0, 4 * SMALL_ROWS);
+    small_model_seal(&plain);
+    small_context_open(&c, &plain, 0); /* no reference, no sums */
+    CHECK_EQUAL(eits_self_test_sums(c.ctx, words + 1),
+                BOTH_WIDTHS(EITS_E_FRAME_ZERO, EITS_E_ARITHMETIC));
+    small_context_close(&c);
+    small_model_free(&plain);
+}
+
 int main(void)
 {
     sizes_agree();
@@ -373,5 +434,6 @@ int main(void)
     default_options();
     options_out_of_range();
     self_test();
+    self_test_sums();
     return checks_report("context");
 }

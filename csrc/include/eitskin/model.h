@@ -120,6 +120,8 @@ typedef struct eits_golden {
     const float *reference; /* n_rows, V */
     const float *frame;     /* n_rows, V */
     const float *image;     /* n_pixels, S/m, bits as the float32 core gives them */
+    /* EITS_SELF_TEST_SUMS checksums of a set of frames (section SUMS); NULL: none of this core's */
+    const uint32_t *sums;
 } eits_golden;
 
 /* Greatest table and polynomial of a calibration; a file with more is EITS_E_MODEL_VALUE. */

@@ -46,11 +46,24 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
  * in it. Errors: EITS_E_ARGUMENT, EITS_E_NOT_FINITE. */
 eits_status eits_solve(eits_context *ctx, const eits_real *y);
 
+/* Checksums that the section SUMS of a model has, one a frame. */
+#define EITS_SELF_TEST_SUMS     6
+/* Counts up with every change of what the core's bits are: sums of another revision are not
+ * compared. */
+#define EITS_SELF_TEST_REVISION 1u
+
 /* Run the model's golden frame with default options: the image must have the bits that the model
  * states (float32), or be within `*difference` of it, relative to its peak (reported in either
- * width). The context must be fresh from eits_init; its reference is the golden reference
- * afterwards. Errors as eits_reconstruct. */
+ * width). In float32 a model's checksums are compared too. The context must be fresh from
+ * eits_init; its reference is the golden reference afterwards. Errors as eits_reconstruct;
+ * EITS_E_ARITHMETIC where the image is right and a checksum is not. */
 eits_status eits_self_test(eits_context *ctx, eits_real *difference);
+
+/* The checksums for this model, as the float32 core has them: of image, touches and numbers of six
+ * frames made of the golden two, with each solver, a lost electrode, noise, a learned reference.
+ * The context must be fresh from eits_init. Errors: those of eits_reference_set;
+ * EITS_E_ARITHMETIC in float64. */
+eits_status eits_self_test_sums(eits_context *ctx, uint32_t sums[EITS_SELF_TEST_SUMS]);
 
 #ifdef __cplusplus
 }

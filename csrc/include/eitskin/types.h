@@ -60,7 +60,8 @@ typedef enum eits_status {
     /* a result would not be finite; the outputs were cleared instead */
     EITS_E_NOT_FINITE = -15,
     /* the core was compiled so that its results would have other bits than a model's golden frame:
-     * with contraction (compile with -ffp-contract=off) or with sums in another order */
+     * with contraction (compile with -ffp-contract=off), with sums in another order, or where the
+     * processor does not round to nearest */
     EITS_E_ARITHMETIC = -16
 } eits_status;
 

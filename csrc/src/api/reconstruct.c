@@ -14,8 +14,10 @@ eits_status eits_solve(eits_context *ctx, const eits_real *y)
 {
     if (ctx == NULL)
         return EITS_E_ARGUMENT;
-    if (y != NULL)
+    if (y != NULL) {
         eits_copy(ctx->frame.y, y, ctx->model->rank);
+        ctx->frame.has_y_log = 0; /* of another frame */
+    }
     ctx->info = (eits_info){0};
     return eits_solve_frame(ctx, &ctx->scratch, ctx->options.warm_start != 0);
 }

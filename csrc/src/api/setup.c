@@ -190,9 +190,9 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     /* The context is given also where the arithmetic fails: eits_self_test then says by how much.
      */
     *ctx = made;
-    eits_real contracted, reordered;
-    eits_try_arithmetic(&contracted, &reordered);
-    return eits_judge_arithmetic(contracted, reordered);
+    eits_real left[EITS_ARITHMETIC_TRIALS];
+    eits_try_arithmetic(left);
+    return eits_judge_arithmetic(left);
 }
 
 /* What was found with other options may not hold any more: coefficients of another sign are no

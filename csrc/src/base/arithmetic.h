@@ -16,12 +16,16 @@
 #endif
 #endif
 
-/* What is left of (1 + e)^2 - (1 + 2e) with e^2 below half a unit in the last place, and of (1/e^2
- * + 1) - 1/e^2, computed as the core was compiled: 0 and 0, but for a compiler that makes a product
- * and a sum one operation, or changes the order of sums. */
-void eits_try_arithmetic(eits_real *contracted, eits_real *reordered);
+/* Trials, in this order: contraction, another order of sums, another rounding
+ * than to nearest, subnormal numbers taken for zero. */
+enum { EITS_ARITHMETIC_TRIALS = 4 };
 
-/* EITS_E_ARITHMETIC where either is not 0. */
-eits_status eits_judge_arithmetic(eits_real contracted, eits_real reordered);
+/* Each computed as the core was compiled, and 0 where arithmetic is as written: what is left of
+ * (1 + e)^2 - (1 + 2e) with e^2 below half a unit in the last place; of (1/e^2 + 1) - 1/e^2; of
+ * 1 + 3/4 unit - (1 + unit); of twice half the least normal number, less that number. */
+void eits_try_arithmetic(eits_real left[EITS_ARITHMETIC_TRIALS]);
+
+/* EITS_E_ARITHMETIC where one is not 0. */
+eits_status eits_judge_arithmetic(const eits_real left[EITS_ARITHMETIC_TRIALS]);
 
 #endif

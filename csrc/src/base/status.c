@@ -37,7 +37,8 @@ const char *eits_status_text(eits_status status)
     case EITS_E_NOT_FINITE:
         return "the result would not be finite";
     case EITS_E_ARITHMETIC:
-        return "the core was compiled with contraction or reordered sums; use -ffp-contract=off";
+        return "the core's arithmetic has other bits; compile it with -ffp-contract=off, round to "
+               "nearest";
     }
     return "unknown status";
 }

@@ -1,6 +1,7 @@
 /* Opening an .eitm model in place. Every length, offset and index is checked before it is followed.
  */
 #include "eitskin/model.h"
+#include "eitskin/solve.h"
 
 #include "model/options.h"
 #include "model/sections.h"
@@ -18,7 +19,7 @@ enum {
 
 typedef struct sections {
     eits_section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds,
-        force, whit, unce, prec, ordr;
+        force, whit, unce, prec, ordr, sums;
 } sections;
 
 /* By memcpy: a cast would read through a pointer of another type, and entries of the header need
@@ -105,11 +106,11 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
 static eits_section *find_slot(sections *found, const uint8_t *tag)
 {
     static const char tags[] =
-        "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOADWHITUNCEPRECORDR";
+        "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOADWHITUNCEPRECORDRSUMS";
     eits_section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref,  &found->redu,
                              &found->sens, &found->scal, &found->colw, &found->grid,  &found->defs,
                              &found->gold, &found->meta, &found->flds, &found->force, &found->whit,
-                             &found->unce, &found->prec, &found->ordr};
+                             &found->unce, &found->prec, &found->ordr, &found->sums};
     for (size_t i = 0; i < sizeof slots / sizeof slots[0]; ++i) {
         if (memcmp(tags + 4 * i, tag, 4) == 0)
             return slots[i];
@@ -360,6 +361,19 @@ static eits_status read_force(eits_force *force, const eits_section *found)
     return EITS_OK;
 }
 
+/* Section SUMS: what made them, then one word a frame. Those of another core say nothing here. */
+static eits_status read_sums(eits_golden *golden, const eits_section *found)
+{
+    if (found->data == NULL)
+        return EITS_OK;
+    if (found->size < 4 || found->size % 4 != 0)
+        return EITS_E_MODEL_SECTION;
+    if (read_u32(found->data) == EITS_SELF_TEST_REVISION &&
+        found->size == 4 + 4 * EITS_SELF_TEST_SUMS)
+        golden->sums = (const uint32_t *)(const void *)(found->data + 4);
+    return EITS_OK;
+}
+
 /* Nothing is copied. Sections begin at multiples of 16 bytes of a blob that does, so that these
  * casts give aligned pointers to any type. */
 static void point_into(eits_model *model, const sections *found)
@@ -416,6 +430,8 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
         status = eits_read_precision(&opened, &found.prec);
     if (status == EITS_OK)
         status = eits_read_scan_order(&opened, &found.ordr);
+    if (status == EITS_OK)
+        status = read_sums(&opened.golden, &found.sums);
     if (status == EITS_OK)
         *model = opened;
     return status;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import struct
 from dataclasses import asdict, fields
 from time import perf_counter_ns
 from typing import Any
@@ -320,11 +321,23 @@ class CoreEngine:
         """Run the model's golden frame; the greatest difference to its image, relative to the peak.
 
         Raises:
-            FrameError: the golden frame does not even run.
+            FrameError: the golden frame does not even run, or the image is right and a checksum of
+                the set of frames is not.
         """
         difference = self._ffi.new("eits_real *")
         self._check_frame(self._lib.eits_self_test(self._context, difference), "golden frame")
         return float(difference[0])
+
+    def self_test_sums(self) -> bytes:
+        """Section SUMS of this model: the core's revision, and a checksum of each frame of the set;
+        of a fresh float32 engine.
+
+        Raises:
+            FrameError: the golden reference is none.
+        """
+        sums = self._ffi.new("uint32_t[]", self._lib.EITS_SELF_TEST_SUMS)
+        self._check_frame(self._lib.eits_self_test_sums(self._context, sums), "golden frame")
+        return struct.pack(f"<I{len(sums)}I", self._lib.EITS_SELF_TEST_REVISION, *sums)
 
 
 def _plain(value: Any) -> Any:

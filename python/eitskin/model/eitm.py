@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.engine import CoreEngine
 from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
@@ -27,7 +28,7 @@ from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 6
+MAJOR, MINOR = 1, 7
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
@@ -35,6 +36,7 @@ DEFAULTS = struct.Struct("<2I12f2I")
 FIELDS_HEAD = struct.Struct("<2f8x")
 MIRROR_ROWS = 4
 REQUIRED = ("DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD")
+OPTIONAL = ("SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE", "PREC", "ORDR", "SUMS")
 FOLD_DTYPE = np.dtype([("first", "<u2"), ("second", "<u2"), ("sign", "<i2"), ("reserved", "<u2")])
 FOLD_NONE = 0xFFFF
 REQUIRED_FLAG = 1
@@ -49,8 +51,8 @@ MIN_LIPSCHITZ, MAX_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
 Sections = dict[str, bytes]
 
 
-def encode_model(model: Model) -> bytes:
-    """The file's bytes.
+def encode_model(model: Model, sums: bytes = b"") -> bytes:
+    """The file's bytes, with ``sums`` as the section SUMS.
 
     Raises:
         ModelError: a number does not fit float32.
@@ -102,6 +104,8 @@ def encode_model(model: Model) -> bytes:
         sections["FLDS"] = (
             FIELDS_HEAD.pack(model.fields.volts, model.fields.per_sheet) + halves.tobytes()
         )
+    if sums:
+        sections["SUMS"] = sums
     taught = bool(model.defaults.touch_fit_left_out & GAIN_DRIFT_KEPT)
     return _assemble(sections, model.protocol.hash, taught)
 
@@ -155,7 +159,7 @@ def _assemble(sections: Sections, protocol_hash: int, taught: bool) -> bytes:
         bodies.append(_padded(content))
         offset += len(bodies[-1])
     body = b"".join(entries + bodies)
-    newest = ("ORDR" in sections, taught, "UNCE" in sections, True)
+    newest = ("SUMS" in sections, "ORDR" in sections, taught, "UNCE" in sections, True)
     minor = MINOR - newest.index(True)
     tail = HEADER.pack(MAGIC, MAJOR, minor, offset, 0, len(sections), 0, protocol_hash)[16:]
     crc = zlib.crc32(tail + body)
@@ -220,7 +224,7 @@ def _split(blob: bytes, where: str) -> Sections:
             raise ModelError(
                 f"{where}: section {name!r} is misplaced or repeated; build the model again"
             )
-        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE", "PREC", "ORDR"):
+        if name not in (*REQUIRED, *OPTIONAL):
             if flags & REQUIRED_FLAG:
                 raise ModelError(
                     f"{where}: needs section {name!r}, which this eitskin does not know; upgrade"
@@ -435,6 +439,8 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
     )
     if protocol.hash != protocol_hash:
         _refuse(where, "a protocol table that does not fit its hash")
+    if len(sections.get("SUMS", b"    ")) not in range(4, 2**32, 4):
+        _refuse(where, "section 'SUMS' of a size that checksums do not have")
     name = STORAGES[d.storage]
     columns = np.frombuffer(sections["SENS"], dtype=DTYPES[name]).reshape(d.n_pixels, d.stride)
     if not np.isfinite(columns).all():
@@ -489,12 +495,22 @@ def load_model(path: str | Path) -> tuple[Model, bytes]:
     return decode_model(blob, str(path)), blob
 
 
+def encode_tested(model: Model) -> bytes:
+    """The file's bytes with checksums of what the float32 core makes of the set of golden frames.
+
+    Raises:
+        ModelError: a number does not fit float32, or the core refuses the model.
+        FrameError: the golden reference is none.
+    """
+    return encode_model(model, CoreEngine(encode_model(model), "float32").self_test_sums())
+
+
 def save_model(path: str | Path, model: Model) -> int:
     """Write ``model`` to ``path`` whole or not at all; returns the number of bytes.
 
     Raises:
-        FileError: it cannot be written.
+        FileError: it cannot be written. Else as :func:`encode_tested`.
     """
-    content = encode_model(model)
+    content = encode_tested(model)
     write_bytes(path, content)
     return len(content)

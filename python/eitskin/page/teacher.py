@@ -102,7 +102,7 @@ class Teacher:
         Raises:
             EitskinError: the presses cannot teach.
         """
-        from eitskin.model.eitm import encode_model, save_model
+        from eitskin.model.eitm import save_model
         from eitskin.teaching.teach import teach
 
         presses = None if self._file is None else self._file.presses
@@ -114,4 +114,4 @@ class Teacher:
         error = taught.report["error_mm"]["held_out_median"]
         notes = "".join(f"; {note}" for note in taught.report["notes"])
         text = f"{path.name}: {len(presses)} presses, {error:.1f} mm where held out{notes}"
-        return encode_model(taught.model), text
+        return path.read_bytes(), text

@@ -14,10 +14,10 @@ import pytest
 
 from eitm_bytes import HEADER_SIZE, entry_place, sealed, sections_of
 from eitskin.core.engine import CoreEngine
-from eitskin.errors import EitskinError, FileError, ModelError
+from eitskin.errors import EitskinError, FileError, FrameError, ModelError
 from eitskin.model import eitm
 from eitskin.model.build import BuildSettings, Linearisation, make_model
-from eitskin.model.eitm import decode_model, encode_model, load_model, save_model
+from eitskin.model.eitm import decode_model, encode_model, encode_tested, load_model, save_model
 from eitskin.skin.protocol import in_order, table
 from small_models import DATA_KINDS, STORAGES, prebuilt, small, small_blob, small_model, tiny_blob
 
@@ -170,7 +170,7 @@ def test_rows_without_a_reciprocal_are_marked() -> None:
 
 def test_the_prebuilt_model_is_written_again_bit_for_bit() -> None:
     model, blob = prebuilt()
-    assert encode_model(model) == blob
+    assert encode_tested(model) == blob
     assert len(blob) < 384 * 1024
 
 
@@ -269,10 +269,26 @@ def test_meta_must_be_an_object(content: bytes) -> None:
 def test_save_and_load(tmp_path: Path) -> None:
     path = tmp_path / "small.eitm"
     size = save_model(path, small_model())
-    assert path.stat().st_size == size == len(small_blob())
+    assert path.stat().st_size == size
     model, blob = load_model(path)
-    assert blob == small_blob() and encode_model(model) == blob
+    assert blob == encode_tested(small_model()) == encode_tested(model)
+    assert encode_model(model) == small_blob()
     assert [entry.name for entry in tmp_path.iterdir()] == ["small.eitm"]
+
+
+def test_another_core_than_the_one_that_wrote_the_checksums_is_told() -> None:
+    blob = encode_tested(small_model())
+    sums = CoreEngine(blob).self_test_sums()
+    assert blob.count(sums) == 1 and blob[6] == 7
+    for place, told in ((0, False), (4, True), (len(sums) - 1, True)):  # revision; first, last
+        changed = bytearray(sums)
+        changed[place] ^= 1
+        engine = CoreEngine(encode_model(small_model(), bytes(changed)))
+        if told:
+            with pytest.raises(FrameError, match="other bits"):
+                engine.self_test()
+        else:
+            assert engine.self_test() == 0
 
 
 def test_a_failed_save_leaves_the_old_file_and_nothing_beside(
