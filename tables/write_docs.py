@@ -38,8 +38,11 @@ def _row(*cells: Any) -> str:
 
 
 def _enum(enum: Table) -> Lines:
-    """Number, name (or text), meaning, and the columns for the page."""
+    """Number, name (or text), meaning, and the columns for the page; text where there are none."""
     columns = enum.get("columns", [])
+    if not columns:
+        yield from ("```text", *_values(enum), "```")
+        return
     texts = columns[:1] == ["text"]
     shown = columns[texts:]
     yield _row("number", "name", "what", *shown)
@@ -48,6 +51,14 @@ def _enum(enum: Table) -> Lines:
         number = f"0x{value:02x}" if enum.get("hexadecimal") else value
         named = f"`{others[0]}`" if texts else name
         yield _row(number, named, doc, *others[texts : texts + len(shown)])
+
+
+def _values(enum: Table) -> Lines:
+    width = max(len(row[0]) for row in enum["rows"])
+    for name, value, doc, *_ in enum["rows"]:
+        number = f"0x{value:02x}" if enum.get("hexadecimal") else value
+        head = f"{number:>6}  {name:<{width}}  "
+        yield from wrapped(doc, head, " " * len(head))
 
 
 def _struct(known: dict[str, Table], struct: Table) -> Lines:
