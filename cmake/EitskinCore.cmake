@@ -15,7 +15,8 @@ set(EITSKIN_CORE_SOURCES
     solve/active_set.c solve/violations.c solve/active_columns.c
     touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c
     touch/touch.c touch/tracker.c
-    evidence/covariance.c evidence/shape.c evidence/likelihood.c evidence/elimination.c
+    evidence/covariance.c evidence/shape.c evidence/likelihood.c evidence/verdict.c
+    evidence/elimination.c evidence/touch_test.c
     evidence/confidence.c evidence/ellipse.c evidence/pair.c
     api/setup.c api/access.c api/save.c api/frame_stage.c api/reference.c api/reconstruct.c
     api/touches.c api/batch.c api/self_test.c

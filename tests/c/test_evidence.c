@@ -422,6 +422,52 @@ static void ghosts_beside_touches_go(void)
     }
 }
 
+/* Beyond a first look no more columns are made than options.test_columns, whatever it is; what is
+ * reported then is known as after a whole test, and a count is said to be uncertain where a step
+ * was left out, and only there. */
+static void no_more_columns_are_made_than_allowed(void)
+{
+    int cut = 0, whole = 0;
+    for (int round = 0; round < 6; ++round) {
+        uint32_t needs = 0;
+        for (uint32_t most = 0; most < 200; most += most < 40 ? 4 : 16) {
+            uint64_t state = (uint64_t)(7 + round / 2);
+            eits_context *ctx = set_up(&b, round & 1);
+            eits_disc discs[4] = {ONE, OTHER, ONE, ONE};
+            CHANGE_OPTIONS(ctx, o.test_columns = most, o.diagnostics = EITS_DIAGNOSTIC_CROWDED);
+            stage_discs(&b, discs, 2);
+            for (int i = 0; i < PACKED; ++i)
+                b.errors[i] *= round < 2 ? 0.01f : 1.0f;
+            for (int k = 2; k < 4; ++k) {
+                discs[k].x_mm += (eits_real)(14 * small_random(&state));
+                discs[k].y_mm += (eits_real)(14 * small_random(&state));
+                discs[k].change *= R(0.2);
+            }
+            const uint32_t first = 4 * EITS_PLACE_PARAMETERS;
+            eits_fit f = fit_of(ctx, discs, 4);
+            eits_test_touches(ctx, &ctx->scratch, &f);
+            const uint32_t made = ctx->evidence.columns_made;
+            needs = most == 0 ? made : needs;
+            CHECK(made >= first && (most == 0 || made <= (most > first ? most : first)));
+            CHECK_EQUAL(f.tested, 1);
+            CHECK(made == needs || ctx->evidence.spent);
+            CHECK(most == 0 ? !ctx->evidence.spent : ctx->evidence.spent || made == needs);
+            for (uint32_t k = 0; k < f.count; ++k) {
+                CHECK(f.rise[k] > 0 && f.place_mm2[k][0] > 0 && f.place_mm2[k][2] > 0);
+                f.pair[k] = -1;
+                f.confidence[k] = 1;
+            }
+            ctx->info.diagnostics = 0;
+            eits_check_count(ctx, &f);
+            CHECK_EQUAL((ctx->info.diagnostics & EITS_DIAGNOSTIC_CROWDED) != 0,
+                        ctx->evidence.spent && f.count > 0);
+            cut += most > 0 && ctx->evidence.spent;
+            whole += most > 0 && !ctx->evidence.spent;
+        }
+    }
+    CHECK(cut > 20 && whole > 5);
+}
+
 /* One wide disc for two at random, side by side: where two are found they lie by the true ones. One
  * for one stays one; so does what is as many as may be. */
 static void two_side_by_side_are_split(void)
@@ -476,6 +522,7 @@ int main(void)
     what_cannot_be_tested_is_left_alone();
     zeros_and_nan_come_to_an_end();
     ghosts_beside_touches_go();
+    no_more_columns_are_made_than_allowed();
     dense_bench_close(&b.b);
     return checks_report("evidence");
 }

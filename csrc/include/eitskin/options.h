@@ -136,6 +136,10 @@ typedef struct eits_options {
     /* 1: where the model says what it may be wrong by, a touch that such errors could have made is
      * not reported, and near ones that could be one touch become one */
     uint32_t touch_test;
+    /* columns that the test of touches may make a frame, about 6 kMAC each at rank 64, beyond a
+     * first look at each touch; then what stands is reported, and said to be crowded; 0: any
+     * number */
+    uint32_t test_columns;
     /* the noise of a row is at least this, V: of a converter its step over the root of 12 */
     eits_real noise_floor_v;
 } eits_options;

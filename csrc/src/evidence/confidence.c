@@ -48,7 +48,8 @@ void eits_check_count(eits_context *ctx, const eits_fit *f)
     if (!f->tested || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED))
         return;
     for (uint32_t k = 0; k < f->count; ++k) {
-        if (f->pair[k] > EITS_PAIR_ODDS || f->confidence[k] < EITS_MIN_CONFIDENCE)
+        if (ctx->evidence.spent || f->pair[k] > EITS_PAIR_ODDS ||
+            f->confidence[k] < EITS_MIN_CONFIDENCE)
             ctx->info.diagnostics |= EITS_DIAGNOSTIC_CROWDED;
     }
 }

@@ -96,11 +96,6 @@
 /* ---- Chosen: on the tuning family of the worlds (seed 1, 40 scenes a set): the least without
  * which fewer counts are right, of 300 to 600 and of 40 to 64. Check: eitskin bench worlds */
 
-/* of parameters, with and without drift: after so many, no simpler answer is tried any more; about
- * 6 kMAC each at rank 64 [columns]. larger: crowds cost more; smaller: false touches stay in
- * crowds */
-#define EITS_TEST_COLUMNS 450
-
 /* of all discs, up to which they get shapes [columns]. larger: crowds cost more; smaller: shapes in
  * crowds become touches */
 #define EITS_SHAPE_COLUMNS 48
@@ -166,6 +161,10 @@
 
 /* but at least [of the threshold]. as SPLIT_RISE */
 #define EITS_SPLIT_MIN_RISE R(0.4)
+
+/* below which the linearisation is to have F of two after the first steps; else they are given up
+ * [of F of one]. larger: costs; smaller: two fingers stay one touch */
+#define EITS_SPLIT_HOPE R(2.0)
 
 /* from the middle at which the two start [of the radius]. further from it: the fit may end
  * elsewhere */

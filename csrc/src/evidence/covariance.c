@@ -61,7 +61,8 @@ static eits_real error_at(const eits_context *ctx, shares of, uint32_t i, uint32
 {
     const eits_uncertainty *u = &ctx->model->uncertainty;
     const size_t at = (size_t)i * (i + 1u) / 2u + j;
-    return eits_fma(of.errors, (eits_real)u->errors[at], of.drift * (eits_real)u->drift[at]);
+    const eits_real error = of.errors * (eits_real)u->errors[at];
+    return of.drift > 0 ? eits_fma(of.drift, (eits_real)u->drift[at], error) : error;
 }
 
 /* Sigma's rows from their diagonals on, where F is 1 or diagonal. */

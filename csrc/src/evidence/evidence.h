@@ -70,6 +70,10 @@ typedef struct eits_likelihood {
     eits_real step[EITS_EVIDENCE_COLUMNS];
 } eits_likelihood;
 
+/* Whether so many more columns may be made in this frame; where not, evidence.spent is set. Who
+ * linearises asks before, and leaves enough to linearise what is taken at last. */
+int eits_may_make(eits_context *ctx, uint32_t columns);
+
 /* Linearise F about the answer: evidence.column, evidence.left and scratch->square. */
 uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
                         eits_likelihood *out);
@@ -84,11 +88,12 @@ uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, eits_a
                           eits_likelihood *likelihood, uint32_t k);
 
 /* Gauss and Newton's steps, a few at most, until F is `enough` or hardly falls; sets
- * answer->misfit. `likelihood` is made unless it is at hand; afterwards it may be or not. */
+ * answer->misfit. `likelihood` is made unless it is at hand; afterwards it is, or it may be made.
+ * Where not even the first may be, the misfit is beyond all others. */
 uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
                     eits_likelihood *likelihood, eits_real enough);
 
-/* elimination.c */
+/* touch_test.c */
 
 /* Drop and merge discs of `f` that the model's errors could have made; sets what is known of each
  * that stays. */
@@ -129,7 +134,7 @@ void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
  * wide as places err; zeros where discs were not tested. */
 void eits_rate_touches(const eits_context *ctx, eits_fit *f);
 
-/* Sets CROWDED where a disc may be two touches, or none. */
+/* Sets CROWDED where a disc may be two touches, or none, or the test was cut short. */
 void eits_check_count(eits_context *ctx, const eits_fit *f);
 
 #endif

@@ -101,6 +101,15 @@ static void invert(const eits_context *ctx, const eits_scratch *scratch, uint32_
     }
 }
 
+int eits_may_make(eits_context *ctx, uint32_t columns)
+{
+    const uint32_t most = ctx->options.test_columns;
+    const int may = most == 0 || (ctx->evidence.columns_made <= most &&
+                                  columns <= most - ctx->evidence.columns_made);
+    ctx->evidence.spent |= !may;
+    return may;
+}
+
 uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
                         eits_likelihood *out)
 {
@@ -266,12 +275,18 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
             eits_dot(ctx->kernels, ctx->evidence.data, ctx->evidence.data, ctx->model->rank);
         return ctx->model->rank;
     }
+    const uint32_t columns = answer->count * answer->parameters;
+    if (!likelihood->at_hand && !eits_may_make(ctx, columns)) {
+        answer->misfit = R(INFINITY);
+        return 0;
+    }
     if (!likelihood->at_hand)
         macs += eits_linearise(ctx, scratch, answer, likelihood);
     eits_real fraction = 1;
     for (int step = 0; step < EITS_REFIT_STEPS; ++step) {
         if (likelihood->here <= enough ||
-            likelihood->here - likelihood->least < EITS_SETTLED_MISFIT)
+            likelihood->here - likelihood->least < EITS_SETTLED_MISFIT ||
+            !eits_may_make(ctx, 2 * columns)) /* where it fails, what stands is made again */
             break;
         eits_likelihood next;
         const eits_answer trial = moved(ctx, answer, likelihood->step, fraction);

@@ -54,15 +54,19 @@ static void m7_sum_panel(const eits_real *panel, const eits_real *v, uint32_t ro
     "]!, {s12-s15}\n\t" FMA4(A0, A1, A2, A3, 0, 4, 8, 12, V0)                        \
         FMA4(A0, A1, A2, A3, 1, 5, 9, 13, V1) FMA4(A0, A1, A2, A3, 2, 6, 10, 14, V2) \
             FMA4(A0, A1, A2, A3, 3, 7, 11, 15, V3)
-/* out += the sums over these rows */
+static const float zeros[16];
+
+/* out = the sums over these rows */
 static void eight_columns(const float *const column[8], const float *v, uint32_t rows, float *out)
 {
     const float *c0 = column[0], *c1 = column[1], *c2 = column[2], *c3 = column[3];
     const float *c4 = column[4], *c5 = column[5], *c6 = column[6], *c7 = column[7];
     uint32_t turns = rows / 8;
-    if (turns > 0) {
+    if (turns == 0) {
+        memcpy(out, zeros, 8 * sizeof *out);
+    } else {
         __asm__ volatile(
-            "vldmia %[out], {s24-s31}\n"
+            "vldmia %[zeros], {s24-s31}\n"
             "1:\n\t"
             "vldmia %[v]!, {s16-s23}\n\t" BLOCK(24, 25, 26, 27, c0, c1, c2, c3, 16, 17, 18, 19)
                 BLOCK(24, 25, 26, 27, c0, c1, c2, c3, 20, 21, 22, 23)
@@ -73,7 +77,7 @@ static void eight_columns(const float *const column[8], const float *v, uint32_t
                                   "vstmia %[out], {s24-s31}\n\t"
             : [c0] "+r"(c0), [c1] "+r"(c1), [c2] "+r"(c2), [c3] "+r"(c3), [c4] "+r"(c4),
               [c5] "+r"(c5), [c6] "+r"(c6), [c7] "+r"(c7), [v] "+r"(v), [turns] "+r"(turns)
-            : [out] "r"(out)
+            : [out] "r"(out), [zeros] "r"(zeros)
             : LOW_S, MIDDLE_S, HIGH_S, "cc", "memory");
     }
     const float *const rest[8] = {c0, c1, c2, c3, c4, c5, c6, c7};
@@ -98,11 +102,10 @@ static void mul_t_f32(const eits_matrix *matrix, const uint32_t *index, uint32_t
             for (uint32_t l = 0; l < 8; ++l)
                 column[l] = data + stride * index[k + l];
         }
-        memset(out + k, 0, 8 * sizeof *out);
         eight_columns(column, v, matrix->rows, out + k);
     }
     if (k < count) { /* lanes to spare take the last column again */
-        float sum[8] = {0};
+        float sum[8];
         for (uint32_t l = 0; l < 8; ++l) {
             const uint32_t at = k + l < count ? k + l : count - 1;
             column[l] = data + stride * (index != NULL ? index[at] : at);
@@ -226,34 +229,34 @@ static void own_mul_t(const eits_matrix *matrix, const uint32_t *index, uint32_t
                            23) "vldmia %[" #AT            \
                                "], {s0-s7}\n\t" FMA8(V, 24, 25, 26, 27, 28, 29, 30, 31)
 
-/* out += the sums over these columns */
+/* out = from + the sums over these columns */
 static void sixteen_rows(const float *data, size_t stride_bytes, const uint32_t *index,
-                         const float *value, uint32_t count, float *out)
+                         const float *value, uint32_t count, const float *from, float *out)
 {
     uint32_t one, other, pairs = count / 2;
-    __asm__ volatile(
-        "vldmia %[out], {s16-s31}\n\t"
-        "cmp %[pairs], #0\n\t"
-        "beq 2f\n"
-        "1:\n\t"
-        "ldrd %[one], %[other], [%[index]], #8\n\t"
-        "vldmia %[value]!, {s8-s9}\n\t"
-        "mla %[one], %[one], %[stride], %[data]\n\t"
-        "mla %[other], %[other], %[stride], %[data]\n\t" COLUMN(one, 8)
-            COLUMN(other, 9) "subs %[pairs], #1\n\t"
-                             "bne 1b\n"
-                             "2:\n\t"
-                             "lsls %[pairs], %[count], #31\n\t"
-                             "beq 3f\n\t"
-                             "ldr %[one], [%[index]]\n\t"
-                             "vldmia %[value], {s8}\n\t"
-                             "mla %[one], %[one], %[stride], %[data]\n\t" COLUMN(
-                                 one, 8) "3:\n\t"
-                                         "vstmia %[out], {s16-s31}\n\t"
-        : [one] "=&r"(one), [other] "=&r"(other), [index] "+r"(index), [value] "+r"(value),
-          [pairs] "+l"(pairs)
-        : [count] "r"(count), [stride] "r"(stride_bytes), [data] "r"(data), [out] "r"(out)
-        : LOW_S, MIDDLE_S, HIGH_S, "cc", "memory");
+    __asm__ volatile("vldmia %[from], {s16-s31}\n\t"
+                     "cmp %[pairs], #0\n\t"
+                     "beq 2f\n"
+                     "1:\n\t"
+                     "ldrd %[one], %[other], [%[index]], #8\n\t"
+                     "vldmia %[value]!, {s8-s9}\n\t"
+                     "mla %[one], %[one], %[stride], %[data]\n\t"
+                     "mla %[other], %[other], %[stride], %[data]\n\t" COLUMN(one, 8)
+                         COLUMN(other, 9) "subs %[pairs], #1\n\t"
+                                          "bne 1b\n"
+                                          "2:\n\t"
+                                          "lsls %[pairs], %[count], #31\n\t"
+                                          "beq 3f\n\t"
+                                          "ldr %[one], [%[index]]\n\t"
+                                          "vldmia %[value], {s8}\n\t"
+                                          "mla %[one], %[one], %[stride], %[data]\n\t" COLUMN(
+                                              one, 8) "3:\n\t"
+                                                      "vstmia %[out], {s16-s31}\n\t"
+                     : [one] "=&r"(one), [other] "=&r"(other), [index] "+r"(index),
+                       [value] "+r"(value), [pairs] "+l"(pairs)
+                     : [count] "r"(count), [stride] "r"(stride_bytes), [data] "r"(data),
+                       [from] "r"(from), [out] "r"(out)
+                     : LOW_S, MIDDLE_S, HIGH_S, "cc", "memory");
 }
 
 static void few_rows(const float *data, size_t stride, const uint32_t *index, const float *value,
@@ -272,7 +275,8 @@ static void mul_f32(const eits_matrix *matrix, const uint32_t *index, const eits
     const size_t stride = matrix->stride;
     size_t row = 0;
     for (; row + 16 <= stride; row += 16)
-        sixteen_rows(data + row, stride * sizeof *data, index, value, count, out + row);
+        sixteen_rows(data + row, stride * sizeof *data, index, value, count, zeros, out + row);
+    memset(out + row, 0, (stride - row) * sizeof *out);
     few_rows(data + row, stride, index, value, count, out + row, (uint32_t)(stride - row));
 }
 
@@ -289,7 +293,8 @@ static void mul_unpacked(const eits_matrix *matrix, const uint32_t *index, const
             for (uint32_t l = 0; l < columns; ++l)
                 own_unpack(matrix, stride * index[k + l] + row, rows, block[l]);
             if (rows == 16)
-                sixteen_rows(block[0], sizeof block[0], in_order, value + k, columns, out + row);
+                sixteen_rows(block[0], sizeof block[0], in_order, value + k, columns,
+                             k == 0 ? zeros : out + row, out + row);
             else
                 few_rows(block[0], 16, in_order, value + k, columns, out + row, rows);
         }
@@ -299,7 +304,8 @@ static void mul_unpacked(const eits_matrix *matrix, const uint32_t *index, const
 static void own_mul(const eits_matrix *matrix, const uint32_t *index, const eits_real *value,
                     uint32_t count, eits_real *out)
 {
-    memset(out, 0, matrix->stride * sizeof *out);
+    if (matrix->storage != EITS_STORAGE_F32 || count == 0)
+        memset(out, 0, matrix->stride * sizeof *out);
     if (count == 0)
         return;
     if (matrix->storage == EITS_STORAGE_F32)

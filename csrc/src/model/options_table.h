@@ -38,6 +38,7 @@ static const eits_option OPTIONS[] = {
     OPTION(regularisation_noise_factor, 0, 0, 1e30f),
     OPTION(row_gains, 1, 0, 1),
     OPTION(touch_test, 1, 0, 1),
+    OPTION(test_columns, 1, 0, UINT32_MAX),
     OPTION(noise_floor_v, 0, 0, 1e30f),
 };
 #undef OPTION
@@ -79,6 +80,7 @@ static eits_options usual_options(const eits_defaults *d)
         .regularisation_noise_factor = (eits_real)5,
         .row_gains = (uint32_t)1,
         .touch_test = (uint32_t)1,
+        .test_columns = (uint32_t)200,
         .noise_floor_v = (eits_real)0,
     };
 }

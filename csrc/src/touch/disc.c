@@ -61,7 +61,8 @@ static covered cover(eits_context *ctx, const eits_scratch *scratch, const eits_
     const eits_real pixel = (eits_real)model->pixel_mm;
     const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / pixel;
     const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / pixel;
-    const eits_real radius = disc->radius_mm / pixel, reach = radius + R(0.5);
+    const eits_real radius = disc->radius_mm / pixel, reach = radius + R(0.5),
+                    beyond = reach * reach * R(1.0001);
     covered c = {0,
                  scratch->index,
                  model->sensitivity,
@@ -74,11 +75,15 @@ static covered cover(eits_context *ctx, const eits_scratch *scratch, const eits_
     cell_range(y, reach, model->ny, &y0, &y1);
     for (uint32_t iy = y0; iy <= y1 && iy < model->ny; ++iy) {
         for (uint32_t ix = x0; ix <= x1 && ix < model->nx; ++ix) {
+            const eits_real dx = (eits_real)ix + R(0.5) - x, dy = (eits_real)iy + R(0.5) - y,
+                            square = eits_fma(dx, dx, dy * dy);
+            /* the corners of the square of cells: half of them, without a root */
+            if (square > beyond)
+                continue;
             const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
             if (j == EITS_NO_PIXEL || model->column_weight[j] == 0.0f)
                 continue;
-            const eits_real dx = (eits_real)ix + R(0.5) - x, dy = (eits_real)iy + R(0.5) - y;
-            const eits_real distance = eits_sqrt(eits_fma(dx, dx, dy * dy));
+            const eits_real distance = eits_sqrt(square);
             const eits_real fraction = R(0.5) + (radius - distance);
             if (!(fraction > 0))
                 continue;

@@ -9,7 +9,7 @@ typedef struct eits_fit {
     eits_disc disc[EITS_MAX_TOUCHES];
     /* what leaving it out would add to |residual|^2, relative to |y|^2 */
     eits_real explained[EITS_MAX_TOUCHES];
-    /* the test of touches (evidence/elimination.c): 1 where it was made */
+    /* the test of touches (evidence/touch_test.c): 1 where it was made */
     uint32_t tested;
     /* minus twice the logarithm of the ratio of likelihoods without and with the disc, over the
      * data's own misfit where that is more than noise */

@@ -88,6 +88,9 @@ class OptionFields:
     # 1: where the model says what it may be wrong by, a touch that such errors could have made is
     # not reported, and near ones that could be one touch become one
     touch_test: bool = True
+    # columns that the test of touches may make a frame, about 6 kMAC each at rank 64, beyond a
+    # first look at each touch; then what stands is reported, and said to be crowded; 0: any number
+    test_columns: int = 200
     # the noise of a row is at least this, V: of a converter its step over the root of 12
     noise_floor_v: float = 0.0
 
@@ -120,6 +123,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "track_hold": (0, MAX_TRACK_FRAMES),
     "track_smooth": (0, 1e30),
     "regularisation_noise_factor": (0, 1e30),
+    "test_columns": (0, 2**32 - 1),
     "noise_floor_v": (0, 1e30),
 }
 # The names that an option may have, in the order of their numbers.

@@ -30,6 +30,8 @@ def rated(tested: Tested, distance: float, pixel_mm: float) -> tuple[FloatArray,
 
 
 def miscounted(tested: Tested) -> bool:
-    """Whether a disc may be two touches, or none."""
+    """Whether a disc may be two touches, or none, or the test was cut short."""
+    if tested.spent and len(tested.rise) > 0:
+        return True
     sure = tested.rise / (tested.rise + CONFIDENCE_HALF)
     return bool((tested.pair > PAIR_ODDS).any() or (sure < MIN_CONFIDENCE).any())

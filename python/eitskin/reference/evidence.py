@@ -30,11 +30,11 @@ from eitskin.core.constants_table import (
     SHAPE_PRECISION,
     SHORTER,
     SPLIT_APART,
+    SPLIT_HOPE,
     SPLIT_MIN_RISE,
     SPLIT_ODDS,
     SPLIT_RISE,
     SPLIT_RISE_OF_ODDS,
-    TEST_COLUMNS,
     TOUCH_EVIDENCE,
 )
 from eitskin.reference.disc_fit import Disc, Fit
@@ -71,13 +71,32 @@ class Tested:
     """For each disc that stays, minus twice the logarithm of the ratio of likelihoods without and
     with it (k,), the covariance xx, xy, yy of its place (k, 3), mm^2, where the test would have it
     less where it is (k, 2), mm, the log odds that it is two touches (k,), and half of its long
-    axis (k, 2), mm, zeros where it is a disc as far as the data tell."""
+    axis (k, 2), mm, zeros where it is a disc as far as the data tell. ``spent``: more columns were
+    wanted than ``options.test_columns`` allows."""
 
     rise: FloatArray
     place_mm2: FloatArray
     apart_mm: FloatArray
     pair: FloatArray
     long_mm: FloatArray
+    spent: bool
+
+
+@dataclass(eq=False)
+class Budget:
+    """The columns that a frame's test has ``made``, of at most ``most`` (0: any number);
+    ``spent``: more were wanted."""
+
+    most: int
+    made: int = 0
+    spent: bool = False
+
+    def allows(self, columns: int) -> bool:
+        """Whether so many more may be made. Who linearises asks before, and leaves enough to
+        linearise what is taken at last."""
+        may = self.most == 0 or self.made + columns <= self.most
+        self.spent |= not may
+        return may
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +109,11 @@ class Answer:
     shape: FloatArray
     parameters: int
     misfit: float = 0.0
+
+    @property
+    def columns(self) -> int:
+        """Parameters of all discs."""
+        return len(self.discs) * self.parameters
 
     def offsets(self) -> FloatArray:
         """How far each parameter is from its prior's middle (k, parameters)."""
@@ -188,8 +212,8 @@ def is_near(a: Disc, b: Disc) -> bool:
 class Hypothesis:
     """The discs under one covariance, with drift or without, and which of them stay."""
 
-    def __init__(self, fit: Fit, errors: DataErrors, *, drift: bool) -> None:
-        self.fit, self.errors, count = fit, errors, len(fit.discs)
+    def __init__(self, fit: Fit, errors: DataErrors, budget: Budget, *, drift: bool) -> None:
+        self.fit, self.errors, self.budget, count = fit, errors, budget, len(fit.discs)
         lower = held_cholesky(errors.error + errors.drift if drift else errors.error)
         self.log_determinant = 2 * float(np.log(np.diag(lower)).sum())
         self.whitening = np.linalg.inv(lower)
@@ -205,8 +229,6 @@ class Hypothesis:
             parameters_of(fit, errors, count),
         )
         self.changed = self.clear = self.fitted = False
-        self.linear = True
-        self.columns_made = 0
         self.rise, self.place_mm2 = np.zeros(count), np.zeros((count, 3))
         self.best_mm, self.pair = np.zeros((count, 2)), np.zeros(count)
         self.axis, self.line = np.zeros((count, 2)), np.zeros((count, 2))
@@ -233,7 +255,7 @@ class Hypothesis:
     def linearise(self, answer: Answer) -> Likelihood:
         """F about ``answer``."""
         columns = np.vstack([self.columns(answer, k) for k in range(len(answer.discs))])
-        self.columns_made += len(columns)
+        self.budget.made += len(columns)
         left, off = self.data - answer.parts().ravel() @ columns, answer.offsets().ravel()
         precision = np.tile(PRECISION[: answer.parameters], len(answer.discs))
         here = float(left @ left) + answer.prior()
@@ -278,13 +300,18 @@ class Hypothesis:
         self, answer: Answer, now: Likelihood | None = None, enough: float = 0.0
     ) -> tuple[Answer, Likelihood | None]:
         """Gauss and Newton's steps, a few at most, until F is ``enough`` or hardly falls; sets its
-        misfit. ``now``: F about ``answer``, if it is at hand; so is what is returned beside it."""
+        misfit. ``now``: F about ``answer``, if it is at hand; so is what is returned beside it.
+        Where not even that may be made, the misfit is beyond all others."""
         if not answer.discs:
             return replace(answer, misfit=float(self.data @ self.data)), None
+        if now is None and not self.budget.allows(answer.columns):
+            return replace(answer, misfit=np.inf), None
         last = now = now or self.linearise(answer)
         fraction = 1.0
         for _ in range(REFIT_STEPS):
             if now.here <= enough or now.here - now.least < SETTLED_MISFIT:
+                break
+            if not self.budget.allows(2 * answer.columns):
                 break
             trial = self.moved(answer, now.step, fraction)
             last = self.linearise(trial)
@@ -378,31 +405,21 @@ class Hypothesis:
         shaped = self.shaped(rest)
         return shaped, about if shaped.parameters == rest.parameters else None
 
-    def take_linear(self, rest: Answer, about: Likelihood | None) -> tuple[bool, Likelihood | None]:
-        """Take ``rest``, fitted again, where F has risen by no more than the others were found to
-        be worth."""
-        dropped = len(self.answer.discs) - len(rest.discs)
-        rest, about = self.refit(rest, about)
-        allowed = TOUCH_EVIDENCE * self.excess(rest.misfit, len(rest.discs))
-        return self.take(rest, allowed * dropped), about
-
     def take_simpler(self, now: Likelihood, weakest: int) -> tuple[bool, Likelihood | None]:
         """Take the best of the answers with one disc less: without the weakest, or with a near pair
         as one. What is at hand of the best is told, if it was tried last."""
         enough = self.answer.misfit + self.needed()
         best, about = self.refit(*self.one_less(self.answer, now, weakest), enough)
         for i, j in self.near_pairs():
+            if best.misfit < enough or not self.budget.allows(2 * best.columns):
+                break
             one, of_one = self.refit(self.as_one(self.answer, i, j), None, enough)
             better = one.misfit < best.misfit
             best, about = (one, of_one) if better else (best, None)
-        return self.take(best, self.needed()), about
-
-    def take(self, simpler: Answer, allowed: float) -> bool:
-        """Take a ``simpler`` answer where F rises by less than is ``allowed``."""
-        if not simpler.misfit - self.answer.misfit < allowed:
-            return False
-        self.answer, self.changed = simpler, True
-        return True
+        if not best.misfit - self.answer.misfit < self.needed():
+            return False, about
+        self.answer, self.changed = best, True
+        return True, about
 
     def fits(self) -> bool:
         """Whether the data are explained about as well as Sigma says."""
@@ -439,37 +456,40 @@ class Hypothesis:
         two.discs[k], two.radius_mm[k], two.shape[k] = first, radius, 0.0
         return two
 
-    def refit_well(self, answer: Answer) -> tuple[Answer, Likelihood | None]:
-        """Twice the usual steps: one disc and two are compared at their best."""
-        return self.refit(*self.refit(answer))
+    def needed_fall(self, k: int, misfit: float, count: int) -> float:
+        """What F is to fall by for disc k as two: the more the less its shape says so."""
+        rise = max(SPLIT_RISE - SPLIT_RISE_OF_ODDS * self.pair[k], SPLIT_MIN_RISE)
+        return float(rise * TOUCH_EVIDENCE * self.excess(misfit, count))
 
     def take_split(self) -> bool:
-        """Take the likeliest pair as two where F falls by the more the less its shape says so."""
+        """Take the likeliest pair as two where F falls enough. Twice the usual steps: one disc and
+        two are compared at their best. Two that are far from it after the first are given up."""
         count = len(self.answer.discs)
         k = int(np.argmax(self.pair[:count])) if count else 0
-        if not (
-            0 < count < self.fit.options.max_touches
-            and self.pair[k] > SPLIT_ODDS
-            and self.columns_made <= TEST_COLUMNS
-        ):
+        if not (0 < count < self.fit.options.max_touches and self.pair[k] > SPLIT_ODDS):
             return False
-        two = self.as_two(k)
+        one, two = self.answer, self.as_two(k)
         if two is None:
             return False
-        one = self.answer if self.fitted else self.refit_well(self.answer)[0]
-        two, now = self.refit_well(two)
-        rise = max(SPLIT_RISE - SPLIT_RISE_OF_ODDS * self.pair[k], SPLIT_MIN_RISE)
-        allowed = rise * TOUCH_EVIDENCE * self.excess(two.misfit, count + 1)
-        if not one.misfit - two.misfit > allowed:
+        two, now = self.refit(two)
+        if not (two.misfit if now is None else now.least) < SPLIT_HOPE * one.misfit:
+            return False
+        two, now = self.refit(two, now)
+        if not self.fitted:
+            one = self.refit(*self.refit(one))[0]
+        fall = one.misfit - two.misfit
+        if one.misfit == np.inf or not fall > self.needed_fall(k, two.misfit, count + 1):
             return False
         self.answer, self.changed, self.fitted = two, True, True
         self.look(now or self.linearise(two))
         return True
 
-    def eliminate(self, *, to_the_end: bool) -> bool:
+    def eliminate(self, now: Likelihood | None = None, *, to_the_end: bool) -> bool:
         """From the discs as they are to those that stay; not ``to_the_end``: false as soon as the
-        data are found not to fit, to be gone on with another time."""
-        now: Likelihood | None = None
+        data are found not to fit, to be gone on with another time. Where no more columns may be
+        made, what stands then stays. ``now``: F about the answer, if it is at hand."""
+        if now is None and not self.budget.allows(self.answer.columns):
+            return True
         while len(self.answer.discs) > self.errors.kept:
             now = now or self.linearise(self.answer)
             weakest = self.look(now)
@@ -478,15 +498,14 @@ class Hypothesis:
             bad = FITS if self.fitted else FITS_AS_DISCS
             if not to_the_end and self.excess(self.answer.misfit, len(self.answer.discs)) > bad:
                 return False
-            if self.linear:
-                rest, about = self.drop_linearly(now, weakest)
-                if len(rest.discs) < len(self.answer.discs):
-                    self.linear, now = self.take_linear(rest, about)
-                    if self.linear:
-                        self.fitted = True
-                        continue
-                    now = None
-            if self.columns_made > TEST_COLUMNS:
+            rest, about = self.drop_linearly(now, weakest)
+            if len(rest.discs) < len(self.answer.discs):
+                rest, now = self.refit(rest, about)
+                if rest.misfit == np.inf:
+                    return True
+                self.answer, self.changed, self.fitted = rest, True, True
+                continue
+            if not self.budget.allows(2 * self.answer.columns):
                 return True
             if not self.fitted:
                 self.answer, now = self.refit(self.answer, now)
@@ -506,20 +525,22 @@ class Hypothesis:
             self.look(now or self.linearise(self.answer))
         return True
 
-    def is_clear(self) -> bool:
-        """Whether the discs need no closer look, as discs: what that costs least."""
+    def is_clear(self) -> Likelihood | None:
+        """Whether the discs need no closer look, as discs, which costs least: sets ``clear``. What
+        is at hand about the answer."""
         parameters = self.answer.parameters
         self.answer = replace(self.answer, parameters=PLACE)
-        weakest = self.look(self.linearise(self.answer))
+        now = self.linearise(self.answer)
+        weakest = self.look(now)
         excess = self.excess(self.answer.misfit, len(self.answer.discs))
         clear = self.rise[weakest] > CLEAR_AS_DISCS * self.needed() and not self.near_pairs()
         self.clear = clear and excess < FITS_AS_DISCS
         self.answer = replace(self.answer, parameters=parameters)
         rank = self.fit.model.rank
-        if self.clear and parameters > PLACE and self.answer.misfit > PAIR_MISFIT * rank:
-            now = self.linearise(self.answer)
-            self.look_at_shapes(now)
-        return self.clear
+        shapes_matter = parameters > PLACE and self.answer.misfit > PAIR_MISFIT * rank
+        if self.clear and shapes_matter and self.budget.allows(self.answer.columns):
+            self.look_at_shapes(self.linearise(self.answer))
+        return now if parameters == PLACE else None
 
 
 def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
@@ -527,18 +548,17 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
     that stay, None where there is no room to test so many."""
     if not fit.discs or not parameters_of(fit, errors, len(fit.discs)):
         return None
-    best = Hypothesis(fit, errors, drift=False)
-    if not best.is_clear():
-        whole = best.eliminate(to_the_end=False)
-        if not best.fits():
-            drifted = Hypothesis(fit, errors, drift=True)
-            drifted.columns_made = best.columns_made
+    budget = Budget(fit.options.test_columns)
+    best = Hypothesis(fit, errors, budget, drift=False)
+    at_hand = best.is_clear()
+    if not best.clear:
+        whole = best.eliminate(at_hand, to_the_end=False)
+        drifted = Hypothesis(fit, errors, budget, drift=True)
+        if not best.fits() and budget.allows(drifted.answer.columns):
             drifted.eliminate(to_the_end=True)
             if not whole and drifted.evidence >= best.answer.misfit + best.log_determinant:
-                best.columns_made = drifted.columns_made
                 whole = best.eliminate(to_the_end=True)
             if not whole or drifted.evidence < best.evidence:
-                drifted.columns_made = max(best.columns_made, drifted.columns_made)
                 best = drifted
     while best.take_split():
         pass
@@ -554,4 +574,5 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
         best.best_mm[:count] - reported,
         best.pair[:count],
         best.axis[:count] * radius_mm,
+        budget.spent,
     )

@@ -120,6 +120,20 @@ def test_all_engines_find_the_same_touches_in_other_worlds(name: str) -> None:
         assert (count == 0) == (name in UNTOUCHED)
 
 
+@pytest.mark.parametrize("columns", [1, 60, 120])
+def test_all_engines_stop_at_the_same_column(columns: int) -> None:
+    """With the same touches, and a count that is said to be uncertain where they did."""
+    for name in ("ellipses", "two_fingers_12_to_16_mm", "drift_2_percent_light"):
+        quiet_v, frame_v = world(name).quiet_v[0], world(name).frames_v[0]
+        results = {
+            engine: one(engine, quiet_v, frame_v, test_columns=columns) for engine in ENGINES
+        }
+        assert agree(results) > 0
+        warned = ["crowded" in result.info.diagnostics_by_name for result in results.values()]
+        assert all(warned) or not any(warned)
+        assert all(warned) or columns > 1
+
+
 def test_long_touches_are_ellipses_and_discs_are_not() -> None:
     """By the angle of the true long axis, or said to be a disc."""
     told = 0

@@ -1,0 +1,97 @@
+/* What one linearisation tells of each disc of an answer: its rise, its place, its shape. */
+#include "evidence/verdict.h"
+
+#include "base/vec.h"
+#include "evidence/constants.h"
+
+eits_real eits_excess(const eits_context *ctx, eits_real misfit, uint32_t count)
+{
+    const eits_real data = (eits_real)(ctx->model->rank - ctx->evidence.drifts),
+                    free = data - (eits_real)(EITS_PLACE_PARAMETERS * count),
+                    of = misfit / (free > EITS_MIN_FREEDOM ? free : EITS_MIN_FREEDOM);
+    return of > 1 ? of : 1;
+}
+
+static int is_near(const eits_disc *a, const eits_disc *b)
+{
+    const eits_real dx = a->x_mm - b->x_mm, dy = a->y_mm - b->y_mm,
+                    reach = EITS_MERGE_REACH * (a->radius_mm + b->radius_mm);
+    return a->polarity == b->polarity && eits_fma(dx, dx, dy * dy) < reach * reach;
+}
+
+int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real needed)
+{
+    const eits_real weaker = v->rise[i] < v->rise[j] ? v->rise[i] : v->rise[j];
+    return weaker < EITS_CLEAR_AS_DISCS * needed && is_near(&v->answer.disc[i], &v->answer.disc[j]);
+}
+
+int eits_any_may_be_one(const eits_verdict *v, eits_real needed)
+{
+    for (uint32_t j = 1; j < v->answer.count; ++j) {
+        for (uint32_t i = 0; i < j; ++i) {
+            if (eits_may_be_one(v, i, j, needed))
+                return 1;
+        }
+    }
+    return 0;
+}
+
+uint32_t eits_weakest(const eits_scratch *scratch, const eits_answer *answer,
+                      const eits_likelihood *likelihood, eits_real *rise)
+{
+    uint32_t weakest = 0;
+    for (uint32_t k = 0; k < answer->count; ++k) {
+        rise[k] = eits_linear_rise(scratch, answer, likelihood, k);
+        weakest = rise[k] < rise[weakest] ? k : weakest;
+    }
+    return weakest;
+}
+
+void eits_look_at_shapes(const eits_context *ctx, const eits_scratch *scratch,
+                         const eits_likelihood *likelihood, eits_verdict *v)
+{
+    const eits_real unit = eits_excess(ctx, v->answer.misfit, v->answer.count);
+    for (uint32_t k = 0; k < v->answer.count; ++k) {
+        v->pair[k] = eits_pair_score(scratch, &v->answer, likelihood, k);
+        eits_pair_line(&v->answer, likelihood, k, v->line[k]);
+        eits_long_axis(scratch, &v->answer, likelihood, k, unit, v->axis[k]);
+    }
+}
+
+/* How well each place is known: the inverse's blocks, times what the data fit worse. */
+static void places_of(const eits_context *ctx, const eits_scratch *scratch,
+                      const eits_likelihood *likelihood, eits_verdict *v)
+{
+    const uint32_t p = v->answer.parameters;
+    const size_t stride = EITS_STRIDE(likelihood->count);
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
+                    unit = pixel * pixel * eits_excess(ctx, v->answer.misfit, v->answer.count);
+    for (uint32_t k = 0; k < v->answer.count; ++k) {
+        const eits_real *x = scratch->square + stride * (k * p + 1u) + k * p + 1u, *y = x + stride;
+        v->place_mm2[k][0] = unit * x[0];
+        v->place_mm2[k][1] = unit * x[1];
+        v->place_mm2[k][2] = unit * y[1];
+        v->best_mm[k][0] = eits_fma(pixel, likelihood->step[k * p + 1], v->answer.disc[k].x_mm);
+        v->best_mm[k][1] = eits_fma(pixel, likelihood->step[k * p + 2], v->answer.disc[k].y_mm);
+    }
+    eits_look_at_shapes(ctx, scratch, likelihood, v);
+}
+
+uint32_t eits_look(const eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
+                   const eits_likelihood *likelihood)
+{
+    if (!v->fitted)
+        v->answer.misfit = likelihood->least;
+    places_of(ctx, scratch, likelihood, v);
+    return eits_weakest(scratch, &v->answer, likelihood, v->rise);
+}
+
+eits_real eits_needed_rise(const eits_context *ctx, const eits_verdict *v)
+{
+    return EITS_TOUCH_EVIDENCE * eits_excess(ctx, v->answer.misfit, v->answer.count);
+}
+
+int eits_fits(const eits_context *ctx, const eits_verdict *v)
+{
+    return eits_excess(ctx, v->answer.misfit, v->answer.count) <= EITS_FITS;
+}
