@@ -1,16 +1,48 @@
-"""What all experiments' tests ask of their pages."""
+"""What all experiments' tests ask of their runs and pages."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from eitskin.config import load_toml
-from eitskin_studies.experiments.experiment import ExperimentOutcome, ExperimentSettings
-from eitskin_studies.experiments.write import write_page
+from eitskin.fem.cem import ForwardModel
+from eitskin_studies.experiments.experiment import (
+    ExperimentOutcome,
+    ExperimentSettings,
+    Workspace,
+    plain,
+    workspace_in,
+)
+from eitskin_studies.experiments.write import to_json, write_page
 from eitskin_studies.harness.sections import PARTS
+from eitskin_studies.harness.sessions import SceneSolver
+from eitskin_studies.harness.store import Store
 
 PAGES = Path(__file__).resolve().parents[3] / "docs" / "results"
+
+
+def coarse(folder: Path, share: float, elements: int = 2500, seed: int = 1) -> Workspace:
+    """A workspace for few scenes, solved on a mesh of few elements."""
+    made = workspace_in(folder, ExperimentSettings(seed, share), plain)
+    made.scenes = lambda skin, scan, _=0: SceneSolver(skin, scan, elements, folder / "frames")
+    return made
+
+
+def goes_on(
+    run: Callable[[], ExperimentOutcome], first: ExperimentOutcome, solves: bool = False
+) -> None:
+    """A second run in the same folder computes and keeps nothing, solves nothing (``solves``: but
+    for its model), and says the same."""
+    with pytest.MonkeyPatch.context() as patch:
+        for owner, name in ((Store, "put"), (ForwardModel, "solve"))[: 1 if solves else 2]:
+            patch.setattr(owner, name, lambda *_, **__: pytest.fail("computed again"))
+        again = run()
+    assert again.tables == first.tables and again.words == first.words
+    assert to_json(again) == to_json(first)
 
 
 def fills_its_page(

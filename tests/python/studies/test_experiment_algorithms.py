@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("scipy")
 pytest.importorskip("netgen")
 
-from study_pages import fills_its_page
+from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin.errors import UsageError
 from eitskin.scoring import metrics
@@ -70,10 +70,7 @@ def small(folder: Path, monkeypatch: pytest.MonkeyPatch, share: float = 0.03) ->
     monkeypatch.setattr(algorithms, "candidates", few)
     monkeypatch.setattr(measure, "SIMULATED_ELEMENTS", 4000)
     monkeypatch.setattr(measure, "MODEL_ELEMENTS", 2000)
-    workspace = workspace_in(folder, ExperimentSettings(seed=2, share=share), plain)
-    real = workspace.scenes
-    monkeypatch.setattr(workspace, "scenes", lambda skin, protocol: real(skin, protocol, 4000))
-    return workspace
+    return coarse(folder, share, 4000, seed=2)
 
 
 @pytest.fixture(scope="module")
@@ -120,16 +117,7 @@ def test_tables_agree_with_the_data(outcome: ExperimentOutcome) -> None:
 def test_what_is_kept_is_not_computed_again(
     folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    workspace = small(folder, monkeypatch)
-
-    def never(*_: object, **__: object) -> None:
-        raise AssertionError("computed again")
-
-    monkeypatch.setattr(measure, "setup_for", never)
-    monkeypatch.setattr(workspace, "scenes", never)
-    again = algorithms.run(workspace)
-    assert again.data == outcome.data and again.tables == outcome.tables
-    assert again.words == outcome.words
+    goes_on(lambda: algorithms.run(small(folder, monkeypatch)), outcome)
 
 
 def test_a_cut_run_goes_on_and_gives_the_same(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page
+from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
@@ -19,7 +19,6 @@ from eitskin.skin.protocol import adjacent, skip
 from eitskin.skin.skin import Skin
 from eitskin_studies.experiments import electrodes
 from eitskin_studies.experiments.electrodes import measuring, patterns, tables, tuning
-from eitskin_studies.experiments.experiment import ExperimentSettings, plain, workspace_in
 
 
 @pytest.mark.parametrize("pattern", list(patterns.PATTERNS))
@@ -80,9 +79,6 @@ def test_another_regularisation_is_the_model_built_with_it() -> None:
 def _few(monkeypatch: pytest.MonkeyPatch) -> None:
     """A run on few elements, electrodes, settings and cases."""
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
-    monkeypatch.setattr(
-        "eitskin_studies.experiments.experiment.Workspace.scenes.__defaults__", (2000,)
-    )
     monkeypatch.setattr(measuring, "PAIR_MM", (24.0, 36.0))
     for module in (electrodes, tables):
         monkeypatch.setattr(module, "COUNTS", (16, 32))
@@ -102,8 +98,7 @@ def _few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _few(monkeypatch)
-    workspace = workspace_in(tmp_path, ExperimentSettings(share=0.03), plain)
-    first = electrodes.run(workspace)
+    first = electrodes.run(coarse(tmp_path, 0.03, 2000))
     by_name = {table.name: table for table in first.tables}
     assert {name: len(table.rows) for name, table in by_name.items()} == {
         "noise": 4,
@@ -124,13 +119,7 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     sixteen = cases[16, "adjacent", "noise"]
     assert first.data["noise_v"] == pytest.approx(1e-6 * sixteen["rms_v0_mv"], rel=0.05)
     assert np.mean(sixteen["scores"]["random"]["image"]) > 0.7
-
-    def refuse(*_: Any, **__: Any) -> None:
-        raise AssertionError("solved again")
-
-    monkeypatch.setattr(ForwardModel, "solve", refuse)
-    again = electrodes.run(workspace_in(tmp_path, ExperimentSettings(share=0.03), plain))
-    assert (again.tables, again.data) == (first.tables, first.data)
+    goes_on(lambda: electrodes.run(coarse(tmp_path, 0.03, 2000)), first)
     fills_its_page(first, "electrodes", tmp_path)
 
 
@@ -145,9 +134,7 @@ def test_scenes_are_solved_once_for_every_pattern(
         "voltages",
         lambda self, *a: solved.append(self.protocol.n_electrodes) or whole(self, *a),
     )
-    shop = measuring.PatternWorkspace(
-        workspace_in(tmp_path, ExperimentSettings(share=0.03), plain), 16
-    )
+    shop = measuring.PatternWorkspace(coarse(tmp_path, 0.03, 2000), 16)
     for pattern in ("adjacent", "skip 2", "opposite"):
         for equal in ("noise", "time"):
             shop.frames("random", measuring.usual_case(16, pattern, equal), 1e-4)

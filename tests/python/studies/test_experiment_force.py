@@ -8,16 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page
+from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin_studies.experiments import force
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    Workspace,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.force import anywhere, detection, scenes, sheet
 from eitskin_studies.experiments.force.law import GEL_LIMIT_KPA, LOADS_G, NOMINAL, SHEET, drawn_laws
 from eitskin_studies.experiments.force.readouts import (
@@ -29,50 +23,20 @@ from eitskin_studies.experiments.force.readouts import (
     from_lists,
 )
 from eitskin_studies.experiments.write import to_json
-from eitskin_studies.harness.sessions import SceneSolver
-
-SHARE = 0.01
-
-
-class CountingDesk(Workspace):
-    """A workspace with a coarse mesh, that counts what is made."""
-
-    made = 0
-
-    def kept(self, facts, make):  # type: ignore[no-untyped-def]
-        def counted() -> object:
-            self.made += 1
-            return make()
-
-        return super().kept(facts, counted)
-
-    def scenes(self, skin, protocol, elements=1500):  # type: ignore[no-untyped-def]
-        return SceneSolver(skin, protocol, elements, self.folder / "frames")
-
-
-def workspace(folder: Path) -> CountingDesk:
-    usual = workspace_in(folder, ExperimentSettings(2, SHARE), plain)
-    return CountingDesk(usual.settings, usual.folder, usual.progress, usual.store)
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome, int]:
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("force")
-    one = workspace(folder)
-    return folder, force.run(one), one.made
+    return folder, force.run(coarse(folder, 0.01, 1500, seed=2))
 
 
-def test_a_run_that_goes_on_computes_nothing_again(
-    done: tuple[Path, ExperimentOutcome, int],
-) -> None:
-    folder, outcome, made = done
-    again = workspace(folder)
-    assert to_json(force.run(again)) == to_json(outcome)
-    assert again.made == 0 and made > 30
+def test_a_run_that_goes_on_computes_nothing_again(done: tuple[Path, ExperimentOutcome]) -> None:
+    goes_on(lambda: force.run(coarse(done[0], 0.01, 1500, seed=2)), done[1], solves=True)
 
 
 def test_every_table_has_its_place_on_the_page(
-    done: tuple[Path, ExperimentOutcome, int], tmp_path: Path
+    done: tuple[Path, ExperimentOutcome], tmp_path: Path
 ) -> None:
     outcome = done[1]
     assert [table.name for table in outcome.tables] == [
@@ -91,7 +55,7 @@ def test_every_table_has_its_place_on_the_page(
 
 
 def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(
-    done: tuple[Path, ExperimentOutcome, int],
+    done: tuple[Path, ExperimentOutcome],
 ) -> None:
     slopes = {name: one["a_gram"] for name, one in json.loads(to_json(done[1]))["slopes"].items()}
     assert slopes[PEAK][0] < 0.3 * slopes[PEAK][-1]
@@ -99,7 +63,7 @@ def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(
     assert slopes[TOUCH][0] == pytest.approx(slopes[TOUCH][-1], rel=0.35)  # on a coarse mesh
 
 
-def test_calibrated_touches_read_one_load_alike(done: tuple[Path, ExperimentOutcome, int]) -> None:
+def test_calibrated_touches_read_one_load_alike(done: tuple[Path, ExperimentOutcome]) -> None:
     told = {
         (one["reading"], one["snr_db"]): anywhere.Anywhere.from_dict(one)
         for one in done[1].data["anywhere"]  # type: ignore[union-attr]
@@ -110,7 +74,7 @@ def test_calibrated_touches_read_one_load_alike(done: tuple[Path, ExperimentOutc
     assert anywhere.scatter(touch.calibrated) < 0.1 < 0.2 < anywhere.scatter(peak.raw)
 
 
-def test_less_noise_shows_less_load(done: tuple[Path, ExperimentOutcome, int]) -> None:
+def test_less_noise_shows_less_load(done: tuple[Path, ExperimentOutcome]) -> None:
     found = [detection.Detection.from_dict(one) for one in done[1].data["detection"]]
     thresholds = np.array([[one.threshold(radius)[0] for radius in range(4)] for one in found])
     assert (thresholds[0] > thresholds[-1]).all() and (thresholds[-1] < 20).all()
@@ -121,7 +85,7 @@ def test_less_noise_shows_less_load(done: tuple[Path, ExperimentOutcome, int]) -
 
 
 def test_under_the_sheet_the_peak_rises_outwards_and_means_see_less(
-    done: tuple[Path, ExperimentOutcome, int],
+    done: tuple[Path, ExperimentOutcome],
 ) -> None:
     slopes, smallest, reach = done[1].tables[5:]
     rising = {row[0]: row[-2] for row in slopes.rows}

@@ -6,38 +6,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from study_pages import fills_its_page
+from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin.core.options_table import ALL_TOUCH_FIT
 from eitskin_studies.experiments import levers
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    Workspace,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
-from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM, AblationRuns
-
-SETTINGS = ExperimentSettings(share=0.05)
-
-
-def _run(folder: Path, patch: pytest.MonkeyPatch) -> ExperimentOutcome:
-    scenes = Workspace.scenes
-    patch.setattr(
-        Workspace,
-        "scenes",
-        lambda workspace, skin, scan, elements=2500: scenes(workspace, skin, scan, elements),
-    )
-    return levers.run(workspace_in(folder, SETTINGS, plain))
+from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("levers")
-    with pytest.MonkeyPatch.context() as patch:
-        return folder, _run(folder, patch)
+    return folder, levers.run(coarse(folder, 0.05))
 
 
 def test_every_lever_is_on_every_set(done: tuple[Path, ExperimentOutcome]) -> None:
@@ -69,16 +50,8 @@ def test_the_default_is_among_them() -> None:
     }
 
 
-def test_a_run_goes_on_where_it_was(
-    done: tuple[Path, ExperimentOutcome], monkeypatch: pytest.MonkeyPatch
+def test_it_goes_on_and_fills_its_page(
+    done: tuple[Path, ExperimentOutcome], tmp_path: Path
 ) -> None:
-    folder, first = done
-    lines = (folder / "results.jsonl").read_text(encoding="utf-8")
-    monkeypatch.setattr(AblationRuns, "_solve", lambda *_: pytest.fail("solved again"))
-    again = _run(folder, monkeypatch)
-    assert again.data == first.data
-    assert (folder / "results.jsonl").read_text(encoding="utf-8") == lines
-
-
-def test_it_fills_its_page(done: tuple[Path, ExperimentOutcome], tmp_path: Path) -> None:
+    goes_on(lambda: levers.run(coarse(done[0], 0.05)), done[1])
     fills_its_page(done[1], "levers", tmp_path)

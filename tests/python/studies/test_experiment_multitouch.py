@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page
+from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin.errors import GeometryError
 from eitskin.scene.library_scenes import find_scene
@@ -19,7 +18,6 @@ from eitskin_studies.experiments import multitouch
 from eitskin_studies.experiments.experiment import (
     ExperimentOutcome,
     ExperimentSettings,
-    Workspace,
     plain,
     workspace_in,
 )
@@ -46,22 +44,14 @@ from eitskin_studies.experiments.multitouch.cells import (
 )
 from eitskin_studies.experiments.multitouch.counts import auc, quantile, roc, score, share
 from eitskin_studies.experiments.multitouch.variants import VARIANTS, SeenFrame
-from eitskin_studies.harness.sessions import SceneSolver
 
 OUTLINE = paper_skin().outline
-COARSE = 2500
 
 
 def _run(folder: Path, patch: pytest.MonkeyPatch) -> ExperimentOutcome:
     """All of it, on few scenes, a coarse mesh, and one cell of the ceiling."""
-    scenes = Workspace.scenes
-    patch.setattr(
-        Workspace,
-        "scenes",
-        lambda workspace, skin, scan, elements=COARSE: scenes(workspace, skin, scan, elements),
-    )
     patch.setattr(measure, "CEILING_CELLS", ((WIDE, 6, 80.0),))
-    return multitouch.run(workspace_in(folder, ExperimentSettings(share=0.01), plain))
+    return multitouch.run(coarse(folder, 0.01))
 
 
 @pytest.fixture(scope="module")
@@ -91,23 +81,10 @@ def test_more_touches_are_harder(done: tuple[Path, ExperimentOutcome]) -> None:
     assert np.mean([exact[k] for k in (2, 3)]) > np.mean([exact[k] for k in (11, 12)]) + 0.3
 
 
-def test_goes_on_without_computing(
-    done: tuple[Path, ExperimentOutcome], monkeypatch: pytest.MonkeyPatch
+def test_it_goes_on_and_fills_its_page(
+    done: tuple[Path, ExperimentOutcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder, first = done
-    lines = (folder / "results.jsonl").read_text().count("\n")
-
-    def refuse(*_: Any, **__: Any) -> None:
-        raise AssertionError("this was computed again")
-
-    monkeypatch.setattr(SceneSolver, "session", refuse)
-    monkeypatch.setattr("eitskin_studies.experiments.multitouch.test_data.setup_for", refuse)
-    again = _run(folder, monkeypatch)
-    assert again.tables == first.tables and again.words == first.words
-    assert (folder / "results.jsonl").read_text().count("\n") == lines
-
-
-def test_it_fills_its_page(done: tuple[Path, ExperimentOutcome], tmp_path: Path) -> None:
+    goes_on(lambda: _run(done[0], monkeypatch), done[1])
     assert "| touches | default, 40 dB |" in fills_its_page(done[1], "multitouch", tmp_path)
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from study_pages import fills_its_page
+from study_pages import fills_its_page, goes_on
 
 from eitskin_studies.experiments import other_worlds
 from eitskin_studies.experiments.experiment import (
@@ -50,8 +50,6 @@ def test_a_finished_run_is_read_again_and_fills_its_page(
     done: tuple[Path, ExperimentOutcome], tmp_path: Path
 ) -> None:
     folder, outcome = done
-    before = (folder / "results.jsonl").read_bytes()
-    assert _run(folder).tables == outcome.tables
-    assert (folder / "results.jsonl").read_bytes() == before
+    goes_on(lambda: _run(folder), outcome)
     page = fills_its_page(outcome, "other-worlds", tmp_path)
     assert page.index("## What fails") < page.index("## What holds")
