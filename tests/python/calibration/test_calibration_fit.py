@@ -16,12 +16,8 @@ from eitskin.errors import FrameError
 
 def test_a_known_law_and_gain_are_found() -> None:
     found = calibrate(presses(), RADIUS_MM)
-    assert (found.fitted.form, found.fitted.order, found.groups, found.by_place) == (
-        "saturating",
-        2,
-        24,
-        True,
-    )
+    seen = found.fitted.form, found.fitted.order, found.groups, found.by_place
+    assert seen == ("saturating", 2, 24, True)
     for value, true, (low, high) in zip(
         found.fitted.numbers, (4.0, 1.5), found.interval, strict=True
     ):

@@ -46,11 +46,8 @@ SUMMARY = {
 @pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
 def test_json(engine: str, done: Done, frames_file: Path) -> None:
     facts = json.loads(done("reconstruct", frames_file, "--engine", engine, "--json"))
-    assert (facts["model"], facts["engine"], len(facts["frames"])) == (
-        "prebuilt paper skin",
-        engine,
-        20,
-    )
+    found = facts["model"], facts["engine"], len(facts["frames"])
+    assert found == ("prebuilt paper skin", engine, 20)
     for number, frame in enumerate(facts["frames"]):
         assert frame["frame"] == number and frame["name"] == f"test-s3-{number}"
         assert set(frame["info"]) == INFO and frame["info"]["iterations"] == 60
@@ -170,10 +167,8 @@ def test_options_reach_the_solver(
 def test_for_people(done: Done, frames_file: Path) -> None:
     text = done("reconstruct", frames_file)
     lines = text.splitlines()
-    assert (
-        " ".join(lines[0].split())
-        == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
-    )
+    found = " ".join(lines[0].split())
+    assert found == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
     assert text.count("60 iterations (iterations), gap ") == 20
     assert "20 frames, 0 refused; median " in text and " of " in lines[-1]
     assert lines[-1].startswith("against the truth of 20")

@@ -124,10 +124,8 @@ def test_record_says_how_much(done: Done, scene: Path, tmp_path: Path) -> None:
 
 
 def test_the_hosts_images_are_the_boards(done: Done, run: Path) -> None:
-    assert (
-        done("replay", run, "--check")
-        == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
-    )
+    found = done("replay", run, "--check")
+    assert found == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
     facts = json.loads(done("replay", run, "--check", "--json"))
     assert facts["same_bits"] and facts["solver_noted"]
     assert (facts["same"], facts["untold"]) == (FRAMES, 0)

@@ -57,15 +57,10 @@ def test_the_recommended_model_is_the_measured_one(
     model, _ = load_model(path)
     one = next(p for p in load_front().points if p.name == facts["name"])
     settings = one.configuration
-    assert (model.rank, model.stored.storage, model.grid.n_pixels) == (
-        settings.rank,
-        settings.storage,
-        one.costs["pixels_kept"],
-    )
-    assert (model.defaults.iterations, model.defaults.solver) == (
-        settings.iterations,
-        settings.solver,
-    )
+    found = model.rank, model.stored.storage, model.grid.n_pixels
+    assert found == (settings.rank, settings.storage, one.costs["pixels_kept"])
+    found = model.defaults.iterations, model.defaults.solver
+    assert found == (settings.iterations, settings.solver)
     assert model.defaults.mask_threshold == pytest.approx(one.threshold)
     measured = ModelShop(paper_skin(), adjacent(16)).build(settings).model
     assert (measured.stored.columns == model.stored.columns).all()

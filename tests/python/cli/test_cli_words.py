@@ -14,10 +14,8 @@ from eitskin.config import listed, nearest
 def test_long_work_says_how_long_is_left(capsys: pytest.CaptureFixture[str]) -> None:
     times = iter(range(0, 400, 4))  # four seconds an item
     assert list(lines(iter("abcdefgh"), "solving", 8, lambda: next(times))) == list("abcdefgh")
-    assert capsys.readouterr().err.splitlines() == [
-        "eitskin: solving: 3 of 8, 00:20 left",
-        "eitskin: solving: 6 of 8, 00:08 left",
-    ]
+    found = capsys.readouterr().err.splitlines()
+    assert found == ["eitskin: solving: 3 of 8, 00:20 left", "eitskin: solving: 6 of 8, 00:08 left"]
     times = iter(range(0, 400, 4))
     assert sum(lines([5, 5, 5, 5], "scenes", 40, lambda: next(times), int)) == 20
     assert capsys.readouterr().err == "eitskin: scenes: 15 of 40, 00:20 left\n"

@@ -281,10 +281,8 @@ def test_an_excitation_that_the_generator_rounds_stays_what_was_asked() -> None:
 
     assert _asked_millihz(board_info()) == 50_000_000
     assert _asked_millihz(board_info(excitation_millihz=9_999_990, samples=100)) == 10_000_000
-    assert (
-        _asked_millihz(board_info(excitation_millihz=1003, sample_rate_hz=1000, samples=1000))
-        == 1000
-    )
+    found = _asked_millihz(board_info(excitation_millihz=1003, sample_rate_hz=1000, samples=1000))
+    assert found == 1000
 
 
 def test_frames_of_a_stream_are_finite() -> None:

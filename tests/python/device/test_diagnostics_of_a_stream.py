@@ -98,10 +98,8 @@ def test_it_is_told_though_nobody_wants_images() -> None:
         device.tare(QUIET)
         device.start_scene()
         told = faults(device.stream(Stream.RAW))
-    assert [fault[:3] for fault in told] == [
-        (FaultCode.ELECTRODE_OPEN, True, OFF),
-        (FaultCode.ELECTRODE_OPEN, False, OFF),
-    ]
+    found = [fault[:3] for fault in told]
+    assert found == [(FaultCode.ELECTRODE_OPEN, True, OFF), (FaultCode.ELECTRODE_OPEN, False, OFF)]
 
 
 def test_what_is_not_looked_for_is_not_found() -> None:

@@ -171,10 +171,7 @@ def test_a_model_too_large_is_refused(image: Path, tools: Path) -> None:
 
 
 def test_the_map_is_the_firmwares() -> None:
-    assert (flash.FIRMWARE_ADDRESS, flash.BANK_ADDRESS, flash.SECOND_BANK_ADDRESS) == (
-        0x08000000,
-        0x08040000,
-        0x080C0000,
-    )
+    found = flash.FIRMWARE_ADDRESS, flash.BANK_ADDRESS, flash.SECOND_BANK_ADDRESS
+    assert found == (0x08000000, 0x08040000, 0x080C0000)
     assert flash.FIRMWARE_ADDRESS + flash.FIRMWARE_ROOM == flash.BANK_ADDRESS
     assert os.sep not in "".join(TOOLS)

@@ -122,11 +122,8 @@ def test_info_is_read_as_it_was_built() -> None:
     info = board_info(firmware=(1, 2, 255), faults=0b10100, board="x" * 15, serial="A" * 24)
     payload = pl.pack(info)
     c = core.ffi.from_buffer("eits_packet_info *", bytearray(payload))
-    assert (c.protocol_hash, c.volts_per_code_nv, list(c.firmware)) == (
-        2**63 + 5,
-        805664,
-        [1, 2, 255, 0],
-    )
+    found = c.protocol_hash, c.volts_per_code_nv, list(c.firmware)
+    assert found == (2**63 + 5, 805664, [1, 2, 255, 0])
     assert pl.parse(link.PacketType.INFO, payload) == info
     assert info.fault_codes == (link.FaultCode.ELECTRODE_OPEN, link.FaultCode.DEADLINE)
     assert info.firmware_text == "1.2.255"
@@ -199,13 +196,8 @@ def test_stats_and_faults_are_read_as_built() -> None:
     stats = pk.BoardStats(*range(17), stages)  # type: ignore[call-arg]
     payload = pl.pack(stats)
     c = core.ffi.from_buffer("eits_packet_stats *", bytearray(payload))
-    assert (
-        c.slots_repeated,
-        c.outliers,
-        c.workspace_used,
-        c.stage[5].worst_us,
-        c.stage[0].count,
-    ) == (7, 8, 16, 24, 1)
+    found = c.slots_repeated, c.outliers, c.workspace_used, c.stage[5].worst_us, c.stage[0].count
+    assert found == (7, 8, 16, 24, 1)
     assert pl.parse(link.PacketType.STATS, payload) == stats
     fault = pk.Fault(8, True, 99, -1, -15, (1, 2, 3, 4, 2**32 - 1))
     assert pl.parse(link.PacketType.FAULT, pl.pack(fault)) == fault

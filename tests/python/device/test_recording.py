@@ -96,10 +96,8 @@ def test_the_head_says_where_it_comes_from(tmp_path: Path) -> None:
     for noted in (None, 7, {}, {"model": "0x" + "1" * 62, "firmware": [1]}):
         head = json.dumps({"format": "eits", "version": 1, "sha256": noted}).encode()
         (tmp_path / "odd.eits").write_bytes(encode(PacketType.RECORDING, 0, head))
-        assert FileTransport(tmp_path / "odd.eits").hashes.as_dict() == {
-            "model": None,
-            "firmware": None,
-        }
+        found = FileTransport(tmp_path / "odd.eits").hashes.as_dict()
+        assert found == {"model": None, "firmware": None}
     assert (tmp_path / "run.eits").read_bytes()[0] == 0
 
 

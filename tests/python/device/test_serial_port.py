@@ -323,11 +323,8 @@ def test_auto_takes_the_one_board(wire: Wire, monkeypatch: pytest.MonkeyPatch) -
 
 def test_devices_are_listed_boards_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("eitskin.device.open.ports", lambda: [Port("/dev/ttyACM9"), BOARD, OTHER])
-    assert [port.path for port in list_devices()] == [
-        "/dev/ttyACM0",
-        "/dev/ttyACM9",
-        "/dev/ttyUSB0",
-    ]
+    found = [port.path for port in list_devices()]
+    assert found == ["/dev/ttyACM0", "/dev/ttyACM9", "/dev/ttyUSB0"]
 
 
 @pytest.mark.parametrize(

@@ -168,18 +168,10 @@ def test_reciprocal_scans_copy_what_they_do_not_measure() -> None:
         device.scan(check_every=3)
         device.start_scene()
         raws = by_kind(list(device.stream(Stream.RAW, frames=4)), RawFrame)
-    assert [raw.flags for raw in raws] == [
-        RawFlags.CHECK,
-        RawFlags.RECIPROCAL,
-        RawFlags.RECIPROCAL,
-        RawFlags.CHECK,
-    ]
-    assert [raw.scan_us for raw in raws] == [
-        207 * 100 + 80,
-        103 * 100 + 80,
-        103 * 100 + 80,
-        207 * 100 + 80,
-    ]
+    found = [raw.flags for raw in raws]
+    assert found == [RawFlags.CHECK, RawFlags.RECIPROCAL, RawFlags.RECIPROCAL, RawFlags.CHECK]
+    found = [raw.scan_us for raw in raws]
+    assert found == [207 * 100 + 80, 103 * 100 + 80, 103 * 100 + 80, 207 * 100 + 80]
     for raw in raws:
         first, second = raw.voltage_v[model.fold.first], raw.voltage_v[model.fold.second]
         assert np.array_equal(second, model.fold.sign.astype(np.float32) * first)

@@ -52,12 +52,8 @@ def test_a_model_is_taken_up() -> None:
     with sim_device(board) as device:
         device.tare(QUIET)
         info = device.upload_model(tiny, lambda done, total: seen.append((done, total)))
-        assert (info.model_crc, info.model_bytes, info.bank, info.tared) == (
-            zlib.crc32(tiny),
-            len(tiny),
-            1,
-            0,
-        )
+        found = info.model_crc, info.model_bytes, info.bank, info.tared
+        assert found == (zlib.crc32(tiny), len(tiny), 1, 0)
         assert seen[-1] == (len(tiny), len(tiny))
         assert len(seen) > 3
         assert [done for done, _ in seen] == [*range(4096, len(tiny), 4096), len(tiny)]

@@ -106,10 +106,8 @@ def test_the_same_bits_as_the_host(
     options = replace(default_options(model), warm_start=warm, solver=solver)
     both = held_against_the_host(program, tmp_path, blob, quiet, frames, options)
     for expected, emulated in both:
-        assert (emulated.stop, emulated.iterations) == (
-            expected.info.stop,
-            expected.info.iterations,
-        )
+        found = emulated.stop, emulated.iterations
+        assert found == (expected.info.stop, expected.info.iterations)
         assert (expected.info.regularisation > 0.03) == warm
         assert emulated.macs == expected.info.macs + expected.info.touch_macs
     board = [emulated for _, emulated in both]
@@ -232,11 +230,8 @@ def test_plain_c_gives_the_same_for_more_instructions(
     assert (own.kernels, plain.kernels) == ("cortex-m7", "portable")
     assert own.workspace_bytes == plain.workspace_bytes
     for one, other in zip(own.frames, plain.frames, strict=True):
-        assert (one.image_crc, one.touches, one.macs) == (
-            other.image_crc,
-            other.touches,
-            other.macs,
-        )
+        found = one.image_crc, one.touches, one.macs
+        assert found == (other.image_crc, other.touches, other.macs)
         assert one.instructions < other.instructions
 
 

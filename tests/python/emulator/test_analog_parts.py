@@ -188,12 +188,6 @@ def test_settling_is_first_order() -> None:
 
 
 def test_codes() -> None:
-    assert codes(np.array([0.0, STEP_V, -STEP_V, 0.49 * STEP_V, 1.2, -1.2])).tolist() == [
-        2048,
-        2049,
-        2047,
-        2048,
-        4095,
-        0,
-    ]
+    found = codes(np.array([0.0, STEP_V, -STEP_V, 0.49 * STEP_V, 1.2, -1.2])).tolist()
+    assert found == [2048, 2049, 2047, 2048, 4095, 0]
     assert pytest.approx(3.3 / 4096 / 1.5) == STEP_V

@@ -128,10 +128,8 @@ def test_touches_and_images_are_the_host_s_to_the_bit(image: bytes) -> None:
     for frame, result in zip(seen, host, strict=True):
         assert frame.solved is not None
         assert result is not None
-        assert (frame.solved.macs, frame.solved.iterations) == (
-            result.info.macs,
-            result.info.iterations,
-        )
+        told = frame.solved.macs, frame.solved.iterations
+        assert told == (result.info.macs, result.info.iterations)
     truth = np.array([[-40.0, 10.0], [30.0, -25.0]])
     for frame in seen[2:]:
         assert frame.touches is not None

@@ -89,10 +89,8 @@ def test_bridged_electrodes_are_named_with_each_other(image: bytes) -> None:
     device.start_scene()
     frames, faults = taken(device, 4)
     told = [fault for fault in faults if fault.code == FaultCode.BRIDGED]
-    assert [(fault.raised, fault.index, fault.value) for fault in told] == [
-        (True, 6, 7),
-        (True, 7, 6),
-    ]
+    found = [(fault.raised, fault.index, fault.value) for fault in told]
+    assert found == [(True, 6, 7), (True, 7, 6)]
     assert {fault.words[:2] for fault in told} == {(0xC0, 0)}
     first = next(f for f in frames if f.solved is not None and f.solved.bridged_electrodes)
     assert first.solved is not None

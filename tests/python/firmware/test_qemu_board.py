@@ -137,10 +137,8 @@ def test_the_same_bits_as_the_host(run: Run) -> None:
             continue
         board = images.pop(raw.frame)
         assert board.image.tobytes() == expected.image.tobytes(), f"frame {raw.frame}"
-        assert (board.solved.stop, board.solved.iterations) == (
-            expected.info.stop,
-            expected.info.iterations,
-        )
+        told = board.solved.stop, board.solved.iterations
+        assert told == (expected.info.stop, expected.info.iterations)
         assert [replace(touch, id=0) for touch in touches[raw.frame].touches] == [
             replace(touch, id=0) for touch in expected.touches
         ]

@@ -66,13 +66,8 @@ def test_frames_over_several_lines(tmp_path: Path) -> None:
     assert np.array_equal(taken(tmp_path / "v.txt", label="frame"), volts)
     reader = LineReader(LineFormat("comma", "frame"), wanted=4)
     told = [reader.feed(n, line) for n, line in enumerate(("frame 7", "1,2,", "3,4,", "5,6", ""))]
-    assert [[row.cells for row in rows] for rows in told] == [
-        [],
-        [],
-        [("1", "2", "3", "4")],
-        [],
-        [],
-    ]
+    found = [[row.cells for row in rows] for rows in told]
+    assert found == [[], [], [("1", "2", "3", "4")], [], []]
 
 
 def test_several_labels_must_be_chosen_from(tmp_path: Path) -> None:

@@ -32,10 +32,8 @@ def write(tmp_path: Path, text: str | bytes) -> Path:
     ],
 )  # fmt: skip
 def test_the_same_numbers_come_out_of_every_dialect(tmp_path: Path, text: str | bytes) -> None:
-    assert read_table(write(tmp_path, text)).numbers(range(3)).tolist() == [
-        [1, 2.5, -0.03],
-        [4, 5, 6],
-    ]
+    found = read_table(write(tmp_path, text)).numbers(range(3)).tolist()
+    assert found == [[1, 2.5, -0.03], [4, 5, 6]]
 
 
 def test_headers_name_columns_and_bad_cells_are_named(tmp_path: Path) -> None:

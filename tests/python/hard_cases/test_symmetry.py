@@ -108,10 +108,8 @@ def steps_for(model: Model, options: Options, quiet: np.ndarray, frames: np.ndar
 def data_of(model: Model, options: Options, quiet: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """y (r,) as the solver sees it."""
     host = Host(encode_model(model))
-    assert [host.status_of(step) for step in (Choose(options), TareStep(as_float32(quiet)))] == [
-        0,
-        0,
-    ]
+    found = [host.status_of(step) for step in (Choose(options), TareStep(as_float32(quiet)))]
+    assert found == [0, 0]
     host.solve_frame(as_float32(frame))
     return host.reduced_data()[: model.rank].astype(np.float64)
 

@@ -25,11 +25,8 @@ def test_fold_takes_the_mean_with_its_sign_and_leaves_single_rows() -> None:
 def test_reciprocal_rows_turned_round_have_sign_minus_one() -> None:
     protocol = table(8, [[0, 1, 4, 5], [5, 4, 0, 1], [2, 3, 6, 7]])
     fold = protocol.reciprocal_pairs()
-    assert (fold.first.tolist(), fold.second.tolist(), fold.sign.tolist()) == (
-        [0, 2],
-        [1, -1],
-        [-1, 1],
-    )
+    found = fold.first.tolist(), fold.second.tolist(), fold.sign.tolist()
+    assert found == ([0, 2], [1, -1], [-1, 1])
 
 
 def test_fold_of_the_forward_model_changes_nothing() -> None:

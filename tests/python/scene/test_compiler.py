@@ -154,10 +154,8 @@ def test_the_plan_tells_what_the_run_then_does(mesh_cache: MeshCache) -> None:
         for scene in (still_scene(5, effects=effects), moving_scene(5, effects=effects)):
             compiled = compile_scene(scene)
             done = simulate_frames(compiled)
-            assert (
-                compiled.plan.factorisations
-                == done.work.factorisations + compiled.work.v0_factorisations
-            )
+            found = compiled.plan.factorisations
+            assert found == done.work.factorisations + compiled.work.v0_factorisations
             assert compiled.plan.solves == done.work.solves + compiled.work.v0_solves
             assert compiled.plan.is_complex == ("phase" in effects)
 

@@ -60,11 +60,8 @@ def test_touches_are_paired_with_the_true_ones() -> None:
     assert "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text
     assert text.endswith(" ms")
     facts = Frame(seen.frame, seen).message()
-    assert [touch["error_mm"] for touch in facts["touches"]] == [
-        pytest.approx(1.0),
-        pytest.approx(3.0),
-        None,
-    ]
+    found = [touch["error_mm"] for touch in facts["touches"]]
+    assert found == [pytest.approx(1.0), pytest.approx(3.0), None]
     assert len(facts["true"]) == 2
     assert look.score.as_dict() == {
         "frames": 1, "true": 2, "found": 2, "false": 1, "position_median_mm": pytest.approx(2.0),

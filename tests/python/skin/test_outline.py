@@ -140,7 +140,5 @@ def test_any_star_shaped_outline(radii: list[float], turn: float, clockwise: boo
     for s in np.linspace(0, outline.perimeter_mm, 11):
         x, y = outline.point_at(float(s))
         # Star-shaped about the origin: just below a rim point is inside, just beyond it is not.
-        assert outline.contains([(0.999 * x, 0.999 * y), (1.001 * x, 1.001 * y)]).tolist() == [
-            True,
-            False,
-        ]
+        found = outline.contains([(0.999 * x, 0.999 * y), (1.001 * x, 1.001 * y)]).tolist()
+        assert found == [True, False]

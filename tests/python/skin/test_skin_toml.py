@@ -24,11 +24,8 @@ def _angles(skin: Skin) -> np.ndarray[Any, Any]:
 
 def test_paper_skin() -> None:
     skin = paper_skin()
-    assert (skin.outline.diameter_mm, skin.thickness_mm, skin.conductivity_s_per_m) == (
-        194,
-        12,
-        0.01,
-    )
+    found = skin.outline.diameter_mm, skin.thickness_mm, skin.conductivity_s_per_m
+    assert found == (194, 12, 0.01)
     assert (skin.electrodes.count, skin.electrodes.width_mm) == (16, 4)
     np.testing.assert_allclose(_angles(skin), (90 + np.arange(16) * 22.5) % 360, atol=1e-9)
     spans = skin.electrode_spans_mm()

@@ -248,10 +248,8 @@ def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver
     assert expected.info.step_halvings == halvings
     assert expected.info.stop == ("iterations" if factor > 1e-6 else "diverged")
     for name, bound in (("c64", 1e-10), ("c", 1e-3)):
-        assert (results[name].info.step_halvings, results[name].info.stop) == (
-            halvings,
-            expected.info.stop,
-        )
+        found = results[name].info.step_halvings, results[name].info.stop
+        assert found == (halvings, expected.info.stop)
         assert (
             np.abs(results[name].image - expected.image).max()
             <= bound * np.abs(expected.image).max()

@@ -77,10 +77,8 @@ def test_protocols_that_need_no_model() -> None:
         assert scanned_protocol(board, None, "x").hash == protocol.hash
     with pytest.raises(DeviceError, match="only its model tells; name its file with"):
         scanned_protocol(info(model_crc=1, protocol_hash=1), None, "x")
-    assert (
-        scanned_protocol(info(protocol_hash=1), KnownModel(*prebuilt()), "x").hash
-        == prebuilt()[0].protocol.hash
-    )
+    found = scanned_protocol(info(protocol_hash=1), KnownModel(*prebuilt()), "x").hash
+    assert found == prebuilt()[0].protocol.hash
 
 
 def test_the_prebuilt_model_is_known_by_its_checksum() -> None:

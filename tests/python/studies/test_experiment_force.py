@@ -142,10 +142,8 @@ def test_the_least_load_lies_between_two() -> None:
 def test_false_alarms_have_the_exact_bound() -> None:
     one = detection.Detection(60.0, np.array([1.0]), np.ones((4, 1)), np.ones((4, 1)), 0, 299)
     assert one.false_share() == (0.0, pytest.approx(0.00997, abs=1e-5))  # 3 / n
-    assert detection.Detection(60.0, one.loads_g, one.hits, one.tries, 5, 5).false_share() == (
-        1.0,
-        1.0,
-    )
+    found = detection.Detection(60.0, one.loads_g, one.hits, one.tries, 5, 5).false_share()
+    assert found == (1.0, 1.0)
 
 
 def test_readings_survive_the_store() -> None:

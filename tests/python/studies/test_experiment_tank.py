@@ -52,10 +52,8 @@ EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "tank_kit4.toml"
 def test_without_frames_it_says_what_to_give(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert (
-        main(["study", "tank", "-o", str(tmp_path / "out"), "--no-pictures"])
-        == UsageError.exit_code
-    )
+    found = main(["study", "tank", "-o", str(tmp_path / "out"), "--no-pictures"])
+    assert found == UsageError.exit_code
     said = capsys.readouterr().err.strip()
     assert "--data DIR" in said and "kit4_dev.npz" in said and "\n" not in said
     with pytest.raises(UsageError, match=r"has no kit4_dev\.npz"):
@@ -233,10 +231,6 @@ def test_measured_frames_as_they_are_said_to_be(shared_data: Path) -> None:
     assert set(TOUCH_LIKE) <= set(frames.frame_name)
     assert 0.02 < np.median(reciprocal_share(frames)) < 0.1
     one, two = rods(shared_data)
-    assert (len(one.metal_mm), len(one.plastic_mm), len(two.metal_mm), len(two.plastic_mm)) == (
-        1,
-        0,
-        2,
-        2,
-    )
+    found = len(one.metal_mm), len(one.plastic_mm), len(two.metal_mm), len(two.plastic_mm)
+    assert found == (1, 0, 2, 2)
     assert one.metal_mm[0, 1] > 70 and abs(one.metal_mm[0, 0]) < 1

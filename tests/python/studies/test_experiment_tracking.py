@@ -105,13 +105,8 @@ def test_what_is_counted() -> None:
     told[10] = (at(2, 1.0),)  # a ghost
     told[8] += (at(4, 60.0),)
     count = count_stream(stream, told, 120)
-    assert (count.frames, count.true, count.missed, count.false_touches, count.switches) == (
-        12,
-        14,
-        6,
-        3,
-        2,
-    )
+    found = count.frames, count.true, count.missed, count.false_touches, count.switches
+    assert found == (12, 14, 6, 3, 2)
     assert count.exact == 4  # frames 0, 3, 8, 11
     assert (count.late, count.ghost, count.fingers, count.never) == ([1, 4], [1, 0], 2, 0)
     assert count.mota == pytest.approx(1 - 11 / 14) and sorted(count.errors_mm) == [0.0] + 7 * [1.0]

@@ -12,12 +12,8 @@ from eitskin_studies.harness.summary import bootstrap_interval, summarise
 
 def test_summary_of_one_to_twenty() -> None:
     summary = summarise(range(1, 21))
-    assert (summary.mean, summary.worst_tenth, summary.median, summary.count) == (
-        10.5,
-        1.5,
-        10.5,
-        20,
-    )
+    found = summary.mean, summary.worst_tenth, summary.median, summary.count
+    assert found == (10.5, 1.5, 10.5, 20)
     assert summary.p95 == pytest.approx(19.05)
     assert summarise(range(1, 21), worst="high").worst_tenth == 19.5
 

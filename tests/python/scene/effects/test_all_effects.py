@@ -191,8 +191,6 @@ def test_the_page_has_every_effect_and_parameter(name: str) -> None:
 
 def test_misplacement_and_outline_are_the_only_geometry_steps() -> None:
     stages = {name: importlib.import_module(module).STAGE for name, module in BUILT_IN.items()}
-    assert [name for name, stage in stages.items() if stage is Stage.GEOMETRY] == [
-        "out_of_round",
-        "misplacement",
-    ]
+    found = [name for name, stage in stages.items() if stage is Stage.GEOMETRY]
+    assert found == ["out_of_round", "misplacement"]
     assert GeometryStep.__dataclass_fields__["stage"].default is Stage.GEOMETRY
