@@ -140,6 +140,10 @@ typedef struct eits_options {
      * first look at each touch; then what stands is reported, and said to be crowded; 0: any
      * number */
     uint32_t test_columns;
+    /* > 0: between touches the reference follows the untouched skin, with this time constant in
+     * frames; 0: it stays as it was taken, also by default but in taught models. After
+     * eits_find_touches alone, and not in a batch */
+    uint32_t reference_frames;
     /* the noise of a row is at least this, V: of a converter its step over the root of 12 */
     eits_real noise_floor_v;
 } eits_options;

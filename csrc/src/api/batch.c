@@ -15,6 +15,8 @@ eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, s
     if (ctx == NULL || frames == NULL || results == NULL)
         return EITS_E_ARGUMENT;
     const size_t pixels = ctx->model->n_pixels;
+    const uint32_t follows = ctx->options.reference_frames;
+    ctx->options.reference_frames = 0; /* what was untouched before says nothing here */
     for (size_t k = 0; k < count; ++k) {
         eits_result *result = results + k;
         memset(result, 0, sizeof *result);
@@ -31,5 +33,6 @@ eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, s
         if (coefficients != NULL)
             eits_copy(coefficients + k * pixels, ctx->solver.x, pixels);
     }
+    ctx->options.reference_frames = follows;
     return EITS_OK;
 }

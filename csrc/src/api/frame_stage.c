@@ -13,9 +13,9 @@
 #include "eitskin/frame.h"
 
 #include "base/vec.h"
+#include "context/projection.h"
 #include "diagnostics/diagnostics.h"
 #include "frame/fold.h"
-#include "frame/projection.h"
 #include "frame/whitening.h"
 
 /* Why each row of this frame cannot be used, as far as the row itself tells. */

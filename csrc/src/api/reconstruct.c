@@ -8,6 +8,7 @@
 #include "api/stages.h"
 #include "base/vec.h"
 #include "context/context.h"
+#include "frame/reference.h"
 #include "solve/solve.h"
 
 eits_status eits_solve(eits_context *ctx, const eits_real *y)
@@ -29,10 +30,13 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
         return EITS_E_ARGUMENT;
     ctx->info = (eits_info){0};
     eits_status status = eits_frame_stage(ctx, frame, length, &ctx->info.masked, &ctx->info.macs);
-    if (status == EITS_OK)
+    if (status == EITS_OK) {
         status = eits_solve_frame(ctx, &ctx->scratch, ctx->options.warm_start != 0);
-    else
+        eits_follow_add(ctx, frame);
+    } else {
         eits_answer_zero(ctx, EITS_STOP_BELOW_THRESHOLD);
+        eits_follow_break(ctx);
+    }
     if (image != NULL)
         eits_copy(image, ctx->solver.image, ctx->model->n_pixels);
     if (info != NULL)

@@ -11,6 +11,7 @@
 #include "context/context.h"
 #include "diagnostics/diagnostics.h"
 #include "evidence/evidence.h"
+#include "frame/reference.h"
 #include "touch/disc_fit.h"
 #include "touch/tracker.h"
 
@@ -38,13 +39,18 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         eits_test_touches(ctx, scratch, &f);
         eits_rate_touches(ctx, &f);
         ctx->info.unexplained = f.total > 0 ? eits_fit_left(ctx, &f) / f.total : 0;
+        if (eits_check_drift(ctx))
+            f.count = 0;
     }
     const uint32_t finite = eits_report_touches(ctx, &f, found);
     ctx->info.touch_macs = f.macs;
     eits_check_crowd(ctx, found, finite);
     eits_check_count(ctx, &f);
     /* Judged by what this frame shows; tracking may hide some of it and add others. */
+    const uint32_t next_id = ctx->tracker.next_id;
     const uint32_t reported = eits_track(ctx, found, finite);
+    if (ctx->tracker.next_id != next_id) /* as many as before may be others */
+        eits_follow_break(ctx);
     ctx->info.touches = reported;
     for (uint32_t k = 0; k < reported; ++k) {
         eits_bring_onto_skin(ctx, &found[k].x_mm, &found[k].y_mm);
@@ -59,5 +65,11 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         touches[k] = found[k];
     if (count != NULL)
         *count = reported;
+    const uint32_t followed = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0
+                                  ? EITS_FOLLOW_UNKNOWN
+                                  : ctx->tracker.count;
+    /* Coefficients of another reference are no start. */
+    if (eits_follow_end(ctx, scratch, found, reported, followed, &ctx->info.touch_macs))
+        ctx->solver.warm = 0;
     return EITS_OK;
 }

@@ -14,6 +14,19 @@
 
 enum { EITS_SCRATCH_ROWS = 8, EITS_SCRATCH_PIXELS = 3 };
 
+/* A reference that follows the skin. Written by frame/follow. */
+typedef struct eits_follow {
+    uint32_t seen;    /* frames since the reference was taken */
+    uint32_t touches; /* touches in the last one; EITS_FOLLOW_UNKNOWN: not known, or of no use */
+    uint32_t rest;    /* frames like it that are yet to pass */
+    uint32_t frames;  /* frames on end behind those whose differences are in the reference's m2 */
+    uint32_t open;    /* 1: so is one whose touches have not been counted */
+    uint32_t means;   /* means of such frames since the number of touches changed */
+    eits_real gain;  /* beside touches: of the frame over the reference, as the first mean had it */
+    eits_real level; /* max(S'y) of untouched skin, as the first of it had it; 0: not known */
+} eits_follow;
+#define EITS_FOLLOW_UNKNOWN UINT32_MAX
+
 /* The reference frame and its noise. Written by frame/reference. */
 typedef struct eits_reference {
     /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them */
@@ -34,7 +47,9 @@ typedef struct eits_reference {
     eits_real noise_v;
     eits_real lambda_noise;
     uint32_t outliers;
-    /* While several frames are learned from. n_rows: sum of squared deviations, in m2_unit^2 */
+    eits_follow follow;
+    /* n_rows. While several frames are learned from: sum of squared deviations, in m2_unit^2; while
+     * the reference follows the skin: sum of differences, NaN for a row that one of them lacks */
     eits_real *m2;
     /* V: a power of two near the first reference frame's greatest voltage, so that squares are
      * numbers */

@@ -72,6 +72,10 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
  * known. */
 void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient);
 
+/* While the reference follows the skin: whether what the touches of this frame explain says that
+ * they are the skin's own change, in a taught model; info.lambda_max and .unexplained known. */
+int eits_check_drift(eits_context *ctx);
+
 /* Whether the reference is further from the model's than an uneven skin's. */
 void eits_check_unlike_model(eits_context *ctx);
 

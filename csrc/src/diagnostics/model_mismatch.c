@@ -3,7 +3,9 @@
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
-#include "frame/projection.h"
+#include "context/projection.h"
+#include "frame/reference.h"
+#include "frame/whitening.h"
 #include "kernels/column.h"
 
 /* The rows of P are orthogonal, so that |d|^2 - sum (P d)_i^2 / |P_i|^2 is what lies outside of
@@ -127,6 +129,23 @@ void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
     const eits_real min = EITS_STALE_NOISE * ctx->info.lambda_noise;
     if (min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
+}
+
+/* A taught model brings the noise's own metric, in which touches explain nearly all of a press and
+ * less of what drifts. Without this the first false touch would stop the reference for good. The
+ * clearer a touch is, the more it may leave; what stands far out of the noise is one, of whatever
+ * shape. Models from physics have the test of touches for this (evidence/). */
+int eits_check_drift(eits_context *ctx)
+{
+    const eits_real level = ctx->info.lambda_noise > 0 ? eits_detection_threshold(ctx)
+                                                       : ctx->reference.follow.level,
+                    clear = level > 0 ? ctx->info.lambda_max / level : EITS_DRIFT_CLEAR;
+    if (!eits_follows(ctx) || ctx->model->precision == NULL ||
+        !eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE) || clear > EITS_DRIFT_CLEAR ||
+        !(ctx->info.unexplained > EITS_DRIFT_UNEXPLAINED * (1 + clear)))
+        return 0;
+    ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
+    return 1;
 }
 
 void eits_check_unlike_model(eits_context *ctx)

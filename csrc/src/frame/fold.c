@@ -23,8 +23,8 @@
 
 #include "base/log.h"
 #include "base/vec.h"
+#include "context/projection.h"
 #include "frame/constants.h"
-#include "frame/projection.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 
@@ -207,12 +207,19 @@ uint32_t eits_reduce_frame(eits_context *ctx, const eits_scratch *scratch, uint6
     return count;
 }
 
-uint64_t eits_reduce(eits_context *ctx, const eits_scratch *scratch, uint32_t count, eits_real *out)
+uint64_t eits_reduce_whole(eits_context *ctx, const eits_scratch *scratch, uint32_t count,
+                           eits_real *out)
 {
     ctx->kernels->mul(&ctx->model->reduction, scratch->index, scratch->value, count, out);
-    const uint64_t filled = eits_fill_rows(ctx, scratch, count, out),
-                   macs = filled + (ctx->whitening.form ? eits_whiten_data(ctx, out) : 0);
-    return macs + (uint64_t)count * ctx->model->rank + eits_project(ctx, out);
+    const uint64_t filled = eits_fill_rows(ctx, scratch, count, out);
+    return filled + (ctx->whitening.form ? eits_whiten_data(ctx, out) : 0) +
+           (uint64_t)count * ctx->model->rank;
+}
+
+uint64_t eits_reduce(eits_context *ctx, const eits_scratch *scratch, uint32_t count, eits_real *out)
+{
+    const uint64_t macs = eits_reduce_whole(ctx, scratch, count, out);
+    return macs + eits_project(ctx, out);
 }
 
 /* y_log: the same of v0 log(v / v0), for the first places of touches. Rows whose reference is

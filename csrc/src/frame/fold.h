@@ -23,4 +23,8 @@ uint64_t eits_reduce_log(eits_context *ctx, const eits_scratch *scratch, const e
 uint64_t eits_reduce(eits_context *ctx, const eits_scratch *scratch, uint32_t count,
                      eits_real *out);
 
+/* The same, not projected. */
+uint64_t eits_reduce_whole(eits_context *ctx, const eits_scratch *scratch, uint32_t count,
+                           eits_real *out);
+
 #endif

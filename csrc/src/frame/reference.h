@@ -37,4 +37,23 @@ void eits_take_reference_frame(eits_context *ctx, const eits_real *frame);
 void eits_keep_second_frame(eits_context *ctx, const eits_real *frame);
 void eits_take_second_frame(eits_context *ctx);
 
+/* ---- follow.c ---- */
+
+/* Whether frames follow one another here, and for long enough to be told from single ones: after a
+ * sixteenth of the time constant. */
+int eits_follows(const eits_context *ctx);
+
+/* A frame was solved: its difference joins those at hand, until eits_follow_end says what it shows.
+ */
+void eits_follow_add(eits_context *ctx, const eits_real *frame);
+
+/* Let go of the frames at hand: what comes has nothing to do with them. */
+void eits_follow_break(eits_context *ctx);
+
+/* The frame added last shows these touches, and with tentative and held ones `followed`;
+ * EITS_FOLLOW_UNKNOWN: it is of no use. Returns 1 where the reference moved; adds to `macs`.
+ * Overwrites frame.d and scratch. */
+int eits_follow_end(eits_context *ctx, const eits_scratch *scratch, const eits_touch *touches,
+                    uint32_t count, uint32_t followed, uint64_t *macs);
+
 #endif

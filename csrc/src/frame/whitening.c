@@ -1,9 +1,9 @@
 #include "frame/whitening.h"
 
 #include "base/vec.h"
+#include "context/projection.h"
 #include "context/triangle.h"
 #include "frame/constants.h"
-#include "frame/projection.h"
 #include "frame/reference.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"

@@ -6,8 +6,8 @@
  * rank^2 / 2 multiply-accumulates at most, where a changed S would cost n_pixels times that and
  * memory that a board has not. */
 #include "base/vec.h"
+#include "context/projection.h"
 #include "context/triangle.h"
-#include "frame/projection.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 

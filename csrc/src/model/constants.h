@@ -13,6 +13,12 @@
  * away beyond its places gives absurd forces; smaller: cuts off gains that were measured */
 #define EITS_MAX_GAIN R(4.0)
 
+/* ---- Chosen: by hand: ten seconds at 50 frames a second. Check: ctest --preset host -R follow */
+
+/* reference_frames of a model that asks for it [frames]. larger: drift shows as touches; smaller:
+ * slow touches are followed */
+#define EITS_FOLLOW_FRAMES 512
+
 /* ---- Chosen: on tuning streams (the study's, seed 100001 by default): no other number of
  * confirmations, smoothing or threshold has more exact frames at 40 dB; holding for 0 or 1 frame
  * has 0.3 to 0.4 points more. Check: eitskin study tracking */

@@ -39,6 +39,7 @@ static const eits_option OPTIONS[] = {
     OPTION(row_gains, 1, 0, 1),
     OPTION(touch_test, 1, 0, 1),
     OPTION(test_columns, 1, 0, UINT32_MAX),
+    OPTION(reference_frames, 1, 0, UINT32_MAX),
     OPTION(noise_floor_v, 0, 0, 1e30f),
 };
 #undef OPTION
@@ -81,6 +82,7 @@ static eits_options usual_options(const eits_defaults *d)
         .row_gains = (uint32_t)1,
         .touch_test = (uint32_t)1,
         .test_columns = (uint32_t)200,
+        .reference_frames = (uint32_t)0,
         .noise_floor_v = (eits_real)0,
     };
 }

@@ -21,7 +21,7 @@
 
 #include "base/vec.h"
 #include "context/products.h"
-#include "frame/projection.h"
+#include "context/projection.h"
 #include "frame/whitening.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"

@@ -16,7 +16,7 @@
  * again, and the gap is always that of the look. */
 #include "base/vec.h"
 #include "context/products.h"
-#include "frame/projection.h"
+#include "context/projection.h"
 #include "frame/whitening.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"

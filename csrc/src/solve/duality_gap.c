@@ -13,7 +13,7 @@
 
 #include "base/vec.h"
 #include "context/products.h"
-#include "frame/projection.h"
+#include "context/projection.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 

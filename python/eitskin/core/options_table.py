@@ -49,6 +49,10 @@ class OptionFields:
     follow_mm: float  # a touch that moved at most so far since the last frame keeps its id
     # parts of the touch fit, a bit each; all but those that the model leaves out by default
     touch_fit: int
+    # > 0: between touches the reference follows the untouched skin, with this time constant in
+    # frames; 0: it stays as it was taken, also by default but in taught models. After
+    # eits_find_touches alone, and not in a batch
+    reference_frames: int
     # iterations between checks of the duality gap and of divergence, and until the working set is
     # chosen again
     gap_every: int = 10
@@ -124,6 +128,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "track_smooth": (0, 1e30),
     "regularisation_noise_factor": (0, 1e30),
     "test_columns": (0, 2**32 - 1),
+    "reference_frames": (0, 2**32 - 1),
     "noise_floor_v": (0, 1e30),
 }
 # The names that an option may have, in the order of their numbers.

@@ -20,7 +20,15 @@ from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
 from eitskin.model.force_law import decode_load, encode_load
-from eitskin.model.model import DATA_KINDS, GAIN_DRIFT_KEPT, Defaults, Fields, Golden, Model
+from eitskin.model.model import (
+    DATA_KINDS,
+    GAIN_DRIFT_KEPT,
+    REFERENCE_FOLLOWS,
+    Defaults,
+    Fields,
+    Golden,
+    Model,
+)
 from eitskin.model.model_errors import decode_model_errors
 from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
@@ -106,7 +114,7 @@ def encode_model(model: Model, sums: bytes = b"") -> bytes:
         )
     if sums:
         sections["SUMS"] = sums
-    taught = bool(model.defaults.touch_fit_left_out & GAIN_DRIFT_KEPT)
+    taught = bool(model.defaults.touch_fit_left_out & (GAIN_DRIFT_KEPT | REFERENCE_FOLLOWS))
     return _assemble(sections, model.protocol.hash, taught)
 
 
@@ -359,7 +367,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     )
     in_range = (
         1 <= d.iterations <= MAX_ITERATIONS
-        and d.touch_fit_left_out <= ALL_TOUCH_FIT | GAIN_DRIFT_KEPT
+        and d.touch_fit_left_out <= ALL_TOUCH_FIT | GAIN_DRIFT_KEPT | REFERENCE_FOLLOWS
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
         and MIN_RADIUS_MM

@@ -47,6 +47,7 @@ from eitskin.reference.disc_fit import Disc, Reduced
 from eitskin.reference.evidence import DataErrors
 from eitskin.reference.exact import ActiveSet, coordinate
 from eitskin.reference.fista import fista
+from eitskin.reference.follow import Follower, gain_beside
 from eitskin.reference.interaction import interplay, turned_dipoles
 from eitskin.reference.problem import (
     Certificate,
@@ -100,7 +101,8 @@ class ReferenceEngine:
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._warm: FloatArray | None = None
-        self._tracker = Tracker(model.grid)
+        self._tracker, self._follower = Tracker(model.grid), Follower(self.options.reference_frames)
+        self._unusable = self._bad
         self._examiner = Examiner(model)
         self._noise_v = self._noise_energy = 0.0
         self._ready = False
@@ -122,7 +124,7 @@ class ReferenceEngine:
         if options.sign != self.options.sign:
             self._warm = None
         learns = self._ready and options.row_gains != self.options.row_gains
-        self.options = options
+        self.options, self._follower.frames = options, options.reference_frames
         if learns:
             self._learn_row_gains()
         self._examiner.wanted = {
@@ -137,6 +139,7 @@ class ReferenceEngine:
         """Forget the warm start and the touches that were followed."""
         self._warm = None
         self._tracker.forget()
+        self._follower.let_go()
 
     def _fold_reference(self, v0: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Folded reference (k,) and where it is known."""
@@ -211,6 +214,7 @@ class ReferenceEngine:
             lambda_noise = max(lambda_noise, self._lambda_noise_floor)
             self._noise_v = max(self._noise_v, self._noise_floor_v)
         self._lambda_noise, self._ready = lambda_noise, True
+        self._follower.begin()
         return LearnedReference(
             len(frames),
             correlation,
@@ -303,6 +307,7 @@ class ReferenceEngine:
         basis = orthonormal(self._directions(folded), self.model.rank)
         y = project(self._reduce(folded.d), basis)
         self._folded, self._straight = folded, self._straight_data(frame, unusable, basis)
+        self._unusable = unusable
         directions = len(y) if self._whitening is None else min(len(y), int(known.sum()))
         # where the basis leaves no direction, what is there is rounding
         return y if len(basis) < directions else np.zeros_like(y), basis, int(unusable.sum())
@@ -430,6 +435,7 @@ class ReferenceEngine:
             y, basis, masked = self.frame_stage(np.asarray(frame, dtype=np.float64))
         except FrameError:
             self._warm = None
+            self._follower.let_go()
             raise
         o, norm = self.options, float(np.linalg.norm(y))
         lambda_noise = self._lambda_noise * self._noise_ratio
@@ -440,6 +446,8 @@ class ReferenceEngine:
             y, basis, lambda_noise, self._warm if o.warm_start else None
         )
         self._warm = result.x if result.stop in SOLVED else None
+        assert self._v0 is not None
+        self._follower.add(frame, self._v0, self._unusable)
         image = self._image(result)
         found: tuple[Touch, ...] = ()
         solved_ns = perf_counter_ns()
@@ -454,10 +462,16 @@ class ReferenceEngine:
             found, self._examiner.found.unexplained, coupled, doubtful = find_touches(
                 self.model, reduced, image, o, added, self._data_errors(basis)
             )
+            if self._is_drift(lambda_max, lambda_noise):
+                found = ()
+                self._examiner.found.names.add("stale reference")
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
             self._examiner.crowd(found, o, clearness, doubtful=doubtful)
             many = len(found) > 1
+            next_id = self._tracker.next_id
             followed = self._tracker.step(found, o, lambda_max, lambda_noise)
+            if self._tracker.next_id != next_id:
+                self._follower.let_go()
             grid = self.model.grid
             found = self._loaded(tuple(brought_onto_skin(grid, one) for one in followed))
             if o.second_pass and many and added is not None and o.touch_sweeps > 0:
@@ -469,6 +483,7 @@ class ReferenceEngine:
                     result, lam, lambda_max = self._solve(y, basis, lambda_noise, None)
                 result = replace(result, iterations=first + result.iterations)
                 self._warm, image = result.x if result.stop in SOLVED else None, self._image(result)
+            self._follow(found, lambda_max, basis)
         gap = result.certificate.gap
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked,
@@ -479,6 +494,53 @@ class ReferenceEngine:
             solve_us=(solved_ns - began_ns) / 1000, touch_us=(perf_counter_ns() - solved_ns) / 1000,
         )  # fmt: skip
         return Reconstruction(image, result.x, found, info)
+
+    def _is_drift(self, lambda_max: float, lambda_noise: float) -> bool:
+        """Whether the touches found are the skin's own change."""
+        found = self._examiner.found
+        threshold = self._detection_threshold if lambda_noise > 0 else None
+        taught = self.model.precision is not None and "stale reference" in self._examiner.wanted
+        return taught and self._follower.drifts(found.unexplained, lambda_max, threshold)
+
+    def _follow(self, touches: tuple[Touch, ...], lambda_max: float, basis: FloatArray) -> None:
+        """Let the reference go after the skin: all of it, or its size alone."""
+        assert self._v0 is not None
+        v0, of_use = self._v0, "model mismatch" not in self._examiner.found.names
+        mean = self._follower.mean(self._tracker.count if of_use else None, v0)
+        if mean is None:
+            return
+        if self._tracker.count == 0:
+            moved = self._follower.moved(mean, v0, lambda_max, self._best_match(basis, mean))
+        elif self.model.data_kind == "difference":
+            columns = self.seen[:, self._pixels(touches)]
+            y, u = self._whole(mean), self._whole(2 * v0)
+            moved = self._follower.grown(v0, gain_beside(u, y, columns))
+        else:
+            return
+        if moved is not None:
+            self._fit_to_model(moved)
+
+    def _whole(self, frame: FloatArray) -> FloatArray:
+        """A frame (m,) with the last one's rows, reduced and not projected (r,)."""
+        folded = self._fold(frame, self._unusable)
+        return self._reduce(np.where(folded.first | folded.second, folded.d, 0.0))
+
+    def _pixels(self, touches: tuple[Touch, ...]) -> list[int]:
+        """The kept pixels whose centres are nearest to touches."""
+        grid = self.model.grid
+        at = np.array([(t.x_mm, t.y_mm) for t in touches]).reshape(-1, 2)
+        away = grid.index[None] + 0.5 - ((at - grid.origin_mm) / grid.pixel_mm)[:, None]
+        return [int(one) for one in (away**2).sum(axis=2).argmin(axis=1)]
+
+    def _best_match(self, basis: FloatArray, frame: FloatArray) -> float:
+        """How much of |y|^2 of ``frame`` (m,) the column of S gives that gives most."""
+        y = project(self._whole(frame), basis)
+        match = self.seen.T @ y
+        best = int(np.abs(match).argmax())
+        column = project(self.seen[:, best], basis)
+        if not abs(match[best]) > self._lambda_noise_floor:
+            return 0.0
+        return float(match[best] ** 2 / ((y @ y) * (column @ column)))
 
     def _loaded(self, touches: tuple[Touch, ...]) -> tuple[Touch, ...]:
         """With their loads, where the model is calibrated."""

@@ -52,7 +52,12 @@ class Tracker:
     def __init__(self, grid: Grid, pairing: Pairing | None = None) -> None:
         self._grid, self._pairing = grid, nearest_pairs if pairing is None else pairing
         self._followed: list[Followed] = []
-        self._next_id = 1
+        self.next_id = 1
+
+    @property
+    def count(self) -> int:
+        """How many touches are followed, reported or not."""
+        return len(self._followed)
 
     def forget(self) -> None:
         """Nothing is followed any more; ids count on."""
@@ -100,8 +105,8 @@ class Tracker:
         )
         if one.touch.id or not (one.seen >= options.track_confirm or sure):
             return one
-        self._next_id += 1
-        return replace(one, touch=replace(one.touch, id=self._next_id - 1))
+        self.next_id += 1
+        return replace(one, touch=replace(one.touch, id=self.next_id - 1))
 
 
 @dataclass(frozen=True)

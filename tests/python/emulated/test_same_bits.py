@@ -27,8 +27,10 @@ from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
+from eitskin.teaching.teach import teach
 from eitskin_studies.harness.emulated import PROGRAM, EmulatedFrame, run_frames
 from printed_touches import printed_touches
+from simulated_presses import SKIN, presses
 from small_models import session as simulated_session
 from small_models import small, small_blob, small_model
 
@@ -113,6 +115,27 @@ def test_the_same_bits_as_the_host(
     board = [emulated for _, emulated in both]
     assert board[0].touches[0] != "0" and board[3].touches == "0"
     assert board[2].image_crc != board[1].image_crc
+
+
+def test_a_reference_that_follows_has_the_hosts_bits(program: Path, tmp_path: Path) -> None:
+    """Between presses on a skin that drifts, and under one that stays while the sheet dries."""
+    model = teach(presses(20), SKIN).model
+    some = presses(8, seed=2)
+    pattern = np.random.default_rng(4).normal(size=some.protocol.n_rows)
+    creep = 3e-4 * np.arange(8)[:, None] * pattern
+    frames = np.stack([some.untouched + creep, some.pressed + creep], axis=1)
+    frames = np.concatenate([*frames, np.linspace(1, 1.01, 6)[:, None] * frames[7, 1]])
+    noise = 2e-4 * np.random.default_rng(9).normal(size=(8, some.protocol.n_rows))
+    crcs = []
+    for constant in (0, 2):
+        options = replace(default_options(model), reference_frames=constant)
+        both = held_against_the_host(
+            program, tmp_path, encode_model(model), some.untouched[:1] + noise, frames, options
+        )
+        crcs.append([emulated.image_crc for _, emulated in both])
+    assert crcs[0][0] == crcs[1][0]
+    assert all(one != other for one, other in zip(crcs[0][1:16], crcs[1][1:16], strict=True))
+    assert crcs[0][-1] != crcs[1][-1]
 
 
 def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:

@@ -30,8 +30,8 @@ class HostCheck:
     ``same``: every bit of the image, and of the touches but their ids, which count on from whatever
     the board did before, of the events that these touches make, and all that was found in the
     frame. ``different``: numbers of frames that
-    are not. ``untold``: frames whose solve or touches began from one that was lost on the way, or
-    from a reference that was. ``alone``: solved on the board without its raw frame here.
+    are not. ``untold``: frames whose solve, touches or reference come from one that was lost on the
+    way. ``alone``: solved on the board without its raw frame here.
     """
 
     same: int = 0
@@ -77,7 +77,8 @@ class HostTwin:
 
     def __init__(self, known: KnownModel, options: Options) -> None:
         self._core = Reconstructor(known.model, blob=known.blob, options=options)
-        self._warm, self._tracks = options.warm_start, options.tracks
+        self._from_before = options.warm_start or options.reference_frames > 0
+        self._tracks = options.tracks
         self._quiet: list[RawFrame] = []
         self._tared = self._sure = self._lost = self._told = False
         self._gestures = Gestures()
@@ -136,7 +137,7 @@ class HostTwin:
         try:
             result = self._core.reconstruct(raw.voltage_v, touches=frame.touches is not None)
         except FrameError:
-            self._count(frame, frame.refused is not None, 1.0, self._warm)
+            self._count(frame, frame.refused is not None, 1.0, self._from_before)
             return None
         assert frame.solved is not None
         same, difference = (
@@ -152,9 +153,9 @@ class HostTwin:
         touched = frame.touches is None or same_touches(result.touches, frame.touches.touches)
         touched = self._same_events(frame) and touched
         if same and not touched:
-            self._count(frame, False, difference, self._warm or self._tracks)
+            self._count(frame, False, difference, self._from_before or self._tracks)
         else:
-            self._count(frame, same, difference, self._warm)
+            self._count(frame, same, difference, self._from_before)
         return result
 
     def _same_events(self, frame: LiveFrame) -> bool:

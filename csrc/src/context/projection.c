@@ -2,7 +2,7 @@
  * multiply-accumulates each. Q is a projection, so applying it to y once and to F S x in every
  * residual makes the problem that of the other directions alone, exactly, without a change of P or
  * S. */
-#include "frame/projection.h"
+#include "context/projection.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
