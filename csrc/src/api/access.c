@@ -18,11 +18,14 @@ const eits_info *eits_get_info(const eits_context *ctx)
     return &ctx->info;
 }
 
+/* Zeros where the last frame was rejected, so that a caller who overlooks the status shows nothing.
+ */
 const eits_real *eits_get_image(const eits_context *ctx)
 {
     return ctx->solver.image;
 }
 
+/* The image before the column weights: what a warm start begins from. */
 const eits_real *eits_get_coefficients(const eits_context *ctx)
 {
     return ctx->solver.x;
@@ -53,6 +56,7 @@ eits_status eits_get_reference(const eits_context *ctx, eits_reference_info *ref
 {
     if (ctx == NULL || reference == NULL)
         return EITS_E_ARGUMENT;
+    /* numbers by value; v0 is the context's own, and changes with the next tare */
     const eits_reference *r = &ctx->reference;
     *reference =
         (eits_reference_info){r->v0,          r->count,   r->ready,        r->v0_rms,  r->gain,

@@ -28,6 +28,7 @@ eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, s
             (void)eits_find_touches(ctx, touches + k * EITS_MAX_TOUCHES, EITS_MAX_TOUCHES,
                                     &result->count);
         result->info = ctx->info;
+        /* also of a frame that failed: eits_reconstruct has left zeros, and no older image */
         if (images != NULL)
             eits_copy(images + k * pixels, ctx->solver.image, pixels);
         if (coefficients != NULL)

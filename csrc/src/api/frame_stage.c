@@ -18,7 +18,11 @@
 #include "frame/fold.h"
 #include "frame/whitening.h"
 
-/* Why each row of this frame cannot be used, as far as the row itself tells. */
+/* Why each row of this frame cannot be used, as far as the row itself tells.
+ *
+ * A row whose reference is no number was masked in the tare: there is nothing to compare it with,
+ * whatever the mask says now. Saturated rows that are masked are not counted: who masked them
+ * knows. */
 static void find_unusable(eits_context *ctx, const eits_real *frame)
 {
     const eits_real limit = ctx->options.saturation_v;
@@ -85,6 +89,7 @@ static eits_status check_rows(const eits_context *ctx, const eits_real *frame, u
     *masked = count_unusable(ctx);
     if (*masked > ctx->options.max_masked)
         return EITS_E_FRAME_CHANNELS;
+    /* With every row out there is no reading that could be zero; max_masked has allowed it. */
     return *masked < ctx->model->n_rows && is_dead(ctx, frame) ? EITS_E_FRAME_ZERO : EITS_OK;
 }
 
@@ -135,6 +140,8 @@ eits_status eits_frame_data(eits_context *ctx, const eits_scratch *scratch, cons
     const uint32_t directions = ctx->whitening.form && count < model->rank ? count : model->rank;
     if (ctx->projection.count >= directions) /* no direction is left: what is there is rounding */
         eits_zero(ctx->frame.y, model->rank);
+    /* The square and not each number: solvers square y, so that one whose square overflows is of no
+     * more use than an infinite one. */
     return eits_is_finite(eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, model->rank))
                ? EITS_OK
                : EITS_E_NOT_FINITE;

@@ -15,6 +15,7 @@ eits_status eits_solve(eits_context *ctx, const eits_real *y)
 {
     if (ctx == NULL)
         return EITS_E_ARGUMENT;
+    /* without y: the data that the last frame stage left */
     if (y != NULL) {
         eits_copy(ctx->frame.y, y, ctx->model->rank);
         ctx->frame.has_y_log = 0; /* of another frame */

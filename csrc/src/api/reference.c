@@ -43,6 +43,8 @@ eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t
     eits_copy(b->v0, frame, length);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (ctx->rows.masked[i])
+            /* and not 0: a mask that is lifted later must not bring back a row that was never
+             * measured */
             b->v0[i] = R(NAN);
     }
     status = fit(ctx);
@@ -71,6 +73,7 @@ eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
     eits_zero(b->m2, ctx->model->n_rows);
     b->wanted = count;
     b->count = 0;
+    /* Until it is done frames are rejected: half a mean would show touches that nobody made. */
     b->ready = 0;
     b->lambda_noise = 0;
     b->noise_v = 0;
@@ -91,6 +94,8 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_scratch *scr
     eits_apply_t(ctx, eits_adjoint(ctx, ctx->frame.y, scratch->row[4]), scratch->pixel[0]);
     if (!eits_all_finite(scratch->pixel[0], ctx->model->n_pixels))
         return EITS_E_NOT_FINITE;
+    /* Divided by what this whitening makes of noise, so that it serves other rows and
+     * regularisations. */
     const eits_real seen =
         eits_greatest(ctx->kernels, scratch->pixel[0], ctx->model->n_pixels, EITS_SIGN_BOTH) /
         ctx->whitening.noise_ratio;
@@ -151,6 +156,8 @@ eits_status eits_reference_finish(eits_context *ctx)
     const eits_status status = fit(ctx);
     if (status != EITS_OK)
         return status;
+    /* A tare of equal frames has no noise, and then any difference would be a touch: what rounding
+     * and a converter's steps leave is the least. */
     const eits_real noise_v = eits_reference_noise(ctx), floor_v = eits_noise_floor_v(ctx),
                     lambda_floor = eits_lambda_noise_floor(ctx);
     b->noise_v = noise_v > floor_v ? noise_v : floor_v;

@@ -49,6 +49,7 @@ eits_status eits_save(const eits_context *ctx, void *memory, size_t size)
     memcpy(to, &head, sizeof head);
     to += EITS_ALIGN16(sizeof head);
     memcpy(to, r->v0, rows * sizeof r->v0[0]);
+    /* They belong to the reference: where a row was masked v0 is no number. */
     memcpy(to + EITS_REALS(rows), ctx->rows.masked, rows);
     return EITS_OK;
 }
@@ -67,6 +68,7 @@ eits_status eits_restore(eits_context *ctx, const void *memory, size_t size)
     from += EITS_ALIGN16(sizeof head);
     ctx->options = head.options;
     ctx->tracker.next_id = head.next_id;
+    /* The deviations m2 are of a tare under way, and none is: they are not among what is saved. */
     *r = (eits_reference){.v0 = r->v0,
                           .m2 = r->m2,
                           .row_gain = r->row_gain,
@@ -80,6 +82,8 @@ eits_status eits_restore(eits_context *ctx, const void *memory, size_t size)
                           .lambda_noise = head.lambda_noise};
     memcpy(r->v0, from, rows * sizeof r->v0[0]);
     memcpy(ctx->rows.masked, from + EITS_REALS(rows), rows);
+    /* They follow from v0 and the model, as at the tare. Touches of before would be other fingers.
+     */
     eits_learn_row_gains(ctx);
     eits_forget(ctx);
     return EITS_OK;

@@ -148,7 +148,10 @@ static void lay_out_panels(eits_context *ctx, arena *a)
     eits_make_panels(&ctx->model->sensitivity, ctx->columns.panels);
 }
 
-/* The way from a cell of the image to its kept pixel. */
+/* The way from a cell of the image to its kept pixel.
+ *
+ * Without it each look at a pixel's neighbours would search all pixels. There are at most 65535, so
+ * that 16 bits hold each and one value is left for none. */
 static uint16_t *map_cells(const eits_model *model, arena *a)
 {
     const size_t cells = (size_t)model->nx * model->ny;
@@ -214,6 +217,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
     return EITS_OK;
 }
 
+/* For tests that compare two builds of the kernels on one machine: the bits are the same. */
 eits_status eits_use_portable_kernels(eits_context *ctx, int portable)
 {
     if (ctx == NULL)

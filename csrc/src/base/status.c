@@ -43,6 +43,7 @@ const char *eits_status_text(eits_status status)
     return "unknown status";
 }
 
+/* Two macros, so that the number is put in before it becomes text. */
 #define TEXT_OF(x) #x
 #define TEXT(x)    TEXT_OF(x)
 

@@ -16,6 +16,7 @@ uint32_t eits_apply(const eits_context *ctx, const eits_scratch *scratch, const 
                     eits_real *out)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
+    /* An image has tens of non-zeros among hundreds of pixels. */
     const uint32_t count = eits_list_nonzeros(ctx->kernels, s, x, scratch->index, scratch->value);
     ctx->kernels->mul(s, scratch->index, scratch->value, count, out);
     return count;

@@ -4,6 +4,8 @@
 #include "base/vec.h"
 #include "evidence/constants.h"
 
+/* What fits worse than its covariance says needs more evidence for each disc, in proportion. Never
+ * less: a misfit below that is luck. */
 eits_real eits_excess(const eits_context *ctx, eits_real misfit, uint32_t count)
 {
     const eits_real data = (eits_real)(ctx->model->rank - ctx->evidence.drifts),
@@ -16,11 +18,14 @@ static int is_near(const eits_disc *a, const eits_disc *b)
 {
     const eits_real dx = a->x_mm - b->x_mm, dy = a->y_mm - b->y_mm,
                     reach = EITS_MERGE_REACH * (a->radius_mm + b->radius_mm);
+    /* a conducting and an insulating touch are never one */
     return a->polarity == b->polarity && eits_fma(dx, dx, dy * dy) < reach * reach;
 }
 
 int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real needed)
 {
+    /* Two clear discs are two, however near; a weak one may be what the other's shape leaves over.
+     */
     const eits_real weaker = v->rise[i] < v->rise[j] ? v->rise[i] : v->rise[j];
     return weaker < EITS_CLEAR_AS_DISCS * needed && is_near(&v->answer.disc[i], &v->answer.disc[j]);
 }
@@ -42,6 +47,7 @@ uint32_t eits_weakest(const eits_scratch *scratch, const eits_answer *answer,
     uint32_t weakest = 0;
     for (uint32_t k = 0; k < answer->count; ++k) {
         rise[k] = eits_linear_rise(scratch, answer, likelihood, k);
+        /* the first of equals, on every target */
         weakest = rise[k] < rise[weakest] ? k : weakest;
     }
     return weakest;

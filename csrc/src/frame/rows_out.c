@@ -24,14 +24,15 @@ static eits_real precision(const eits_context *ctx, uint32_t i, uint32_t j)
     return (eits_real)ctx->model->precision[high * (high + 1u) / 2u + low];
 }
 
+/* Packed, unlike F: it has a row for each fold left out, and those are few. */
 static eits_real *packed_row(eits_real *triangle, uint32_t i)
 {
     return triangle + (size_t)i * (i + 1u) / 2u;
 }
 
 /* L of R_mm = L L' in the metric's place, which it fits: as many rows at most as directions. A
- * pivot that rounding has eaten becomes the least that keeps the rest finite; the triangle is then
- * checked as a whole. */
+ * pivot that rounding has eaten gives no number, which the check of the whole triangle F finds; the
+ * stored whitening then stands in. */
 static uint64_t factor_left_out(eits_context *ctx, const uint32_t *out, uint32_t count)
 {
     eits_real *l = ctx->whitening.metric;
@@ -53,6 +54,7 @@ static uint32_t list_left_out(const eits_context *ctx, uint32_t *out)
 {
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        /* written always and counted where it holds: no branch */
         out[count] = k;
         count += ctx->frame.sides[k] == 0;
     }
@@ -97,6 +99,8 @@ uint64_t eits_fill_rows(eits_context *ctx, const eits_scratch *scratch, uint32_t
     uint32_t count = 0;
     if (ctx->model->precision == NULL || ctx->whitening.form != EITS_WHITENING_TRIANGLE)
         return 0;
+    /* L x = R_mo d_o forward, then L'x back: the factor serves every frame until other rows are
+     * out. */
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         if (ctx->frame.sides[k] != 0)
             continue;
@@ -114,6 +118,7 @@ uint64_t eits_fill_rows(eits_context *ctx, const eits_scratch *scratch, uint32_t
         for (uint32_t b = 0; b < a; ++b)
             x[b] = eits_fma(-l[(size_t)a * (a + 1u) / 2u + b], x[a], x[b]);
     }
+    /* y takes what the rows left out are expected to say, each by its column of P. */
     uint32_t a = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         if (ctx->frame.sides[k] != 0)

@@ -8,7 +8,9 @@
 #include "kernels/column.h"
 #include "kernels/kernels.h"
 
-/* |P|^2. */
+/* |P|^2.
+ *
+ * By this much the energy of white noise grows from the folds to y. */
 static eits_real energy_of(const eits_context *ctx, eits_real *copy)
 {
     const eits_matrix *p = &ctx->model->reduction;
@@ -25,6 +27,7 @@ void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch)
     const eits_row_form *form = &ctx->model->row_form;
     ctx->whitening.energy = ctx->whitening.energy_stored = energy_of(ctx, scratch->row[3]);
     ctx->whitening.possible = form->scale != NULL;
+    /* To reals once: a core in double would convert them in every frame. */
     for (uint32_t i = 0; ctx->whitening.possible && i < ctx->model->rank; ++i) {
         ctx->whitening.row_scale[i] = (eits_real)form->scale[i];
         ctx->whitening.row_strength[i] = (eits_real)form->strength[i];
@@ -156,6 +159,7 @@ static void solve(const eits_context *ctx, eits_real *triangle, eits_real *v)
 {
     for (uint32_t i = ctx->model->rank; i-- > 0;) {
         const eits_real *row = row_of(ctx, triangle, i), before = v[i];
+        /* zero while its row is summed: the dot runs over the diagonal as well */
         v[i] = 0;
         v[i] = (before - dot_of_row(ctx, i, row, v)) / row[i];
     }
@@ -181,6 +185,8 @@ static uint64_t measure_noise(eits_context *ctx, const eits_scratch *scratch)
     eits_real *v = scratch->row[3], sum = 0, total = 0;
     for (uint32_t p = 0; p < EITS_NOISE_PROBES; ++p) {
         for (uint32_t i = 0; i < rank; ++i) {
+            /* Fixed signs, the rows of a Hadamard matrix: the same bits anywhere, and no two probes
+             * alike. */
             const uint32_t both = i & p, odd = (both ^ both >> 1 ^ both >> 2) & 1u;
             const eits_real size =
                 eits_sqrt(ctx->whitening.row_strength[i]) / ctx->whitening.row_scale[i];

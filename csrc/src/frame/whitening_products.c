@@ -11,7 +11,9 @@
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 
-/* out = D v. */
+/* out = D v.
+ *
+ * Over the whole stride, whose padding is zeros: a loop without a remainder. */
 static void weigh(const eits_context *ctx, const eits_real *v, eits_real *out)
 {
     const eits_real *weight = ctx->whitening.map;
@@ -66,12 +68,14 @@ uint64_t eits_forward_macs(const eits_context *ctx)
 
 const eits_real *eits_adjoint(const eits_context *ctx, const eits_real *v, eits_real *room)
 {
+    /* F is the identity: no copy, and none of its time. */
     if (!ctx->whitening.form)
         return v;
     if (ctx->whitening.form == EITS_WHITENING_DIAGONAL) {
         weigh(ctx, v, room);
         return room;
     }
+    /* F' by adding up F's rows: the transpose of what is stored by rows needs no gathering. */
     eits_zero(room, EITS_STRIDE(ctx->model->rank));
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         add_row(ctx, i, room, v[i], row_of(ctx, ctx->whitening.map, i));

@@ -159,7 +159,9 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
     c->farthest_mm = far > c->farthest_mm ? far : c->farthest_mm;
 }
 
-/* An event at where the contact is now; what moves from here on is measured from there. */
+/* An event at where the contact is now; what moves from here on is measured from there.
+ *
+ * Steps add up from what was reported last: a slow finger is not lost between two frames. */
 static void tell_place(const eits_gestures *g, eits_contact *c, uint32_t kind, event_list *out)
 {
     c->told_x_mm = c->x_mm;
@@ -171,7 +173,9 @@ static void tell_place(const eits_gestures *g, eits_contact *c, uint32_t kind, e
                                 .y_mm = c->y_mm});
 }
 
-/* From now on others know of it. */
+/* From now on others know of it.
+ *
+ * Until now it might have been noise, which would have lifted again at once. */
 static void land(const eits_gestures *g, eits_contact *c, event_list *out)
 {
     c->state = CONTACT_DOWN;
@@ -334,6 +338,7 @@ static void begin_again(eits_gestures *g, event_list *out)
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         if (g->contact[k].state == CONTACT_DOWN)
             lift(g, k, out);
+        /* forgotten, so that no tap or hold is made of the time that nobody saw */
         g->contact[k] = (eits_contact){0};
     }
     g->pair = (eits_finger_pair){0};
@@ -351,12 +356,16 @@ eits_status eits_gestures_update(eits_gestures *gestures, const eits_touch *touc
     event_list out = {.events = events, .room = room, .dropped = &g->dropped};
     const uint32_t elapsed_us = time_us - g->time_us;
     *told = 0;
+    /* The same frame twice says nothing new. A clock that goes back is a long gap, as unsigned
+     * numbers have it, and so is treated as one. */
     if (g->begun && elapsed_us == 0)
         return EITS_OK;
     if (g->begun && elapsed_us > EITS_LONGEST_GAP_US)
         begin_again(g, &out);
     g->time_us = time_us;
     g->begun = 1;
+    /* Who is who before who has lifted: a finger under a new id is found before its old one ends.
+     * Pairs and holds last, since both look at what is left. */
     match(g, touches, count, &out);
     note_company(g);
     end_lost(g, &out);

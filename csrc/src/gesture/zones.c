@@ -9,6 +9,7 @@ static eits_real some(eits_real distance)
     return distance > R(1e-6) ? distance : R(1e-6);
 }
 
+/* Places are bounded, so that squares of distances stay finite in float32. */
 static int is_zone(const eits_zone *z)
 {
     if (z->corners_mm == NULL)
@@ -30,6 +31,7 @@ eits_status eits_zones_init(eits_zones *zones, const eits_zone *zone, uint32_t c
             return EITS_E_ARGUMENT;
     }
     memset(zones, 0, sizeof *zones);
+    /* in place: the corners stay the caller's, and cost no memory here */
     zones->zone = zone;
     zones->count = count;
     return EITS_OK;

@@ -17,6 +17,8 @@
 
 #include <immintrin.h>
 
+/* Loads that need no alignment cost nothing where the address has it, and a caller's frame may lie
+ * anywhere. */
 #ifdef EITS_DOUBLE
 enum { LANES = 4 };
 typedef __m256d vector;
@@ -214,6 +216,7 @@ static void avx2_prox(const eits_prox *how, uint32_t n, const eits_real *restric
         STORE(next + j, moved);
         STORE(z + j, FMA(betas, SUB(moved, LOAD(x + j)), moved));
     }
+    /* The rest, fewer than a vector, one by one: the same operations, the same bits. */
     for (; j < n; ++j) {
         const eits_real v = eits_fma(step, gradient[j], z[j]);
         const eits_real up = allow_up && v > t ? v - t : 0, down = allow_down && v < -t ? v + t : 0;

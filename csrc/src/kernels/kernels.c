@@ -80,6 +80,7 @@ uint32_t eits_list_nonzeros(const eits_kernels *kernels, const eits_matrix *matr
  * register holds one row of many columns, so that no sum goes across a register. */
 void eits_make_panels(const eits_matrix *matrix, eits_real *panels)
 {
+    /* Lanes beyond the last column are zeros: they take part in every sum and change none. */
     for (uint32_t j = 0; j < EITS_PANEL_COLUMNS(matrix->cols); ++j) {
         eits_real *lane =
             panels + (size_t)(j / EITS_PANEL) * EITS_PANEL * matrix->rows + j % EITS_PANEL;

@@ -280,6 +280,8 @@ static void mul_f32(const eits_matrix *matrix, const uint32_t *index, const eits
     few_rows(data + row, stride, index, value, count, out + row, (uint32_t)(stride - row));
 }
 
+/* Sixteen rows of eight columns at a time: half a kilobyte of stack instead of a copy of S, and
+ * each number is unpacked once. */
 static void mul_unpacked(const eits_matrix *matrix, const uint32_t *index, const eits_real *value,
                          uint32_t count, eits_real *out)
 {

@@ -147,6 +147,7 @@ static void finish(eits_link_decoder *d, eits_link_packet *packet)
 {
     if (d->broken)
         return;
+    /* a block that promised more bytes was cut, or two packets have run together */
     if (d->left > 0 || d->used < (size_t)MIN) {
         ++d->framing_errors;
         return;
@@ -180,6 +181,7 @@ size_t eits_link_feed(eits_link_decoder *d, const uint8_t *bytes, size_t size,
             unstuff(d, bytes[i]);
             continue;
         }
+        /* zeros may follow one another; between them is no packet */
         if (d->in_packet)
             finish(d, packet);
         d->used = 0;

@@ -53,6 +53,7 @@ eits_real eits_force_n(const eits_model *model, eits_real x_mm, eits_real y_mm,
     const eits_real strength = eits_fabs(strength_s_per_m_mm2) * gain_at(force, u, v);
     const uint32_t last = force->head->points - 1;
     uint32_t k = 1;
+    /* few points: a walk is as quick as a search by halves, and stops at the last segment */
     while (k < last && strength > (eits_real)force->strength[k])
         ++k;
     const eits_real s0 = (eits_real)force->strength[k - 1], s1 = (eits_real)force->strength[k];

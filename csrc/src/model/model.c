@@ -103,6 +103,7 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
     return EITS_OK;
 }
 
+/* By tag, in any order: a writer may put sections where it likes. */
 static eits_section *find_slot(sections *found, const uint8_t *tag)
 {
     static const char tags[] =
@@ -309,6 +310,7 @@ static eits_status read_fields(eits_model *model, const eits_section *flds)
         return EITS_OK;
     const uint32_t rows = 2u * model->n_electrodes + MIRROR_ROWS, stride = (rows + 7u) & ~7u;
     const size_t halves = (size_t)model->n_pixels * stride;
+    /* without it (other data than differences) touches are fitted as if they did not interact */
     if (flds->size != FIELDS_HEAD + halves * 2u)
         return EITS_E_MODEL_SECTION;
     model->fields.volts = eits_read_f32(flds->data);
@@ -347,6 +349,7 @@ static eits_status read_force(eits_force *force, const eits_section *found)
         head->order > EITS_MAX_FORCE_ORDER || !eits_between(head->radius_mm, 1e-6f, 1e30f) ||
         !eits_between(head->reach, 0, 1e3f) || !eits_between(head->uncertainty, 0, 1e30f))
         return EITS_E_MODEL_VALUE;
+    /* bounded above, so that the size below is small and exact */
     const uint32_t terms = (head->order + 1) * (head->order + 2) / 2;
     if (found->size != sizeof *head + (2 * head->points + terms) * 4)
         return EITS_E_MODEL_SECTION;
@@ -414,6 +417,7 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
         status = check_sizes(&opened, &found);
     if (status != EITS_OK)
         return status;
+    /* what the header claims; check_tables compares it with the table itself */
     memcpy(&opened.protocol_hash, bytes + 24, sizeof opened.protocol_hash);
     point_into(&opened, &found);
     status = check_tables(&opened);

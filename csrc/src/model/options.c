@@ -21,6 +21,8 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         return EITS_E_ARGUMENT;
     const eits_defaults *d = model->defaults;
     *options = usual_options(d);
+    /* A model may name more touches than this build holds: its defaults are good options all the
+     * same. */
     options->max_touches = d->max_touches < EITS_MAX_TOUCHES ? d->max_touches : EITS_MAX_TOUCHES;
     options->max_masked = model->n_rows / 2;
     options->touch_fit = EITS_TOUCH_FIT_ALL & ~d->touch_fit_left_out;
@@ -66,6 +68,7 @@ int eits_options_in_range(const eits_options *o)
         if (!is_in_range(o, &OPTIONS[k]))
             return 0;
     }
+    /* A fit starts from the seed and is kept between the other two: a seed outside would jump. */
     return o->touch_min_radius_mm <= o->touch_seed_radius_mm &&
            o->touch_seed_radius_mm <= o->touch_max_radius_mm;
 }
