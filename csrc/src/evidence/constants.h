@@ -94,11 +94,26 @@
 #define EITS_SHORTER R(0.4)
 
 /* ---- Chosen: on the tuning family of the worlds (seed 1, 40 scenes a set): the least without
- * which fewer counts are right, of 300 to 600 and of 40 to 64. Check: eitskin bench worlds */
+ * which fewer counts are right, of 40 to 64. Check: eitskin bench worlds */
 
 /* of all discs, up to which they get shapes [columns]. larger: crowds cost more; smaller: shapes in
  * crowds become touches */
 #define EITS_SHAPE_COLUMNS 48
+
+/* ---- Chosen: on the tuning family of the worlds (seed 11, 100 scenes a set): long touches found
+ * as two, by reaches of 1.2 to 2.2 and 3, 4 or all discs; of five discs 2.5 radii apart none is
+ * lost. Check: eitskin bench worlds */
+
+/* up to which pairs are tried as one long touch [discs]. larger: crowds cost more; smaller: long
+ * touches become two */
+#define EITS_FEW_DISCS 3
+
+/* MERGE_REACH where there are few [of the sum of radii]. as there */
+#define EITS_REACH_OF_FEW R(2.2)
+
+/* so much is the weaker of such a pair worth at most [of the threshold]. larger: costs; smaller:
+ * long touches become two */
+#define EITS_CLEAR_OF_FEW R(60.0)
 
 /* ---- Chosen: on the tuning family of the worlds (seeds 1 and 2): logistic regression of found
  * touches, true or false, on the logarithm of their rise; factor and floors of places so that 90 %

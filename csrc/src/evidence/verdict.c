@@ -14,6 +14,7 @@ eits_real eits_excess(const eits_context *ctx, eits_real misfit, uint32_t count)
     return of > 1 ? of : 1;
 }
 
+<<<<<<< HEAD
 static int is_near(const eits_disc *a, const eits_disc *b)
 {
     const eits_real dx = a->x_mm - b->x_mm, dy = a->y_mm - b->y_mm,
@@ -28,6 +29,21 @@ int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real nee
      */
     const eits_real weaker = v->rise[i] < v->rise[j] ? v->rise[i] : v->rise[j];
     return weaker < EITS_CLEAR_AS_DISCS * needed && is_near(&v->answer.disc[i], &v->answer.disc[j]);
+=======
+/* Two discs that lie along one long touch are further apart, and each is worth much beside the
+ * other; to try all such pairs of a crowd would cost too much. */
+int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real needed)
+{
+    const int few = v->answer.count <= EITS_FEW_DISCS;
+    const eits_disc *a = &v->answer.disc[i], *b = &v->answer.disc[j];
+    const eits_real weaker = v->rise[i] < v->rise[j] ? v->rise[i] : v->rise[j],
+                    clear = few ? EITS_CLEAR_OF_FEW : EITS_CLEAR_AS_DISCS, dx = a->x_mm - b->x_mm,
+                    dy = a->y_mm - b->y_mm,
+                    reach = (few ? EITS_REACH_OF_FEW : EITS_MERGE_REACH) *
+                            (a->radius_mm + b->radius_mm);
+    return a->polarity == b->polarity && weaker < clear * needed &&
+           eits_fma(dx, dx, dy * dy) < reach * reach;
+>>>>>>> 58fa0ee9 (Two discs along one long touch are tried as one where there are few; the options' table of ranges has test_columns)
 }
 
 int eits_any_may_be_one(const eits_verdict *v, eits_real needed)

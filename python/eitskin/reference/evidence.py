@@ -12,7 +12,9 @@ import numpy.typing as npt
 from eitskin.core.constants_table import (
     CLEAR,
     CLEAR_AS_DISCS,
+    CLEAR_OF_FEW,
     DIPOLE_PRECISION,
+    FEW_DISCS,
     FITS,
     FITS_AS_DISCS,
     FREE_PRECISION,
@@ -24,6 +26,7 @@ from eitskin.core.constants_table import (
     MIN_PIVOT,
     MOST_CHANGE,
     PAIR_MISFIT,
+    REACH_OF_FEW,
     REFIT_STEPS,
     SETTLED_MISFIT,
     SHAPE_COLUMNS,
@@ -203,10 +206,10 @@ def parameters_of(fit: Fit, errors: DataErrors, count: int) -> int:
     return PLACE if count * PLACE <= room else 0
 
 
-def is_near(a: Disc, b: Disc) -> bool:
-    """Whether two discs may be one touch."""
+def is_near(a: Disc, b: Disc, reach: float) -> bool:
+    """Whether two discs, nearer than so many sums of their radii, may be one touch."""
     distance = np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm)
-    return a.polarity == b.polarity and bool(distance < MERGE_REACH * (a.radius_mm + b.radius_mm))
+    return a.polarity == b.polarity and bool(distance < reach * (a.radius_mm + b.radius_mm))
 
 
 class Hypothesis:
@@ -333,13 +336,16 @@ class Hypothesis:
         return TOUCH_EVIDENCE * self.excess(self.answer.misfit, len(self.answer.discs))
 
     def near_pairs(self) -> list[tuple[int, int]]:
-        """Pairs i < j of near discs, one of them worth little beside the other, by j and then i."""
-        discs, weak = self.answer.discs, self.rise < CLEAR_AS_DISCS * self.needed()
+        """Pairs i < j of near discs, one of them worth little beside the other, by j and then i;
+        of few discs further ones, too: two may lie along one long touch."""
+        discs, few = self.answer.discs, len(self.answer.discs) <= FEW_DISCS
+        reach = REACH_OF_FEW if few else MERGE_REACH
+        weak = self.rise < (CLEAR_OF_FEW if few else CLEAR_AS_DISCS) * self.needed()
         return [
             (i, j)
             for j in range(len(discs))
             for i in range(j)
-            if (weak[i] or weak[j]) and is_near(discs[i], discs[j])
+            if (weak[i] or weak[j]) and is_near(discs[i], discs[j], reach)
         ]
 
     def shaped(self, answer: Answer) -> Answer:

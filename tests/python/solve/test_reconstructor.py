@@ -383,6 +383,7 @@ BAD_OPTIONS = [
     ({"row_gains": 2}, "row_gains"),
     ({"touch_test": -1}, "touch_test"),
     ({"noise_floor_v": float("nan")}, "noise_floor_v"),
+    ({"test_columns": -1}, "test_columns"),
     ({"iteration": 5}, "'iteration' is unknown; did you mean 'iterations'"),
 ]
 
