@@ -14,24 +14,9 @@ eits_real eits_excess(const eits_context *ctx, eits_real misfit, uint32_t count)
     return of > 1 ? of : 1;
 }
 
-<<<<<<< HEAD
-static int is_near(const eits_disc *a, const eits_disc *b)
-{
-    const eits_real dx = a->x_mm - b->x_mm, dy = a->y_mm - b->y_mm,
-                    reach = EITS_MERGE_REACH * (a->radius_mm + b->radius_mm);
-    /* a conducting and an insulating touch are never one */
-    return a->polarity == b->polarity && eits_fma(dx, dx, dy * dy) < reach * reach;
-}
-
-int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real needed)
-{
-    /* Two clear discs are two, however near; a weak one may be what the other's shape leaves over.
-     */
-    const eits_real weaker = v->rise[i] < v->rise[j] ? v->rise[i] : v->rise[j];
-    return weaker < EITS_CLEAR_AS_DISCS * needed && is_near(&v->answer.disc[i], &v->answer.disc[j]);
-=======
-/* Two discs that lie along one long touch are further apart, and each is worth much beside the
- * other; to try all such pairs of a crowd would cost too much. */
+/* Two clear discs are two, however near; a weak one may be what the other's shape leaves over. Two
+ * that lie along one long touch are further apart, and each is worth much; to try all such pairs of
+ * a crowd would cost too much. A conducting and an insulating touch are never one. */
 int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real needed)
 {
     const int few = v->answer.count <= EITS_FEW_DISCS;
@@ -43,7 +28,6 @@ int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real nee
                             (a->radius_mm + b->radius_mm);
     return a->polarity == b->polarity && weaker < clear * needed &&
            eits_fma(dx, dx, dy * dy) < reach * reach;
->>>>>>> 58fa0ee9 (Two discs along one long touch are tried as one where there are few; the options' table of ranges has test_columns)
 }
 
 int eits_any_may_be_one(const eits_verdict *v, eits_real needed)
