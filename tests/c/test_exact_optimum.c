@@ -17,32 +17,13 @@ enum { SIDE = 9, N = SIDE * SIDE, RANK = 12, MANY = 200000 };
 static const eits_solver SOLVERS[] = {EITS_SOLVER_COORDINATE, EITS_SOLVER_ACTIVE_SET};
 static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-} bench;
+static dense_bench b;
 
-static bench b;
-
-static void tear_down(bench *b)
+static eits_context *set_up(dense_bench *b, small_spec spec, int prepared)
 {
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
-static eits_context *open_made(bench *b, int prepared)
-{
-    small_context_open(&b->c, &b->made, prepared);
-    small_new_data(b->c.ctx, 61);
-    return b->c.ctx;
-}
-
-static eits_context *set_up(bench *b, small_spec spec, int prepared)
-{
-    tear_down(b);
-    memset(b, 0, sizeof *b);
-    b->made = small_model_make(spec);
-    return open_made(b, prepared);
+    eits_context *ctx = dense_bench_open(b, spec, prepared);
+    small_new_data(ctx, 61);
+    return ctx;
 }
 
 /* lambda: a fraction of the greatest correlation. */
@@ -133,7 +114,7 @@ static void columns_that_depend(void)
         for (int near = 0; near < 2; ++near) {
             for (int sign = 0; sign < 3; ++sign) {
                 for (int l = 0; l < 3; ++l) {
-                    tear_down(&b);
+                    dense_bench_close(&b);
                     b.made = small_model_make(
                         (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
                     uint32_t size;
@@ -148,7 +129,9 @@ static void columns_that_depend(void)
                         values[j % RANK] *= near ? 1.0001f : 1.0f;
                     }
                     small_model_seal(&b.made);
-                    eits_context *ctx = open_made(&b, l % 2);
+                    small_context_open(&b.c, &b.made, l % 2);
+                    eits_context *ctx = b.c.ctx;
+                    small_new_data(ctx, 61);
                     const eits_info info = solve(ctx, SOLVERS[s], 50000, (eits_sign)sign,
                                                  l == 0   ? 1e-4
                                                  : l == 1 ? 0.02
@@ -181,7 +164,7 @@ static void same_bits_in_every_layout(void)
 {
     for (int s = 0; s < 2; ++s) {
         for (int storage = 0; storage < 4; ++storage) {
-            bench b[4] = {0};
+            dense_bench b[4] = {0};
             for (int way = 0; way < 4; ++way) {
                 eits_context *ctx = set_up(
                     &b[way],
@@ -195,7 +178,7 @@ static void same_bits_in_every_layout(void)
                              sizeof *eits_get_info(ctx)) == 0);
             }
             for (int way = 0; way < 4; ++way)
-                tear_down(&b[way]);
+                dense_bench_close(&b[way]);
         }
     }
 }
@@ -339,6 +322,6 @@ int main(void)
     it_never_rises();
     beside_a_basis();
     numbers_that_cannot_be();
-    tear_down(&b);
+    dense_bench_close(&b);
     return checks_report("exact solvers");
 }

@@ -1,5 +1,6 @@
 /* Ids that follow touches from frame to frame. */
 #include "check.h"
+#include "dense.h"
 #include "small_model.h"
 
 #include "base/vec.h"
@@ -11,28 +12,13 @@
 #include <math.h>
 #include <string.h>
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-} bench;
+static dense_bench b;
 
-static bench b;
-
-static void tear_down(bench *b)
+static eits_context *set_up(dense_bench *b, double follow_mm)
 {
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
-static eits_context *set_up(bench *b, double follow_mm)
-{
-    tear_down(b);
-    b->made = small_model_make((small_spec){.rank = 3, .side = 3});
-    small_context_open(&b->c, &b->made, 0);
-    eits_options o = *eits_get_options(b->c.ctx);
-    o.follow_mm = (eits_real)follow_mm;
-    CHECK_EQUAL(eits_set_options(b->c.ctx, &o), EITS_OK);
-    return b->c.ctx;
+    eits_context *ctx = dense_bench_open(b, (small_spec){.rank = 3, .side = 3}, 0);
+    CHANGE_OPTIONS(ctx, o.follow_mm = (eits_real)follow_mm);
+    return ctx;
 }
 
 static eits_touch at(double x, double y)
@@ -150,10 +136,8 @@ static void zero_is_never_an_id(void)
  * and is another. */
 static void through_the_whole_core(void)
 {
-    tear_down(&b);
-    b.made = small_model_make((small_spec){.rank = 64, .side = 20, .shape = SMALL_WAVES});
-    small_context_open(&b.c, &b.made, 0);
-    eits_context *ctx = b.c.ctx;
+    eits_context *ctx =
+        dense_bench_open(&b, (small_spec){.rank = 64, .side = 20, .shape = SMALL_WAVES}, 0);
     static const struct {
         double x, y, change;
         uint32_t id;
@@ -189,6 +173,6 @@ int main(void)
     all_of_a_full_house();
     following_may_be_off();
     zero_is_never_an_id();
-    tear_down(&b);
+    dense_bench_close(&b);
     return checks_report("touch ids");
 }

@@ -1,6 +1,7 @@
 /* Touches followed in time: tracks that start once confirmed and end after the hold, places
  * smoothed. */
 #include "check.h"
+#include "dense.h"
 #include "small_model.h"
 
 #include "base/vec.h"
@@ -9,26 +10,12 @@
 
 #include <math.h>
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-} bench;
-
-static bench b;
-
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
+static dense_bench b;
 
 /* A 120 mm square around the origin; a frame whose S'y is ten times that of noise. */
-static eits_context *set_up(bench *b, uint32_t confirm, uint32_t hold, double smooth)
+static eits_context *set_up(dense_bench *b, uint32_t confirm, uint32_t hold, double smooth)
 {
-    tear_down(b);
-    b->made = small_model_make((small_spec){.rank = 8, .side = 20});
-    small_context_open(&b->c, &b->made, 0);
-    eits_context *ctx = b->c.ctx;
+    eits_context *ctx = dense_bench_open(b, (small_spec){.rank = 8, .side = 20}, 0);
     CHANGE_OPTIONS(ctx, o.track_confirm = confirm, o.track_hold = hold,
                    o.track_smooth = (eits_real)smooth);
     ctx->info.lambda_max = 10;
@@ -323,6 +310,6 @@ int main(void)
     held_in_motion();
     extremes();
     switched();
-    tear_down(&b);
+    dense_bench_close(&b);
     return checks_report("track in time");
 }

@@ -19,27 +19,13 @@ enum { SIDE = 9, N = SIDE * SIDE, RANK = 12 };
 
 static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-} bench;
+static dense_bench b;
 
-static bench b;
-
-static void tear_down(bench *b)
+static eits_context *set_up(dense_bench *b, small_spec spec, int prepared)
 {
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
-static eits_context *set_up(bench *b, small_spec spec, int prepared)
-{
-    tear_down(b);
-    memset(b, 0, sizeof *b);
-    b->made = small_model_make(spec);
-    small_context_open(&b->c, &b->made, prepared);
-    small_new_data(b->c.ctx, 61);
-    return b->c.ctx;
+    eits_context *ctx = dense_bench_open(b, spec, prepared);
+    small_new_data(ctx, 61);
+    return ctx;
 }
 
 static eits_options with(const eits_context *ctx, eits_solver solver, uint32_t iterations,
@@ -88,7 +74,7 @@ static void looking_always_gives_the_bits_of_fista(void)
         for (int sign = 0; sign < 3; ++sign) {
             for (int prepared = 0; prepared < 2; ++prepared) {
                 for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
-                    bench b[2] = {0};
+                    dense_bench b[2] = {0};
                     for (int solver = 0; solver < 2; ++solver) {
                         eits_context *ctx = set_up(&b[solver],
                                                    (small_spec){.rank = RANK,
@@ -105,8 +91,8 @@ static void looking_always_gives_the_bits_of_fista(void)
                     }
                     CHECK(eits_get_info(b[0].c.ctx)->nonzeros > 0);
                     check_same(b[0].c.ctx, b[1].c.ctx);
-                    tear_down(&b[0]);
-                    tear_down(&b[1]);
+                    dense_bench_close(&b[0]);
+                    dense_bench_close(&b[1]);
                 }
             }
         }
@@ -118,7 +104,7 @@ static void looking_always_recovers_like_fista(void)
 {
     static const double factors[] = {1.0 / 3, 1.0 / 16, 1e-9};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
-        bench b[2] = {0};
+        dense_bench b[2] = {0};
         for (int solver = 0; solver < 2; ++solver) {
             eits_context *ctx = set_up(
                 &b[solver],
@@ -129,8 +115,8 @@ static void looking_always_recovers_like_fista(void)
         }
         CHECK(eits_get_info(b[0].c.ctx)->step_halvings > 0);
         check_same(b[0].c.ctx, b[1].c.ctx);
-        tear_down(&b[0]);
-        tear_down(&b[1]);
+        dense_bench_close(&b[0]);
+        dense_bench_close(&b[1]);
     }
 }
 
@@ -184,7 +170,7 @@ static void the_optimum_is_that_of_all_columns(void)
 static void same_bits_in_every_layout(void)
 {
     for (int storage = 0; storage < 4; ++storage) {
-        bench b[4] = {0};
+        dense_bench b[4] = {0};
         for (int way = 0; way < 4; ++way) {
             eits_context *ctx = set_up(
                 &b[way], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
@@ -195,14 +181,14 @@ static void same_bits_in_every_layout(void)
             CHECK(eits_get_info(ctx)->macs == eits_get_info(b[0].c.ctx)->macs);
         }
         for (int way = 0; way < 4; ++way)
-            tear_down(&b[way]);
+            dense_bench_close(&b[way]);
     }
 }
 
 /* Rows left out and the drift of the gain: the same projections as FISTA's. */
 static void beside_a_basis(void)
 {
-    bench b[2] = {0};
+    dense_bench b[2] = {0};
     for (int solver = 0; solver < 2; ++solver) {
         eits_context *ctx = set_up(&b[solver], RANDOM, 0);
         eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
@@ -220,8 +206,8 @@ static void beside_a_basis(void)
     }
     CHECK(eits_get_info(b[0].c.ctx)->nonzeros >= 3);
     check_same(b[0].c.ctx, b[1].c.ctx);
-    tear_down(&b[0]);
-    tear_down(&b[1]);
+    dense_bench_close(&b[0]);
+    dense_bench_close(&b[1]);
 }
 
 /* From the optimum a warm start stays there; what it starts from is all of the last frame's
@@ -356,6 +342,6 @@ int main(void)
     refused_options();
     violations_nearby();
     zeros_at_rest_are_pruned();
-    tear_down(&b);
+    dense_bench_close(&b);
     return checks_report("working set");
 }

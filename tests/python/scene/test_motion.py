@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.python.scene.scene_helpers import moving_scene, still_scene
+from scene_helpers import moving_scene, still_scene
 
 from eitskin.device.bank import BANK_BYTES, bank_bytes
 from eitskin.device.client import Device
