@@ -79,6 +79,7 @@
 #define FLASH_BASE            0x40023C00u
 #define FLASH_ACR             REG32(FLASH_BASE + 0x00u)
 #define FLASH_KEYR            REG32(FLASH_BASE + 0x04u)
+#define FLASH_OPTKEYR         REG32(FLASH_BASE + 0x08u)
 #define FLASH_SR              REG32(FLASH_BASE + 0x0Cu)
 #define FLASH_CR              REG32(FLASH_BASE + 0x10u)
 #define FLASH_OPTCR           REG32(FLASH_BASE + 0x14u)
@@ -98,9 +99,14 @@
 #define FLASH_CR_PSIZE_POS    8u
 #define FLASH_CR_STRT         (1u << 16)
 #define FLASH_CR_LOCK         (1u << 31)
+#define FLASH_OPTCR_OPTLOCK   (1u << 0)
+#define FLASH_OPTCR_OPTSTRT   (1u << 1)
+#define FLASH_OPTCR_BOR_POS   2u
 #define FLASH_OPTCR_NDBANK    (1u << 29)
 #define FLASH_KEY1            0x45670123u
 #define FLASH_KEY2            0xCDEF89ABu
+#define FLASH_OPTKEY1         0x08192A3Bu
+#define FLASH_OPTKEY2         0x4C5D6E7Fu
 
 /* ---- GPIO, chapter 6 ---- */
 #define GPIOA_BASE         0x40020000u

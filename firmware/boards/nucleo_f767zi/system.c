@@ -20,6 +20,24 @@ void nucleo_interrupt(uint32_t irq, uint32_t urgency)
     NVIC_ISER(irq / 32u) = 1u << (irq % 32u);
 }
 
+/* Brown-out reset at its highest level (0 in BOR_LEV: below 2.7 V at the latest), where it is not:
+ * a supply that falls faster than the detector's interrupt runs leaves no processor that drives.
+ * Once in a board's life; not while the supply is low, and the other option bytes as they are. */
+static void set_brown_out(void)
+{
+    const uint32_t options = FLASH_OPTCR, level = 3u << FLASH_OPTCR_BOR_POS;
+    if ((options & level) == 0 || (PWR_CSR1 & PWR_CSR1_PVDO) != 0)
+        return;
+    FLASH_OPTKEYR = FLASH_OPTKEY1;
+    FLASH_OPTKEYR = FLASH_OPTKEY2;
+    FLASH_OPTCR = options & ~(level | FLASH_OPTCR_OPTLOCK);
+    FLASH_OPTCR |= FLASH_OPTCR_OPTSTRT;
+    DSB();
+    while ((FLASH_SR & FLASH_SR_BSY) != 0)
+        ;
+    FLASH_OPTCR |= FLASH_OPTCR_OPTLOCK;
+}
+
 void nucleo_system_start(void)
 {
     SCB_SHCSR |= SCB_SHCSR_MEMFAULTENA | SCB_SHCSR_BUSFAULTENA | SCB_SHCSR_USGFAULTENA;
@@ -53,6 +71,7 @@ void nucleo_system_start(void)
     EXTI_RTSR |= EXTI_IMR_MR16;
     EXTI_IMR |= EXTI_IMR_MR16;
     nucleo_interrupt(IRQ_PVD, 0);
+    set_brown_out(); /* before the watchdog: it takes as long as the erase of a sector */
 
     IWDG_KR = 0xCCCCu;
     IWDG_KR = 0x5555u;

@@ -9,6 +9,7 @@ from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin.emulator.memory import BANK_BYTES
 from eitskin.errors import DeviceError
+from emulated import board_of, connect, power_up
 
 OPEN = "FLASH_KEYR = 0x45670123u; FLASH_KEYR = 0xCDEF89ABu;"
 WAIT = "while (FLASH_SR & FLASH_SR_BSY) ;"
@@ -158,3 +159,42 @@ def test_an_image_or_bank_that_is_too_long_is_refused() -> None:
         EmulatedBoard(bytes(262145), flat_skin())
     with pytest.raises(DeviceError, match="a bank has"):
         EmulatedBoard(bytes(100), flat_skin(), (bytes(BANK_BYTES + 1),))
+
+
+OPTION_KEYS = "FLASH_OPTKEYR = 0x08192A3Bu; FLASH_OPTKEYR = 0x4C5D6E7Fu;"
+
+
+@pytest.mark.parametrize(
+    ("body", "options", "hazards"),
+    [
+        (OPTION_KEYS + "FLASH_OPTCR = 0xFFFFAAF0u; FLASH_OPTCR |= 2u;" + WAIT, 0xFFFFAAF1, 0),
+        (OPTION_KEYS + "FLASH_OPTCR = 0xFFFFAAF0u;", 0xFFFFAAFD, 0),  # never started
+        ("FLASH_OPTCR = 0xFFFFAAF2u;", 0xFFFFAAFD, 1),
+        ("FLASH_OPTKEYR = 1u; FLASH_OPTCR = 0xFFFFAAF2u;", 0xFFFFAAFD, 2),
+    ],
+)
+def test_option_bytes_want_keys_and_a_start_and_outlive_a_reset(
+    body: str, options: int, hazards: int
+) -> None:
+    board = flashed(body)
+    assert sum(board.record.hazards.values()) == hazards
+    board.flash.reset()
+    assert board.flash.read(0x14, 4) == options
+
+
+def test_the_image_sets_the_brown_out_level_once_and_nothing_else(image: bytes) -> None:
+    """BOR_LEV, bits 2 and 3, is 0: level 3, the highest."""
+    board = board_of(connect(power_up(image, noisy=False)))
+    for _ in range(2):
+        assert board.flash.read(0x14, 4) == 0xFFFFAAF1
+        assert board.flash.options_programmed == 1
+        board.lose_power()
+        board.run_until(board.clock.now + TICKS_PER_S)
+    assert not board.record.hazards
+
+
+def test_option_bytes_are_left_alone_while_the_supply_is_low(image: bytes) -> None:
+    board = EmulatedBoard(image, flat_skin(), ())
+    board.drop_supply(True)
+    board.run_until(round(0.1 * TICKS_PER_S))
+    assert board.flash.options_programmed == 0

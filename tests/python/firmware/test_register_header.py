@@ -40,7 +40,7 @@ RENAMED = {
     "RCC_PLLCFGR_PLLN": "PLLN0",
     "RCC_PLLCFGR_PLLP": "PLLP0", "RCC_PLLCFGR_PLLQ": "PLLQ0",
     "RCC_AHB1ENR_DTCMRAMEN": "CCMDATARAMEN",
-    "FLASH_ACR_ARTEN": "ICEN", "FLASH_SR_ERSERR": "PGSERR",
+    "FLASH_OPTCR_BOR": "BOR_LEV", "FLASH_ACR_ARTEN": "ICEN", "FLASH_SR_ERSERR": "PGSERR",
 }  # fmt: skip
 # In neither file.
 ONLY_F7 = {
@@ -109,7 +109,7 @@ def test_everything_in_the_header_was_read() -> None:
         | set(BITS)
         | {f"{name}_POS" for name in POSITIONS}
     )
-    constants = {"FLASH_KEY1", "FLASH_KEY2", "SCB_AIRCR_SYSRESETREQ", "UID", "DCB_DEMCR"}
+    constants = {"FLASH_KEY1", "FLASH_KEY2", "FLASH_OPTKEY1", "FLASH_OPTKEY2", "SCB_AIRCR_SYSRESETREQ", "UID", "DCB_DEMCR"}
     assert {name for name in defined - read - constants if not name.startswith("IRQ_")} == set()
     assert len(REGISTERS) > 80 and len(BITS) > 80 and len(POSITIONS) > 20
 

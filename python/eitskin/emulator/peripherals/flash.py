@@ -5,7 +5,8 @@ One bank: while it erases or programs, the processor that runs from it stands st
 rest go on. Times are the data sheet's typical ones at 32-bit parallelism (STM32F767xx data sheet,
 table "Flash memory programming"). Cells go from 1 to 0 only. While PG is set, the piece of flash
 that holds a bank is registers to the processor; the program's own 256 KB cannot be programmed here
-(recorded). Option bytes are read only. A loss of power never falls into an erase: that is one step.
+(recorded). Option bytes take keys, a word in OPTCR and its start bit, and stay as they are over
+resets; OPTCR1 is read only. A loss of power never falls into an erase: that is one step.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from eitskin.emulator.record import Record
 
 ACR, KEYR, OPTKEYR, SR, CR, OPTCR, OPTCR1 = (4 * k for k in range(7))
 KEYS = (0x45670123, 0xCDEF89AB)
+OPTION_KEYS = (0x08192A3B, 0x4C5D6E7F)
+OPTLOCK, OPTSTRT = 1 << 0, 1 << 1
 PG, SER, MER, STRT, LOCK = 1 << 0, 1 << 1, 1 << 2, 1 << 16, 1 << 31
 EOP, PGPERR, ERSERR = 1 << 0, 1 << 6, 1 << 7
 WORD_TICKS = 16 * TICKS_PER_US
@@ -55,6 +58,8 @@ class FlashInterface(Registers):
         super().__init__(record, RESET_VALUES)
         self._memories, self._stall, self._after_slice = memories, stall, after_slice
         self._keys: list[int] = []
+        self._option_keys: list[int] = []
+        self._options, self.options_programmed = RESET_VALUES[OPTCR], 0
         self._open_pieces = False
         self._barred = False
         self.words_programmed = self.sectors_erased = self.not_erased = 0
@@ -62,8 +67,8 @@ class FlashInterface(Registers):
 
     def reset(self) -> None:
         """As after a reset."""
-        self.values = dict(self.reset_values)
-        self._keys, self._barred = [], False
+        self.values = {**self.reset_values, OPTCR: self._options}
+        self._keys, self._option_keys, self._barred = [], [], False
         self._follow()
 
     def wait_states(self) -> int:
@@ -80,7 +85,15 @@ class FlashInterface(Registers):
             self.values[SR] &= ~value
         elif offset == CR:
             self._control(value)
-        elif offset in (OPTKEYR, OPTCR, OPTCR1):
+        elif offset == OPTKEYR:
+            self._option_keys.append(value)
+            if tuple(self._option_keys) == OPTION_KEYS:
+                self.values[OPTCR] &= ~OPTLOCK
+            elif tuple(self._option_keys) != OPTION_KEYS[:1]:
+                self.hazard("wrong key of the option bytes")
+        elif offset == OPTCR:
+            self._option_control(value)
+        elif offset == OPTCR1:
             self.unmodelled("option bytes written")
         else:
             super().write(offset, size, value)
@@ -93,6 +106,18 @@ class FlashInterface(Registers):
         elif len(self._keys) == 2:
             self._keys = []
             self.values[CR] &= ~LOCK
+
+    def _option_control(self, value: int) -> None:
+        if self.values[OPTCR] & OPTLOCK:
+            self.hazard("OPTCR written while it is locked")
+            return
+        self.values[OPTCR] = value & ~OPTSTRT
+        if value & OPTSTRT:
+            self._options = value & ~OPTSTRT | OPTLOCK
+            self.options_programmed += 1
+            self._stall(ERASE_TICKS[32])
+        if value & OPTLOCK:
+            self._option_keys = []
 
     def _control(self, value: int) -> None:
         if self.values[CR] & LOCK:
