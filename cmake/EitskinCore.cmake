@@ -13,7 +13,7 @@ set(EITSKIN_CORE_SOURCES
     diagnostics/crowded.c diagnostics/reference_outliers.c
     solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c solve/coordinate_descent.c
     solve/active_set.c solve/violations.c solve/active_columns.c
-    touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c
+    touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c touch/seek.c
     touch/touch.c touch/tracker.c
     evidence/covariance.c evidence/shape.c evidence/likelihood.c evidence/verdict.c
     evidence/elimination.c evidence/touch_test.c

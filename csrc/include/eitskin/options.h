@@ -112,6 +112,9 @@ typedef struct eits_options {
     uint32_t mac_limit;
     /* the diagnostics that are looked for, a bit each */
     uint32_t diagnostics;
+    /* 1: discs start where the data answer most, one after the other, each sought again beside the
+     * others, and not at the image's peaks; the default in taught models */
+    uint32_t touch_seek;
     /* parts of the touch fit, a bit each; all but those that the model leaves out by default */
     uint32_t touch_fit;
     /* 1: where more than one touch is found, eits_find_touches solves again with their interaction

@@ -29,6 +29,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
     options->project_reference = (d->touch_fit_left_out & EITS_GAIN_DRIFT_KEPT) == 0;
     options->reference_frames =
         (d->touch_fit_left_out & EITS_REFERENCE_FOLLOWS) != 0 ? EITS_FOLLOW_FRAMES : 0;
+    options->touch_seek = !options->project_reference; /* in a taught model */
     return EITS_OK;
 }
 

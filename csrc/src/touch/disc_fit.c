@@ -84,6 +84,21 @@ void eits_fit_restart(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     }
 }
 
+eits_fit_kept eits_fit_keep(const eits_context *ctx, const eits_fit *f)
+{
+    eits_fit_kept kept = {.count = f->count, .left = eits_fit_left(ctx, f)};
+    memcpy(kept.disc, f->disc, sizeof kept.disc);
+    return kept;
+}
+
+void eits_fit_undo(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
+                   const eits_fit_kept *kept)
+{
+    memcpy(f->disc, kept->disc, sizeof kept->disc);
+    f->count = kept->count;
+    eits_fit_restart(ctx, scratch, f);
+}
+
 /* Solve H s = g for the step, H symmetric: scaled to a unit diagonal, damped, Cholesky. A parameter
  * that nothing depends on, or that rounding makes dependent, does not move.
  *

@@ -5,6 +5,14 @@
 
 #include "touch/disc.h"
 
+/* Enough to undo a trial: atoms and residual follow from the discs, and cost less to compute again,
+ * seldom, than to keep. */
+typedef struct eits_fit_kept {
+    eits_disc disc[EITS_MAX_TOUCHES];
+    uint32_t count;
+    eits_real left; /* |residual|^2 */
+} eits_fit_kept;
+
 typedef struct eits_fit {
     eits_disc disc[EITS_MAX_TOUCHES];
     /* what leaving it out would add to |residual|^2, relative to |y|^2 */
@@ -60,6 +68,11 @@ void eits_fit_strengths(eits_context *ctx, const eits_scratch *scratch, eits_fit
 /* Atoms and residual of the discs as they are; after a change of discs or data. */
 void eits_fit_restart(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
+/* The discs as they are, and back to them. */
+eits_fit_kept eits_fit_keep(const eits_context *ctx, const eits_fit *f);
+void eits_fit_undo(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
+                   const eits_fit_kept *kept);
+
 /* The change that explains `target` best along `atom`, of the disc's own sign. */
 eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const eits_real *atom,
                            const eits_real *target);
@@ -94,6 +107,11 @@ int eits_fit_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* A disc becomes two where they explain clearly more. Returns 1 where any did. */
 int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
+
+/* seek.c */
+
+/* Discs of the data without the image, each where what the others leave answers most. */
+void eits_fit_seek(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* touch.c */
 

@@ -18,28 +18,6 @@
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-/* Enough to undo a trial: atoms and residual follow from the discs, and cost less to compute again,
- * seldom, than to keep. */
-typedef struct saved {
-    eits_disc disc[EITS_MAX_TOUCHES];
-    uint32_t count;
-    eits_real left; /* |residual|^2 */
-} saved;
-
-static saved save(const eits_context *ctx, const eits_fit *f)
-{
-    saved s = {.count = f->count, .left = eits_fit_left(ctx, f)};
-    memcpy(s.disc, f->disc, sizeof s.disc);
-    return s;
-}
-
-static void restore(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, const saved *s)
-{
-    memcpy(f->disc, s->disc, sizeof s->disc);
-    f->count = s->count;
-    eits_fit_restart(ctx, scratch, f);
-}
-
 static eits_real lesser(eits_real a, eits_real b)
 {
     return a < b ? a : b;
@@ -113,7 +91,7 @@ eits_disc eits_merged_disc(const eits_options *o, const eits_disc *a, const eits
 static int try_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, const pair *p)
 {
     const uint32_t rank = ctx->model->rank;
-    const saved before = save(ctx, f);
+    const eits_fit_kept before = eits_fit_keep(ctx, f);
     f->disc[p->i] = eits_merged_disc(&ctx->options, &f->disc[p->i], &f->disc[p->j]);
     --f->count;
     for (uint32_t k = p->j; k < f->count; ++k)
@@ -130,7 +108,7 @@ static int try_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
                           EITS_DIRECTIONS_OF_NOISE * f->noise / (eits_real)rank));
     if (eits_fit_left(ctx, f) <= before.left + more)
         return 1;
-    restore(ctx, scratch, f, &before);
+    eits_fit_undo(ctx, scratch, f, &before);
     return 0;
 }
 
@@ -238,7 +216,7 @@ static two best_two(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
 static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
     const uint32_t last = f->count;
-    const saved before = save(ctx, f);
+    const eits_fit_kept before = eits_fit_keep(ctx, f);
     const two begin = best_two(ctx, scratch, f, k);
     if (begin.left < 0 || begin.left > EITS_SPLIT_FIRST * before.left)
         return 0;
@@ -259,7 +237,7 @@ static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
     if (left <= EITS_SPLIT_GAIN * before.left && before.left - left >= min &&
         edge_distance(&f->disc[k], &f->disc[last]) > EITS_SPLIT_DISTANCE)
         return 1;
-    restore(ctx, scratch, f, &before);
+    eits_fit_undo(ctx, scratch, f, &before);
     return 0;
 }
 

@@ -5,7 +5,8 @@
  * Place, radius and strength come from the data themselves, by a model with few unknowns
  * (disc_fit.c). The order of stages:
  *
- *   1. peaks of the image, at most max_touches, as discs of one radius; strengths
+ *   1. peaks of the image, at most max_touches, as discs of one radius; strengths. Or discs sought
+ *      in the data (seek.c)
  *   2. places and radii, to log data where there are any; pruning
  *   3. merging, then the touches' interaction taken out of the data, and places again, in turn
  *   4. merging and splitting, in turn with 3
@@ -97,14 +98,18 @@ static void begin(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const eits_options *o = &ctx->options;
     f->data = ctx->frame.has_y_log && o->touch_sweeps > 0 ? ctx->frame.y_log : ctx->frame.y;
-    seed(ctx, scratch, f);
-    eits_fit_strengths(ctx, scratch, f);
-    if (o->touch_change_s_per_m > 0) {
-        for (uint32_t k = 0; k < f->count; ++k)
-            f->disc[k].radius_mm = eits_expected_radius(o, &f->disc[k]);
+    if (o->touch_seek && o->touch_sweeps > 0) {
+        eits_fit_seek(ctx, scratch, f);
+    } else {
+        seed(ctx, scratch, f);
         eits_fit_strengths(ctx, scratch, f);
+        if (o->touch_change_s_per_m > 0) {
+            for (uint32_t k = 0; k < f->count; ++k)
+                f->disc[k].radius_mm = eits_expected_radius(o, &f->disc[k]);
+            eits_fit_strengths(ctx, scratch, f);
+        }
+        eits_fit_move_all(ctx, scratch, f, o->touch_sweeps - later(ctx));
     }
-    eits_fit_move_all(ctx, scratch, f, o->touch_sweeps - later(ctx));
     eits_fit_prune(ctx, scratch, f);
 }
 

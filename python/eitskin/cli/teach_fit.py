@@ -96,7 +96,7 @@ def report_lines(report: dict[str, Any]) -> list[str]:
         f" as the core solves presses held out {error['held_out_median']:.1f},"
         f" {error['held_out_p95']:.1f}",
         f"counted as one   {100 * report['counted_as_one']:.0f} % of presses held out,"
-        f" lambda_rel {report['lambda_rel']:g}",
+        f" each touch explains {100 * report['least_share']:g} % of the data's energy",
         f"noise            {100 * report['noise']['of_a_press']:.0f} % of a press",
         "more presses     "
         + ", ".join(

@@ -47,6 +47,9 @@ class OptionFields:
     # weight of the radius so expected against the data, relative to the touch's own energy
     touch_radius_weight: float
     follow_mm: float  # a touch that moved at most so far since the last frame keeps its id
+    # 1: discs start where the data answer most, one after the other, each sought again beside the
+    # others, and not at the image's peaks; the default in taught models
+    touch_seek: bool
     # parts of the touch fit, a bit each; all but those that the model leaves out by default
     touch_fit: int
     # > 0: between touches the reference follows the untouched skin, with this time constant in

@@ -28,6 +28,7 @@ def default_options(model: Model) -> Options:
         touch_fit=ALL_TOUCH_FIT & ~d.touch_fit_left_out,
         project_reference=not d.touch_fit_left_out & GAIN_DRIFT_KEPT,
         reference_frames=FOLLOW_FRAMES if d.touch_fit_left_out & REFERENCE_FOLLOWS else 0,
+        touch_seek=bool(d.touch_fit_left_out & GAIN_DRIFT_KEPT),
     )
 
 

@@ -24,6 +24,7 @@ from eitskin.model.model import Model
 from eitskin.reference.confidence import miscounted, rated
 from eitskin.reference.disc_fit import Disc, Fit, Reduced
 from eitskin.reference.evidence import DataErrors, keep_likely
+from eitskin.reference.seek import seek
 from eitskin.reference.split_merge import join, part
 
 FloatArray = npt.NDArray[np.float64]
@@ -51,12 +52,15 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
 
     fit.radius_weight = o.touch_radius_weight * (EARLY_RADIUS if interplay is not None else 1.0)
     fit.data = frame.straight if frame.straight is not None and o.touch_sweeps > 0 else frame.y
-    fit.seed(image)
-    fit.fit_strengths()
-    if o.touch_change_s_per_m > 0:
-        fit.discs = [replace(disc, radius_mm=fit.expected_radius(disc)) for disc in fit.discs]
+    if o.touch_seek and o.touch_sweeps > 0:
+        seek(fit)
+    else:
+        fit.seed(image)
         fit.fit_strengths()
-    fit.move_all(o.touch_sweeps - later)
+        if o.touch_change_s_per_m > 0:
+            fit.discs = [replace(disc, radius_mm=fit.expected_radius(disc)) for disc in fit.discs]
+            fit.fit_strengths()
+        fit.move_all(o.touch_sweeps - later)
     explained = fit.keep_real()
     if o.touch_sweeps == 0:
         return explained

@@ -24,6 +24,7 @@ KNOWN_ROUNDS, UNKNOWN_ROUNDS = 3, 8
 NEAR = 0.18  # of the skin's width: presses that near are compared to begin with
 SCALE_SD = 0.05  # of log scale: a skin is about as large as it is described
 LOG_BOUND = 12.0
+LEAST_SHRINKAGE = 0.5  # residuals are not normal: the formula alone trusts too much
 PLACE_ROUNDS, PLACE_KEPT = 5, 0.3
 
 
@@ -146,7 +147,9 @@ def noise_of(residual: FloatArray) -> Noise:
     second = (x**2).T @ (x**2) / count
     off = ~np.eye(rows, dtype=bool)
     uncertain = (second - correlation**2)[off].sum() / max(count - 1, 1)
-    shrinkage = float(np.clip(uncertain / max((correlation[off] ** 2).sum(), 1e-300), 0.01, 1))
+    shrinkage = float(
+        np.clip(uncertain / max((correlation[off] ** 2).sum(), 1e-300), LEAST_SHRINKAGE, 1)
+    )
     correlation = np.where(off, (1 - shrinkage) * correlation, 1.0)
     sd = np.sqrt(variance)
     covariance = sd[:, None] * correlation * sd

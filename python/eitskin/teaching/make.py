@@ -23,16 +23,18 @@ from eitskin.teaching.fit import Learned
 FloatArray = npt.NDArray[np.float64]
 
 RANK = 64
-LAMBDA_RELS = (0.1, 0.2, 0.3, 0.5, 0.7)
+LAMBDA_REL = 0.2  # of the image alone: touches are sought in the data
+# of |y|^2 that each touch must explain beside the others
+LEAST_SHARES = (0.01, 0.013, 0.016, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06, 0.08, 0.12)
 
 
-def taught_defaults(grid: Grid, lambda_rel: float) -> Defaults:
-    """What suits a taught model: exact solutions, discs of a pixel, no search among them."""
+def taught_defaults(grid: Grid, least_share: float) -> Defaults:
+    """What suits a taught model: exact solutions, discs of a pixel sought in the data."""
     return Defaults(
         iterations=200,
-        lambda_rel=lambda_rel,
+        lambda_rel=LAMBDA_REL,
         touch_threshold=0.05,
-        touch_min_fraction=0.03,
+        touch_min_fraction=least_share,
         touch_min_radius_mm=grid.pixel_mm,
         touch_max_radius_mm=grid.pixel_mm,
         touch_seed_radius_mm=grid.pixel_mm,
@@ -54,7 +56,7 @@ def taught_model(
     protocol: Protocol,
     grid: Grid,
     untouched: FloatArray,
-    lambda_rel: float,
+    least_share: float,
     meta: dict[str, Any] | None = None,
     storage: str = "f32",
     rank: int = RANK,
@@ -86,7 +88,7 @@ def taught_model(
         precision=_precision(learned, float(s[0])),
         lipschitz=float(np.float32(spectral_norm_squared(decoded) * (1 + LIPSCHITZ_MARGIN))),
         noise_gain=float(np.float32(noise_gain(projection, decoded))),
-        defaults=taught_defaults(grid, lambda_rel),
+        defaults=taught_defaults(grid, least_share),
         golden=Golden(
             reference, pressed.astype(np.float32), np.zeros(grid.n_pixels, dtype=np.float32)
         ),

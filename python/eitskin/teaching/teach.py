@@ -29,14 +29,16 @@ from eitskin.teaching.left_out import (
     refined_places,
     stranger_note,
 )
-from eitskin.teaching.make import LAMBDA_RELS, taught_model
+from eitskin.teaching.make import LEAST_SHARES, taught_model
 from eitskin.teaching.presses import Presses
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Iterable[Any], str], Iterable[Any]]
+# models, each with the numbers of presses that it did not know
+Tried = list[tuple[Model, npt.NDArray[np.int64]]]
 
 FEW_PRESSES = 50
-FOLDS, COUNTED_ONCE, MAX_HELD_OUT = 5, 0.97, 250
+FOLDS, COUNTED_ONCE, MAX_HELD_OUT = 5, 0.96, 250
 PIXELS_ACROSS = 32
 NOTHING = 0.1  # of a row's energy explained: it carries nothing
 OTHER_SCALE = 0.16  # of its logarithm: more is another unit or another skin
@@ -117,16 +119,16 @@ def teach(
             learned, grid, presses.place_mm, place_sd_mm, presses.difference, given, width_mm
         )
     left_out = leave_one_out(learned, grid)
-    lambda_rel, held = chosen_lambda(learned, presses, given, grid, width_mm, progress)
+    least_share, held = held_out(learned, presses, given, grid, width_mm, progress)
     meta = {"teach": {"presses": len(presses)}}
     if skin is not None:
         meta["skin"] = skin_to_table(seen_as)
-    model = taught_model(learned, presses.protocol, grid, presses.untouched, lambda_rel, meta)
+    model = taught_model(learned, presses.protocol, grid, presses.untouched, least_share, meta)
     law, law_note = size_law(presses, held, grid)
     notes += law_note
-    report = _report(presses, learned, left_out, held, lambda_rel, notes)
+    report = _report(presses, learned, left_out, held, least_share, notes)
     report["held_out_by_presses"] = learning_curve(
-        learned, presses, given, grid, width_mm, lambda_rel, held
+        learned, presses, given, grid, width_mm, least_share, held
     )
     report["fit_s"] = round(time.monotonic() - begun, 2)
     model = replace(model, load=law, meta={**model.meta, "teach": report})
@@ -204,7 +206,7 @@ def model_without(
     kept: npt.NDArray[np.int64],
     grid: Grid,
     width_mm: float,
-    lambda_rel: float,
+    least_share: float,
 ) -> Model:
     """A model of some of the presses with the kernel of all."""
     less = learn(
@@ -212,10 +214,10 @@ def model_without(
         None if given is None else given[kept], width_mm, choose=False,
         amplitude=learned.process.amplitude[kept],
     )  # fmt: skip
-    return taught_model(less, presses.protocol, grid, presses.untouched[kept], lambda_rel)
+    return taught_model(less, presses.protocol, grid, presses.untouched[kept], least_share)
 
 
-def chosen_lambda(
+def held_out(
     learned: Learned,
     presses: Presses,
     given: FloatArray | None,
@@ -223,31 +225,37 @@ def chosen_lambda(
     width_mm: float,
     progress: Progress,
 ) -> tuple[float, HeldOut]:
-    """The least lambda_rel at which presses held out, in five folds, count as one touch; and what
-    the core gives for them with it."""
+    """The least share that a touch must explain, by presses held out in five folds; and what the
+    core gives for them with it."""
     count = len(presses)
     fold = np.random.default_rng(1).permutation(count) % min(FOLDS, count)
     limit = MAX_HELD_OUT // FOLDS
-    models, tested = [], []
+    tried = []
     for k in progress(range(int(fold.max()) + 1), "held-out presses"):
-        models.append(
-            model_without(
-                learned, presses, given, np.flatnonzero(fold != k), grid, width_mm, LAMBDA_RELS[0]
-            )
+        model = model_without(
+            learned, presses, given, np.flatnonzero(fold != k), grid, width_mm, LEAST_SHARES[0]
         )
-        tested.append(np.flatnonzero(fold == k)[:limit])
-    for lambda_rel in LAMBDA_RELS:
+        tried.append((model, np.flatnonzero(fold == k)[:limit]))
+    return chosen_share(tried, presses)
+
+
+def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
+    """The least of ``LEAST_SHARES`` at which presses that a model of ``tried`` did not know count
+    as one touch, each model for its own of ``presses``; and what the core gives for them with it.
+    """
+    for share in LEAST_SHARES:
         parts = [
             solve_presses(
-                replace(one, defaults=replace(one.defaults, lambda_rel=lambda_rel)),
+                replace(one, defaults=replace(one.defaults, touch_min_fraction=share)),
                 presses.take(which),
             )
-            for one, which in zip(models, tested, strict=True)
+            for one, which in tried
         ]
         error, number, strength = (np.concatenate(part) for part in zip(*parts, strict=True))
         if np.mean(number == 1) >= COUNTED_ONCE:
             break
-    return lambda_rel, HeldOut(error, number.astype(np.int64), strength, np.concatenate(tested))
+    which = np.concatenate([which for _, which in tried])
+    return share, HeldOut(error, number.astype(np.int64), strength, which)
 
 
 def learning_curve(
@@ -256,7 +264,7 @@ def learning_curve(
     given: FloatArray | None,
     grid: Grid,
     width_mm: float,
-    lambda_rel: float,
+    least_share: float,
     held: HeldOut,
 ) -> dict[str, float]:
     """Median error by number of presses: measured with a quarter, a half and four fifths of them,
@@ -266,7 +274,7 @@ def learning_curve(
     for few in (count // 4, count // 2):
         if few < MIN_PRESSES:
             continue
-        model = model_without(learned, presses, given, order[:few], grid, width_mm, lambda_rel)
+        model = model_without(learned, presses, given, order[:few], grid, width_mm, least_share)
         points[few] = float(np.median(solve_presses(model, presses.take(order[-count // 4 :]))[0]))
     points[count * 4 // 5] = float(np.median(held.error_mm))
     sizes, errors = np.log(list(points)), np.log(list(points.values()))
@@ -306,7 +314,7 @@ def _report(
     learned: Learned,
     left_out: LeftOut,
     held: HeldOut,
-    lambda_rel: float,
+    least_share: float,
     notes: list[str],
 ) -> dict[str, Any]:
     placement, kernel = learned.kernel.placement, learned.kernel
@@ -332,7 +340,7 @@ def _report(
             "held_out_p95": round(float(np.quantile(held.error_mm, 0.95)), 2),
         },
         "counted_as_one": round(float(np.mean(held.count == 1)), 3),
-        "lambda_rel": lambda_rel,
+        "least_share": least_share,
         "noise": {
             "of_a_press": round(float(np.sqrt(np.mean(learned.process.left_out() ** 2))), 3),
             "shrinkage": round(learned.noise.shrinkage, 3),

@@ -46,6 +46,8 @@ from eitskin.teaching.teach import (
     MIRROR_GAIN,
     PIXELS_ACROSS,
     Progress,
+    Tried,
+    chosen_share,
     known_size,
     quiet_progress,
     solve_presses,
@@ -62,6 +64,7 @@ MAX_FOLDS = 10
 STRANGE = 6.0  # times the median misfit: no press like the others
 BETTER_BY = 1.0  # standard errors of the mean logarithm of two errors' ratio
 ERROR_FLOOR = 0.01  # of the skin's width: errors below are alike
+SHARE_FROM = 20  # presses: fewer do not tell the least share that a touch must explain
 STILL_POOR = 3.0  # times the error of the model when it was taught
 
 
@@ -128,7 +131,7 @@ def update(
     check_presses(presses, skin)
     session, mirrored = _mirrored_or_not(_session(old, skin, presses), presses)
     found = {how: adapted(session, presses, how) for how in progress((MOVED, FULL), "candidates")}
-    errors = held_out_errors(model, session, presses, found, progress)
+    errors, tried = held_out_errors(model, session, presses, found, progress)
     chosen = choice(errors, ERROR_FLOOR * session.width_mm)
     before = float(model.meta["teach"].get("error_mm", {}).get("held_out_median", np.inf))
     strangers = _strangers(session, found[MOVED])
@@ -159,17 +162,20 @@ def update(
     }
     if chosen == KEPT:
         return Updated(model, chosen, move, report)
-    meta = {**model.meta, "teach": {"lambda_rel": model.defaults.lambda_rel, **report}}
+    defaults = model.defaults
+    if len(presses) >= SHARE_FROM:
+        share, _ = chosen_share(tried[chosen], presses)
+        defaults = replace(defaults, touch_min_fraction=share)
+    least_share = defaults.touch_min_fraction
+    meta = {**model.meta, "teach": {"least_share": least_share, **report}}
     if skin is not None:
         seen = move.skin(skin)
         meta["skin"] = skin_to_table(seen)
         grid = grid_for(seen.outline, PIXELS_ACROSS)
     else:
         grid = move.grid(model.grid, session.kernel.centre_mm)
-    new = taught_model(
-        found[chosen], presses.protocol, grid, presses.untouched, model.defaults.lambda_rel, meta
-    )
-    new = replace(new, defaults=model.defaults, load=_law(model, new, move, session, presses))
+    new = taught_model(found[chosen], presses.protocol, grid, presses.untouched, least_share, meta)
+    new = replace(new, defaults=defaults, load=_law(model, new, move, session, presses))
     return Updated(new, chosen, move, report)
 
 
@@ -299,24 +305,27 @@ def held_out_errors(
     presses: Presses,
     found: dict[str, Learned],
     progress: Progress = quiet_progress,
-) -> dict[str, FloatArray]:
+) -> tuple[dict[str, FloatArray], dict[str, Tried]]:
     """Errors (n,) mm of each candidate for presses that it did not know, as the core solves them;
-    of the old model, which knew none, for all."""
+    of the old model, which knew none, for all. And the models that were tried, each with those
+    presses' numbers."""
     count = len(presses)
     fold = np.random.default_rng(1).permutation(count) % min(count, MAX_FOLDS)
     errors = {KEPT: solve_presses(model, presses)[0]} | {how: np.zeros(count) for how in found}
+    tried: dict[str, Tried] = {how: [] for how in found}
     for k in progress(range(int(fold.max()) + 1), "held-out presses"):
         known = presses.take(np.flatnonzero(fold != k))
         for how, learned in found.items():
             assert isinstance(learned.kernel, Deviation)
             less = adapted(session, known, how, learned.kernel)
             grid = _move(less).grid(model.grid, session.kernel.centre_mm)
-            tried = taught_model(
-                less, presses.protocol, grid, known.untouched, model.defaults.lambda_rel
+            one = taught_model(
+                less, presses.protocol, grid, known.untouched, model.defaults.touch_min_fraction
             )
             out = np.flatnonzero(fold == k)
-            errors[how][out] = solve_presses(tried, presses.take(out))[0]
-    return errors
+            errors[how][out] = solve_presses(one, presses.take(out))[0]
+            tried[how].append((one, out))
+    return errors, tried
 
 
 def choice(errors: dict[str, FloatArray], floor_mm: float) -> str:

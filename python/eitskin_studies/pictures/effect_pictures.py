@@ -63,8 +63,10 @@ SHOWN: dict[str, dict[str, Any]] = {
     "mains": {"amplitude_v": 0.005, "frequency_hz": 49.0},
     "common_mode": {"cmrr_db": 60.0},
     "channel_gain": {"spread": 0.02},
+    "offset": {"spread": 0.02},
     "jitter": {"jitter_ns": 100.0, "samples": 16},
     "noise": {"snr_db": 50.0},
+    "rectifier": {"drop_v": 0.0},
     "saturation": {"headroom": 0.5},
     "adc": {"bits": 6},
 }

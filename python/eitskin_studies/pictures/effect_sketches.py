@@ -272,6 +272,18 @@ def channel_gain(axes: Axes, session: EffectSession, parameters: Any) -> None:
     axes.set(xlabel="channel: measuring pair", ylabel="gain - 1 (%)", title="drawn once a session")
 
 
+def offset(axes: Axes, session: EffectSession, parameters: Any) -> None:
+    """Each channel's offset."""
+    from eitskin.scene.effects.offset import offsets_v
+
+    pairs, number = channels(session.protocol)
+    added_mv = np.zeros(len(pairs))
+    added_mv[number] = 1e3 * offsets_v(parameters, session)
+    axes.bar(np.arange(len(pairs)), added_mv, color=ELECTRODE)
+    axes.axhline(0, color=INK, linewidth=0.8)
+    axes.set(xlabel="channel: measuring pair", ylabel="offset (mV)", title="drawn once a session")
+
+
 def mux(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """A row's voltage after switching."""
     t = np.linspace(0, 2 * parameters.dwell_us, 300)
@@ -374,6 +386,14 @@ def _transfer(
     axes.set(xlabel="in (mV)", ylabel="out (mV)")
 
 
+def rectifier(axes: Axes, session: EffectSession, parameters: Any) -> None:
+    """Its characteristic."""
+    from eitskin.scene.effects import rectifier as effect
+
+    _transfer(axes, session, effect, parameters, float(np.abs(session.v0_v()).max()))
+    axes.set_title("magnitudes")
+
+
 def saturation(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The limiter's characteristic."""
     from eitskin.scene.effects import saturation as effect
@@ -411,7 +431,7 @@ SKETCHES: dict[str, Callable[[Any, EffectSession, Any], None]] = {
         contact_impedance, detached, bridged,
         phase,
         source_impedance, amplitude_drift, crosstalk, mux, charge_injection, mains, common_mode,
-        channel_gain, jitter,
-        noise, saturation, adc,
+        channel_gain, offset, jitter,
+        noise, rectifier, saturation, adc,
     )
 }  # fmt: skip

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from eitskin.model.eitm import decode_model, encode_model
@@ -15,6 +16,8 @@ from eitskin.teaching.make import taught_model
 from eitskin.teaching.presses import Presses
 from eitskin.teaching.teach import Taught, solve_presses, teach
 from simulated_presses import RADIUS_MM, SKIN, TRUE, presses
+
+FloatArray = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
@@ -43,15 +46,30 @@ def test_shuffled_places_teach_nothing() -> None:
 
 def test_the_file_brings_its_own_options_and_every_engine_agrees(taught: Taught) -> None:
     model = decode_model(encode_model(taught.model), "taught")
-    one = presses(1, seed=5)
-    found = []
-    for engine in ("c", "c64", "numpy"):
+    some = presses(8, seed=5)
+    away = np.linalg.norm(some.place_mm[:, None] - some.place_mm, axis=2)
+    both = np.argwhere(np.triu(away > RADIUS_MM))[:6]
+    found: dict[str, list[FloatArray]] = {"c": [], "c64": [], "numpy": []}
+    images: dict[str, FloatArray] = {}
+    exact = 0
+    for engine, places in found.items():
         core = Reconstructor(model, engine=engine)
-        assert not core.options.project_reference and core.options.touch_fit == 0
-        core.tare(one.untouched[0])
-        found.append(core.reconstruct(one.pressed[0]))
-    assert found[1].image == pytest.approx(found[2].image, abs=1e-9 * found[2].image.max())
-    assert found[0].touches[0].x_mm == pytest.approx(found[2].touches[0].x_mm, abs=0.01)
+        assert not core.options.project_reference and core.options.touch_seek
+        assert core.options.touch_fit == 0
+        for i, j in both:
+            core.forget()
+            core.tare(some.untouched[i])
+            made = core.reconstruct(some.pressed[i] + some.difference[j])
+            places.append(np.array([(one.x_mm, one.y_mm) for one in made.touches]))
+            images[engine] = made.image
+    size = images["numpy"].max()
+    assert images["c64"] == pytest.approx(images["numpy"], abs=1e-9 * size)
+    for c32, c64, numpy in zip(*found.values(), strict=True):
+        assert c64 == pytest.approx(numpy, abs=1e-6) and c32 == pytest.approx(numpy, abs=0.02)
+    for (i, j), seen in zip(both, found["c"], strict=True):
+        apart = np.linalg.norm(seen[:, None] - some.place_mm[[i, j]], axis=2)
+        exact += len(seen) == 2 and apart.min(axis=0).max() < 0.1 * 2 * RADIUS_MM
+    assert exact >= 3
 
 
 def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught: Taught) -> None:

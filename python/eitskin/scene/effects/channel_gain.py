@@ -2,7 +2,8 @@
 do not match.
 
 Resistors of 1 % make gains that differ by about 1 %. Each measuring pair (V+, V-) is a channel with
-the gain 1 + uniform(-spread, spread), drawn once. Two rows that reciprocity makes equal are read by
+the gain 1 + uniform(-spread, spread), drawn once; so many as are wired the other way round have the
+opposite sign. Two rows that reciprocity makes equal are read by
 different channels, so their difference tells the mismatch; a difference image relative to the
 reference (dv / v) cancels it.
 """
@@ -25,10 +26,13 @@ SUMMARY = "Each measuring pair has a gain of its own."
 
 @dataclass(frozen=True)
 class Parameters:
-    """How far gains differ."""
+    """How far gains differ, and how many are negative."""
 
     spread: float = parameter(
         0.01, "1", "each channel's gain differs from 1 by up to this", low=0, high=1
+    )
+    inverted: float = parameter(
+        0.0, "1", "part of the channels whose inputs are swapped", low=0, high=1
     )
 
 
@@ -36,7 +40,11 @@ def gains(parameters: Parameters, session: EffectSession) -> FloatArray:
     """The gain of each row's channel, (m,)."""
     pairs, number = channels(session.protocol)
     drawn = session.stream(NAME).uniform(-parameters.spread, parameters.spread, len(pairs))
-    return np.asarray((1 + drawn)[number])
+    gain = 1 + drawn
+    if parameters.inverted:
+        swapped = session.stream(f"{NAME} sign").permutation(len(pairs))
+        gain[swapped < round(parameters.inverted * len(pairs))] *= -1
+    return np.asarray(gain[number])
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
@@ -48,6 +56,9 @@ def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
 
     count = len(channels(session.protocol)[0])
     note = f"{count} channels whose gains differ by up to {100 * parameters.spread:g} %"
-    return VoltageStep(
-        NAME, STAGE, EffectCost(vector_passes_per_frame=1, random_numbers=count), note, apply
+    if parameters.inverted:
+        note += f", {100 * parameters.inverted:g} % of them inverted"
+    cost = EffectCost(
+        vector_passes_per_frame=1, random_numbers=count * (2 if parameters.inverted else 1)
     )
+    return VoltageStep(NAME, STAGE, cost, note, apply)

@@ -39,7 +39,9 @@ STRONG: dict[str, dict[str, Any]] = {
     "phase": {"relative_permittivity": 1000.0, "readout": "magnitude"},
     "source_impedance": {"resistance_ohm": 50e3, "frequency_hz": 50e3},
     "amplitude_drift": {"slope_per_min": 3.0, "walk_per_sqrt_min": 0.1},
-    "channel_gain": {"spread": 0.05},
+    "channel_gain": {"spread": 0.05, "inverted": 0.25},
+    "offset": {"spread": 0.05},
+    "rectifier": {"drop_v": 1e-4},
     "mux": {"settling_us": 50.0, "on_spread_ohm": 10.0},
     "charge_injection": {"charge_pc": 50.0},
     "crosstalk": {"coupling_db": -40.0},
@@ -57,10 +59,10 @@ STRONG: dict[str, dict[str, Any]] = {
 KEEP = {
     "misplacement", "background", "temperature", "gel_drying", "contact_impedance", "detached",
     "bridged", "phase", "out_of_round", "sheet_change", "stretch", "bend", "creep",
-    "amplitude_drift", "saturation", "adc",
+    "amplitude_drift", "saturation", "adc", "rectifier",
 }  # fmt: skip
 RANDOM = {
-    "misplacement", "background", "contact_impedance", "amplitude_drift", "channel_gain", "mux",
+    "misplacement", "background", "contact_impedance", "amplitude_drift", "channel_gain", "mux", "offset",
     "charge_injection", "out_of_round", "sheet_change",
     "jitter", "noise",
 }  # fmt: skip

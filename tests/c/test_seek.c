@@ -1,0 +1,127 @@
+/* Touches that are sought in the data, whatever the image shows. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "base/vec.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "kernels/kernels.h"
+#include "touch/disc_fit.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { SIDE = 20, RANK = 64 };
+static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
+
+/* The data of these discs, and an image with one peak far from them. */
+static eits_context *pressed(dense_bench *b, const eits_disc *disc, uint32_t count, eits_sign sign)
+{
+    eits_context *ctx = dense_bench_open(b, WAVES, 0);
+    eits_options o = *eits_get_options(ctx);
+    eits_real atom[RANK];
+    CHECK_EQUAL(o.touch_seek, 0); /* this model was not taught */
+    o.touch_seek = 1;
+    o.sign = sign;
+    o.touch_min_fraction = R(0.02);
+    o.detection_factor = 0;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    eits_zero(ctx->frame.y, RANK);
+    for (uint32_t k = 0; k < count; ++k) {
+        (void)eits_disc_atom(ctx, &ctx->scratch, disc + k, atom, NULL);
+        eits_axpy(ctx->kernels, ctx->frame.y, disc[k].change, atom, RANK);
+    }
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    for (uint32_t j = 0; j < b->c.model.n_pixels; ++j)
+        ctx->solver.image[j] = j == 0 ? 1 : 0;
+    return ctx;
+}
+
+static uint32_t found(eits_context *ctx, eits_touch *touch)
+{
+    uint32_t count = 0;
+    CHECK_EQUAL(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count), EITS_OK);
+    return count;
+}
+
+static int has(const eits_touch *touch, uint32_t count, const eits_disc *disc)
+{
+    for (uint32_t k = 0; k < count; ++k) {
+        if (fabs((double)(touch[k].x_mm - disc->x_mm)) < 1 &&
+            fabs((double)(touch[k].y_mm - disc->y_mm)) < 1 &&
+            touch[k].strength_s_per_m_mm2 * disc->polarity > 0)
+            return 1;
+    }
+    return 0;
+}
+
+static void touches_that_the_image_does_not_show_are_found(void)
+{
+    static const struct {
+        uint32_t count;
+        eits_sign sign;
+        eits_disc disc[6];
+    } cases[] = {
+        {1, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1}}},
+        {2, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(0.01), 1}}},
+        /* what answers most lies between them */
+        {2, EITS_SIGN_INCREASE, {{-10, 3, 9, R(0.05), 1}, {12, 3, 9, R(0.05), 1}}},
+        {2, EITS_SIGN_DECREASE, {{-21, 9, 9, R(-0.05), -1}, {27, -15, 9, R(-0.02), -1}}},
+        {2, EITS_SIGN_BOTH, {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(-0.04), -1}}},
+        /* more than are exchanged */
+        {6,
+         EITS_SIGN_INCREASE,
+         {{-39, -39, 9, R(0.05), 1},
+          {39, -39, 9, R(0.045), 1},
+          {-39, 39, 9, R(0.04), 1},
+          {39, 39, 9, R(0.05), 1},
+          {0, 0, 9, R(0.04), 1},
+          {3, -45, 9, R(0.05), 1}}},
+    };
+    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
+        dense_bench b = {0};
+        eits_touch touch[EITS_MAX_TOUCHES];
+        eits_context *ctx = pressed(&b, cases[c].disc, cases[c].count, cases[c].sign);
+        const uint32_t count = found(ctx, touch);
+        CHECK_EQUAL(count, cases[c].count);
+        for (uint32_t k = 0; k < cases[c].count; ++k)
+            CHECK(has(touch, count, &cases[c].disc[k]));
+        CHECK(eits_get_info(ctx)->touch_macs > 0);
+        eits_options o = *eits_get_options(ctx);
+        o.touch_seek = 0; /* the image's peak is none of them */
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK(found(ctx, touch) < 2u);
+        dense_bench_close(&b);
+    }
+}
+
+static void what_explains_too_little_is_no_touch(void)
+{
+    const eits_disc disc[2] = {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(0.02), 1}};
+    dense_bench b = {0};
+    eits_touch touch[EITS_MAX_TOUCHES];
+    eits_context *ctx = pressed(&b, disc, 2, EITS_SIGN_INCREASE);
+    eits_options o = *eits_get_options(ctx);
+    o.touch_min_fraction = R(0.2); /* it explains a seventh */
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(found(ctx, touch), 1);
+    CHECK(has(touch, 1, &disc[0]));
+    o.touch_min_fraction = R(0.02);
+    o.max_touches = 1;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(found(ctx, touch), 1);
+    o.max_touches = EITS_MAX_TOUCHES;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    for (int i = 0; i < RANK; ++i) /* nothing of the sign that is looked for */
+        ctx->frame.y[i] = 0;
+    CHECK_EQUAL(found(ctx, touch), 0);
+    dense_bench_close(&b);
+}
+
+int main(void)
+{
+    touches_that_the_image_does_not_show_are_found();
+    what_explains_too_little_is_no_touch();
+    return checks_report("seek");
+}
