@@ -62,9 +62,8 @@ KEEP = {
     "amplitude_drift", "saturation", "adc", "rectifier",
 }  # fmt: skip
 RANDOM = {
-    "misplacement", "background", "contact_impedance", "amplitude_drift", "channel_gain", "mux", "offset",
-    "charge_injection", "out_of_round", "sheet_change",
-    "jitter", "noise",
+    "misplacement", "background", "contact_impedance", "amplitude_drift", "channel_gain", "mux",
+    "offset", "charge_injection", "out_of_round", "sheet_change", "jitter", "noise",
 }  # fmt: skip
 
 
