@@ -1,6 +1,7 @@
 #include "app/commands.h"
 
 #include "app/drive.h"
+#include "app/follow.h"
 #include "app/models.h"
 #include "app/report.h"
 #include "app/scan_control.h"
@@ -74,8 +75,8 @@ static fw_answer on_stream(fw_instrument *instrument, const void *payload, size_
     fw_answer bad;
     (void)size;
     memcpy(&c, payload, sizeof c);
-    const uint32_t all =
-        EITS_STREAM_RAW | EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS;
+    const uint32_t all = EITS_STREAM_RAW | EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES |
+                         EITS_STREAM_EVENTS | EITS_STREAM_FOLLOWED;
     if (outside(&bad, offsetof(eits_command_stream, what), c.what, 0, all) ||
         outside(&bad, offsetof(eits_command_stream, every), c.every, 1, UINT16_MAX))
         return bad;
@@ -83,6 +84,8 @@ static fw_answer on_stream(fw_instrument *instrument, const void *payload, size_
         return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
     if ((c.what & ~EITS_STREAM_RAW) != 0 && !instrument->engine.tared)
         return fw_refuse(EITS_REPLY_NOT_TARED, 0, 0);
+    if ((c.what & EITS_STREAM_FOLLOWED) != 0 && (c.every != 1 || !fw_follow_possible(instrument)))
+        return fw_refuse(EITS_REPLY_DRIVES, 0, 0);
     if (c.what != 0 && !fw_drive_on(instrument))
         return fw_refuse(EITS_REPLY_TRIPPED, 0, 0);
     instrument->stream =
@@ -411,7 +414,10 @@ static fw_answer dispatch(fw_instrument *instrument, const eits_link_packet *pac
             return busy_with(EITS_PACKET_TARE);
         if ((c->rules & NOT_IN_UPLOAD) != 0 && instrument->upload.active)
             return busy_with(EITS_PACKET_MODEL_BEGIN);
-        return c->run(instrument, packet->payload, packet->size);
+        const fw_answer answer = c->run(instrument, packet->payload, packet->size);
+        if (c->rules != 0) /* it may have changed what drives build on */
+            fw_follow_forget(instrument);
+        return answer;
     }
     return fw_refuse(EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
 }

@@ -30,6 +30,22 @@ static void *take(uint8_t **next, size_t bytes)
     return taken;
 }
 
+/* What follows touches drive by drive, where there is room for it beside all the rest. */
+static void start_fast(fw_engine *engine, uint8_t *next)
+{
+    const size_t bytes = EITS_ALIGN16(eits_fast_size(&engine->model));
+    const size_t frame = EITS_ALIGN16(engine->model.n_rows * sizeof(float));
+    engine->fast = NULL;
+    engine->fast_bytes = 0;
+    if (bytes == 0 || next + bytes + frame > engine->saved.core)
+        return;
+    engine->aligned = take(&next, frame);
+    if (eits_fast_init(next, bytes, engine->ctx, &engine->fast) != EITS_OK)
+        engine->fast = NULL;
+    else
+        engine->fast_bytes = bytes + frame;
+}
+
 static void lay_out(fw_engine *engine)
 {
     const size_t rows = engine->model.n_rows;
@@ -46,6 +62,7 @@ static void lay_out(fw_engine *engine)
     uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
     /* not cleared: it may hold what is to be restored */
     engine->saved.core = end - eits_saved_size(&engine->model);
+    start_fast(engine, next);
 }
 
 /* Rows that no fold names as a second one, as they are measured. Rows that no fold names at all are
@@ -91,7 +108,7 @@ eits_status fw_engine_open(fw_engine *engine, const eits_model *model)
         return status;
     lay_out(engine);
     list_unique(engine);
-    engine->used_bytes = needs;
+    engine->used_bytes = needs + engine->fast_bytes;
     engine->open = true;
     return EITS_OK;
 }
@@ -102,6 +119,7 @@ void fw_engine_close(fw_engine *engine)
     engine->cosine = 1;
     engine->sine = 0;
     engine->used_bytes = 0;
+    engine->fast = NULL;
 }
 
 void fw_engine_set_noise_floor(fw_engine *engine, float volts)

@@ -29,6 +29,11 @@ typedef struct fw_engine {
     uint32_t n_unique;
     uint8_t *flags; /* n_rows: bits of the frame under way */
     fw_saved saved;
+    /* touches after each drive, and a frame brought to one instant; NULL where the model has no
+     * fields, or memory is short */
+    eits_fast *fast;
+    float *aligned; /* n_rows */
+    size_t fast_bytes;
 } fw_engine;
 
 void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes);

@@ -45,6 +45,20 @@ typedef struct fw_drive {
     uint32_t sensed_us, current_ua;
 } fw_drive;
 
+/* Touches after each drive (follow.h). */
+typedef struct fw_follow {
+    volatile bool held;              /* the main loop is at what is shared */
+    volatile bool owed;              /* drives wait until owed_frame is brought to one instant */
+    volatile bool at_frame;          /* the main loop has a frame */
+    bool working, running;           /* drives are being looked at; none was left out since begun */
+    uint32_t owed_frame, begun;      /* numbers of frames */
+    uint32_t next_first, next_frame; /* of the next drive */
+    uint32_t told;                   /* touches in the last packet */
+    bool found_any;
+    uint32_t found_count;
+    eits_touch found[EITS_MAX_TOUCHES]; /* in the last frame that was solved */
+} fw_follow;
+
 typedef struct fw_instrument {
     const fw_board *board;
     fw_tx_queue tx_queue;
@@ -57,6 +71,7 @@ typedef struct fw_instrument {
     fw_engine engine;
     fw_tare tare;
     fw_stream stream;
+    fw_follow follow;
     eits_gestures gestures;
     /* of the frame under way, as they come and as they are sent: too much for the stack */
     eits_event events[EITS_MAX_EVENTS];

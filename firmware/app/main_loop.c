@@ -2,6 +2,7 @@
 
 #include "app/commands.h"
 #include "app/drive.h"
+#include "app/follow.h"
 #include "app/models.h"
 #include "app/report.h"
 #include "app/scan_control.h"
@@ -23,6 +24,7 @@ void fw_instrument_init(fw_instrument *instrument, const fw_board *board)
     fw_ad9833_init(&instrument->generator, board->generator);
     fw_engine_init(&instrument->engine, board->workspace, board->workspace_bytes);
     fw_scan_init(&instrument->scan, board, &instrument->demodulator);
+    fw_follow_init(instrument);
     (void)eits_link_decoder_init(&instrument->decoder, instrument->received, FW_RECEIVE_ROOM);
     instrument->uptime_us = fw_now_us(instrument);
     const fw_last_reset *last = &board->last_reset;
@@ -52,7 +54,9 @@ static bool read_link(fw_instrument *instrument)
         at += eits_link_feed(&instrument->decoder, instrument->chunk + at, size - at, &packet);
         if (packet.payload == NULL)
             continue;
+        fw_follow_hold(instrument);
         fw_command(instrument, &packet);
+        fw_follow_release(instrument);
         fw_drive_heard(instrument); /* the host waits for what a long command does */
     }
     return size > 0;
@@ -97,11 +101,13 @@ bool fw_instrument_step(fw_instrument *instrument)
     bool worked = read_link(instrument);
     fw_frame *frame = fw_scan_take(&instrument->scan);
     if (frame != NULL) {
+        fw_follow_take(instrument, true);
         if (instrument->drive.settling > 0)
             --instrument->drive.settling;
         else
             fw_process_frame(instrument, frame);
         fw_scan_release(&instrument->scan);
+        fw_follow_take(instrument, false);
         worked = true;
     }
     fw_drive_check(instrument);

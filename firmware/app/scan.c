@@ -53,6 +53,38 @@ static void switch_to(fw_scan *scan, uint32_t position)
     scan->switched_us = now_us(scan);
 }
 
+static bool same_drive(const fw_scan *scan, uint32_t position, uint32_t other)
+{
+    const uint8_t *a = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, position);
+    const uint8_t *b = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, other);
+    return a[0] == b[0] && a[1] == b[1];
+}
+
+/* The drive that ends with the row at `position` can be looked at. */
+static void tell_drive(fw_scan *scan, uint32_t position, uint32_t start_us, bool last)
+{
+    const uint32_t first = scan->drive_from, count = position + 1 - first;
+    const uint32_t told = atomic_load_explicit(&scan->drives, memory_order_relaxed);
+    scan->drive_from = last ? 0 : position + 1;
+    if (scan->drive_done == NULL)
+        return;
+    if (told - atomic_load_explicit(&scan->drives_taken, memory_order_acquire) < FW_SCAN_DRIVES) {
+        const fw_frame *frame = scan->frame;
+        scan->drive[told % FW_SCAN_DRIVES] =
+            (fw_scan_drive){.frame = frame->number,
+                            .first = first,
+                            .count = count,
+                            .time_us = frame->time_us + first * scan->slot_us +
+                                       ((count - 1) * scan->slot_us + scan->burst_us) / 2,
+                            .end_us = start_us + scan->burst_us,
+                            .z = frame->z,
+                            .quality = frame->quality,
+                            .last = last};
+        atomic_store_explicit(&scan->drives, told + 1, memory_order_release);
+    }
+    scan->drive_done(scan->user);
+}
+
 /* Whether the next frame measures all rows. */
 static void plan_frame(fw_scan *scan)
 {
@@ -64,9 +96,13 @@ static void plan_frame(fw_scan *scan)
  * due yet. */
 static bool begin_frame(fw_scan *scan, uint32_t start_us)
 {
-    const uint32_t filled = atomic_load_explicit(&scan->filled, memory_order_relaxed);
-    if (filled - atomic_load_explicit(&scan->taken, memory_order_acquire) >= 2)
-        return false;
+    uint32_t filled = atomic_load_explicit(&scan->filled, memory_order_relaxed);
+    if (filled - atomic_load_explicit(&scan->taken, memory_order_acquire) >= 2) {
+        if (!scan->newest)
+            return false;
+        /* the main loop has the other one, and has not looked at this one */
+        atomic_store_explicit(&scan->filled, --filled, memory_order_release);
+    }
     const uint32_t period = scan->settings.frame_period_us;
     if (period != 0) {
         const int32_t late = (int32_t)(start_us - scan->next_due_us);
@@ -121,14 +157,15 @@ static void on_burst(void *user, const fw_burst *burst)
     if (scan->frame == NULL && !begin_frame(scan, burst->start_us))
         return;
     fw_frame *frame = scan->frame;
-    const uint32_t row = fw_scan_row_at(scan, scan->position);
-    const bool last = scan->position + 1 == fw_scan_next_rows(scan);
+    const uint32_t position = scan->position, row = fw_scan_row_at(scan, position);
+    const bool last = position + 1 == fw_scan_next_rows(scan);
+    const bool drive_ends = last || !same_drive(scan, position, position + 1);
     const bool bus_error = !scan->switched;
     if (last) {
         ++scan->next_number;
         plan_frame(scan);
     }
-    switch_to(scan, last ? 0 : scan->position + 1);
+    switch_to(scan, last ? 0 : position + 1);
     scan->tries = 0;
     frame->bus_errors += bus_error;
     if (good) {
@@ -140,6 +177,8 @@ static void on_burst(void *user, const fw_burst *burst)
         frame->quality[row] = EITS_QUALITY_UNSETTLED;
     }
     frame->busy_us += now_us(scan) - entered_us;
+    if (drive_ends)
+        tell_drive(scan, position, burst->start_us, last);
     if (last)
         end_frame(scan, burst->start_us);
 }
@@ -164,6 +203,7 @@ fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const f
     scan->slot_us = fw_slot_us(settings);
     scan->frame = NULL;
     scan->tries = 0;
+    scan->drive_from = 0;
     scan->due_known = false;
     atomic_store(&scan->filled, 0);
     atomic_store(&scan->taken, 0);
@@ -202,6 +242,19 @@ fw_frame *fw_scan_take(fw_scan *scan)
 void fw_scan_release(fw_scan *scan)
 {
     atomic_fetch_add_explicit(&scan->taken, 1, memory_order_release);
+}
+
+const fw_scan_drive *fw_scan_next_drive(const fw_scan *scan)
+{
+    const uint32_t taken = atomic_load_explicit(&scan->drives_taken, memory_order_relaxed);
+    if (atomic_load_explicit(&scan->drives, memory_order_acquire) == taken)
+        return NULL;
+    return &scan->drive[taken % FW_SCAN_DRIVES];
+}
+
+void fw_scan_take_drive(fw_scan *scan)
+{
+    atomic_fetch_add_explicit(&scan->drives_taken, 1, memory_order_release);
 }
 
 bool fw_scan_stalled(fw_scan *scan, uint32_t now)

@@ -55,6 +55,17 @@ typedef struct fw_scan_table {
     uint32_t n_unique;
 } fw_scan_table;
 
+/* The rows of a drive, measured; they are the places `first` on of its frame. */
+typedef struct fw_scan_drive {
+    uint32_t frame, first, count;
+    uint32_t time_us; /* the middle, were no measurement repeated */
+    uint32_t end_us;
+    const fw_iq *z; /* of the frame */
+    const uint8_t *quality;
+    bool last; /* of the frame */
+} fw_scan_drive;
+#define FW_SCAN_DRIVES 32u
+
 typedef struct fw_scan {
     const fw_board *board;
     const fw_demodulator *demodulator;
@@ -77,6 +88,13 @@ typedef struct fw_scan {
     _Atomic uint32_t filled, taken; /* frames since the scan was started */
     _Atomic uint32_t bursts, slots_repeated, frames_scanned;
     uint32_t watched_bursts, watched_us; /* of fw_scan_stalled */
+    /* of each drive that is measured, where somebody wants to know */
+    void (*drive_done)(void *user);
+    void *user;
+    bool newest; /* both frames full: the one that waits goes, and the scan goes on */
+    fw_scan_drive drive[FW_SCAN_DRIVES];
+    uint32_t drive_from; /* where the drive under way began */
+    _Atomic uint32_t drives, drives_taken;
 } fw_scan;
 
 void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *demodulator);
@@ -107,6 +125,11 @@ fw_status fw_scan_stop(fw_scan *scan);
 /* The oldest full frame, or NULL; it stays the caller's until fw_scan_release. */
 fw_frame *fw_scan_take(fw_scan *scan);
 void fw_scan_release(fw_scan *scan);
+
+/* The oldest drive that was not taken; NULL: there is none. After FW_SCAN_DRIVES that nobody took,
+ * the next ones are left out. */
+const fw_scan_drive *fw_scan_next_drive(const fw_scan *scan);
+void fw_scan_take_drive(fw_scan *scan);
 
 /* Whether no burst has come for four slots and 20 ms although the scan runs. */
 bool fw_scan_stalled(fw_scan *scan, uint32_t now_us);

@@ -1,5 +1,6 @@
 #include "app/scan_control.h"
 
+#include "app/follow.h"
 #include "app/report.h"
 
 fw_status fw_stop_scan(fw_instrument *instrument)
@@ -48,6 +49,7 @@ void fw_start_scan(fw_instrument *instrument)
     /* Where the multiplexers do not open, nothing may drive: the generator goes into reset, and
      * what is wanted is tried again. */
     const fw_status stopped = fw_stop_scan(instrument);
+    fw_follow_forget(instrument);
     instrument->tried_us = fw_now_us(instrument);
     const fw_fault_detail detail = {.frame = instrument->last_frame};
     const bool wanted = stopped == FW_OK && fw_scan_wanted(instrument);

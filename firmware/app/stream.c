@@ -1,5 +1,6 @@
 #include "app/stream.h"
 
+#include "app/follow.h"
 #include "app/phase.h"
 #include "app/report.h"
 
@@ -160,19 +161,24 @@ static void send_events(fw_instrument *instrument, const fw_frame *frame, eits_s
                            head.count * sizeof body[0]);
 }
 
-/* Returns the microseconds that the solver took, touches included. */
-static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw_quality *quality)
+/* `volts`: the frame's, or as the drives have brought them to one instant. Returns the microseconds
+ * that the solver took, touches included. */
+static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const float *volts,
+                      const fw_quality *quality)
 {
     eits_context *ctx = instrument->engine.ctx;
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count = 0;
     const uint32_t began_us = fw_now_us(instrument);
     const eits_status status =
-        eits_reconstruct(ctx, frame->volts, instrument->engine.model.n_rows, NULL, NULL);
+        eits_reconstruct(ctx, volts, instrument->engine.model.n_rows, NULL, NULL);
     const uint32_t solved_us = fw_now_us(instrument);
-    const bool wanted = (instrument->stream.what & (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS)) != 0;
+    const bool wanted = (instrument->stream.what &
+                         (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS | EITS_STREAM_FOLLOWED)) != 0;
     if (wanted && status == EITS_OK)
         (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
+    if (volts != frame->volts && status == EITS_OK)
+        fw_follow_found(instrument, touches, count);
     const uint32_t done_us = fw_now_us(instrument);
     const eits_info *info = eits_get_info(ctx);
     eits_packet_solved head = {.frame = frame->number,
@@ -242,11 +248,13 @@ void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
         return;
     }
     const uint32_t began_us = fw_now_us(instrument);
+    const bool follows = (stream->what & EITS_STREAM_FOLLOWED) != 0;
+    const float *volts = follows ? fw_follow_align(instrument, frame) : frame->volts;
     uint32_t solving_us = 0;
     send_raw(instrument, frame, 0);
-    if (solved)
-        solving_us = solve(instrument, frame, &quality);
-    else
+    if (solved && volts != NULL)
+        solving_us = solve(instrument, frame, volts, &quality);
+    else if (!solved)
         examine(instrument, frame, &quality);
     const uint32_t done_us = fw_now_us(instrument);
     fw_stats_add(&instrument->stats, EITS_STAGE_SEND, done_us - began_us - solving_us);

@@ -10,6 +10,11 @@ typedef struct fw_tx_queue {
     fw_link link;
     uint32_t sequence; /* of the next packet; a dropped one takes its number too */
     uint32_t sent, dropped;
+    /* a packet is under way: what runs between the main loop's instructions must not send one, and
+     * is called when it may */
+    volatile bool busy;
+    void (*free)(void *user);
+    void *user;
     uint8_t scratch[EITS_LINK_ENCODED(EITS_LINK_MAX_PAYLOAD)];
 } fw_tx_queue;
 

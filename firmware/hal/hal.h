@@ -128,6 +128,9 @@ typedef struct fw_system_ops {
     uint32_t (*stack_used)(void *ctx);          /* most bytes so far */
     void (*set_leds)(void *ctx, uint32_t leds); /* bit 0 alive, bit 1 touch, bit 2 fault */
     bool (*button)(void *ctx);                  /* the owner holds it now; NULL: there is none */
+    /* `work` runs soon, after the interrupts and before the main loop goes on; always the same.
+     * From the capture's interrupt, the main loop, or `work`. */
+    void (*later)(void *ctx, void (*work)(void *user), void *user);
 } fw_system_ops;
 
 /* What the start-up code found in memory that survives a reset. */

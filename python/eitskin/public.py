@@ -91,6 +91,7 @@ def _frames(session: Session, outputs: Outputs) -> Iterator[Frame]:
             outputs.put(item)
             if isinstance(item, Notice):
                 notices.append(item)
+            if not isinstance(item, Frame):
                 continue
             yield replace(item, notices=tuple(notices))
             notices.clear()

@@ -58,7 +58,7 @@ uint32_t small_get_u32(const uint8_t *at)
 }
 
 /* towards zero, too small becomes zero: good enough for tests */
-static uint16_t half_of(double value)
+uint16_t small_half(double value)
 {
     int exponent;
     const double fraction = frexp(fabs(value), &exponent); /* in [0.5, 1) */
@@ -209,7 +209,7 @@ static void store_s(const small_spec *spec, const double *s, uint32_t n, uint32_
                 small_put_f32(sens + 4 * at, (float)column[i]);
                 break;
             case EITS_STORAGE_F16:
-                small_put_u16(sens + 2 * at, half_of(column[i]));
+                small_put_u16(sens + 2 * at, small_half(column[i]));
                 break;
             case EITS_STORAGE_I16:
                 small_put_u16(sens + 2 * at, (uint32_t)(int32_t)lrint(column[i] / (double)scale));
@@ -238,12 +238,12 @@ static void fill_fields(const small_spec *spec, const uint32_t *cells, uint32_t 
             const double angle = 6.28318530717958647692 * e / SMALL_ELECTRODES;
             const double dx = x - radius * cos(angle), dy = y - radius * sin(angle),
                          unit = radius / 20 / (dx * dx + dy * dy);
-            small_put_u16(column + 2 * e, half_of(unit * dx));
-            small_put_u16(column + 2 * (SMALL_ELECTRODES + e), half_of(unit * dy));
+            small_put_u16(column + 2 * e, small_half(unit * dx));
+            small_put_u16(column + 2 * (SMALL_ELECTRODES + e), small_half(unit * dy));
         }
         const double mirror[4] = {radius, 0, x / radius, -y / radius};
         for (uint32_t k = 0; k < 4; ++k)
-            small_put_u16(column + 2 * (2 * SMALL_ELECTRODES + k), half_of(mirror[k]));
+            small_put_u16(column + 2 * (2 * SMALL_ELECTRODES + k), small_half(mirror[k]));
     }
 }
 

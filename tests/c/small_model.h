@@ -72,6 +72,7 @@ uint8_t *small_model_entry(const small_model *model, const char *tag);
 void small_put_u16(uint8_t *at, uint32_t value);
 void small_put_u32(uint8_t *at, uint32_t value);
 void small_put_f32(uint8_t *at, float value);
+uint16_t small_half(double value);
 uint32_t small_get_u32(const uint8_t *at);
 
 /* A context with its own aligned workspace. */

@@ -192,7 +192,8 @@ static uint32_t align(bench *b, eits_real *aligned)
     return state;
 }
 
-static void confirm(bench *b, const double (*places)[2], uint32_t count)
+/* What was found in the last frame that was aligned. */
+static void find(bench *b, const double (*places)[2], uint32_t count)
 {
     eits_touch found[EITS_MAX_TOUCHES];
     memset(found, 0, sizeof found);
@@ -202,6 +203,13 @@ static void confirm(bench *b, const double (*places)[2], uint32_t count)
         found[k].strength_s_per_m_mm2 = (eits_real)unit(b);
     }
     CHECK_EQUAL(eits_fast_confirm(b->fast, found, count), EITS_OK);
+}
+
+static void confirm(bench *b, const double (*places)[2], uint32_t count)
+{
+    eits_real aligned[SMALL_ROWS];
+    (void)align(b, aligned);
+    find(b, places, count);
 }
 
 static void test_nothing_touches(void)
@@ -406,6 +414,33 @@ static void test_frames_begin_and_end_touches(void)
     bench_close(b);
 }
 
+/* Drives come while a frame is solved: what is found in it is where touches were then, and says
+ * nothing of one that came since. */
+static void test_touches_that_move_on(void)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_fast_touch touch[EITS_FAST_TOUCHES];
+    eits_real aligned[SMALL_ROWS];
+    put(b, 0, 20, 11, 1);
+    drives(b, 16);
+    (void)align(b, aligned);
+    for (uint32_t k = 1; k <= 20; ++k) {
+        put(b, 0, 20 - (double)k, 11, 1);
+        drives(b, 1);
+    }
+    find(b, (const double[][2]){{20, 11}}, 1);
+    CHECK_EQUAL(told(b, touch), 1);
+    CHECK_NEAR(touch[0].x_mm, 0, 2.0);
+    CHECK_EQUAL(touch[0].confirmed, 1);
+    CHECK_EQUAL(b->fast->seeds, 0);
+    CHECK_EQUAL(b->fast->known[0].frames_missed, 0);
+    find(b, NULL, 0); /* of no frame since */
+    CHECK_EQUAL(b->fast->known[0].frames_missed, 0);
+    confirm(b, NULL, 0);
+    CHECK_EQUAL(b->fast->known[0].frames_missed, 1);
+    bench_close(b);
+}
+
 /* Rows of an electrode that a frame named are left out, until none is named. */
 static void test_named_electrodes(void)
 {
@@ -573,6 +608,7 @@ int main(void)
     test_other_things_than_touches();
     test_rows_without_sense();
     test_frames_begin_and_end_touches();
+    test_touches_that_move_on();
     test_named_electrodes();
     test_a_clock_that_stands_or_goes_back();
     test_a_touch_that_leaves_the_skin();

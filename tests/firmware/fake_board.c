@@ -152,6 +152,23 @@ static uint64_t next_interrupt_ns(const fake_board *f)
                                        : UINT64_MAX;
 }
 
+static void run_later(fake_board *f)
+{
+    void (*const work)(void *user) = f->later;
+    f->later = NULL;
+    if (work != NULL)
+        work(f->later_user);
+}
+
+static void system_later(void *ctx, void (*work)(void *user), void *user)
+{
+    fake_board *f = ctx;
+    f->later = work;
+    f->later_user = user;
+    if (!f->in_interrupt)
+        run_later(f);
+}
+
 static void interrupt(fake_board *f)
 {
     uint16_t *samples = f->samples[f->bursts % 2u];
@@ -170,6 +187,7 @@ static void interrupt(fake_board *f)
     f->in_interrupt = true;
     f->done(f->done_user, &burst);
     f->in_interrupt = false;
+    run_later(f);
 }
 
 void fake_advance(fake_board *f, uint64_t ns)
@@ -354,9 +372,9 @@ static const fw_lines_ops LINES = {lines_write, lines_wait};
 static const fw_capture_ops CAPTURE = {capture_configure, capture_start, capture_stop};
 static const fw_link_ops LINK = {link_write, link_read, link_ended};
 static const fw_store_ops STORE = {store_bank, store_erase, store_program};
-static const fw_system_ops SYSTEM = {time_us,       system_wait,     system_lock,
-                                     system_unlock, feed_watchdog,   system_reset,
-                                     stack_used,    system_set_leds, button};
+static const fw_system_ops SYSTEM = {time_us,       system_wait,  system_lock, system_unlock,
+                                     feed_watchdog, system_reset, stack_used,  system_set_leds,
+                                     button,        system_later};
 
 void fake_restart(fake_board *f)
 {

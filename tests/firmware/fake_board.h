@@ -77,6 +77,8 @@ typedef struct fake_board {
     uint64_t random;
     uint16_t samples[2][FW_MAX_SAMPLES];
     fw_status configure_status;
+    void (*later)(void *user); /* after the interrupt; NULL: nothing */
+    void *later_user;
 
     /* flash: NOR */
     _Alignas(16) uint8_t bank[FW_BANKS][FAKE_BANK];

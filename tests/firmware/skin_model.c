@@ -13,10 +13,18 @@ const skin_spec SKIN_OPPOSITE = {
 const skin_spec SKIN_BY_SEVEN = {
     .electrodes = 16, .drive_step = 1, .measure_step = 1, .rank = 24, .side = 8, .order = 7};
 
-enum { MAX_ROWS = 4096, SECTIONS = 12 };
-static const char TAGS[SECTIONS][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS",
-                                       "COLW", "GRID", "DEFS", "GOLD", "META", "ORDR"};
-enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, META, ORDR };
+const skin_spec SKIN_WITH_FIELDS = {.electrodes = 16,
+                                    .drive_step = 1,
+                                    .measure_step = 1,
+                                    .rank = 24,
+                                    .side = 8,
+                                    .order = 7,
+                                    .fields = 1};
+
+enum { MAX_ROWS = 4096, SECTIONS = 13 };
+static const char TAGS[SECTIONS][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW",
+                                       "GRID", "DEFS", "GOLD", "META", "ORDR", "FLDS"};
+enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, META, ORDR, FLDS };
 
 typedef struct draft {
     uint32_t n_rows, n_folded;
@@ -103,6 +111,31 @@ static void put_order(uint8_t *at, const draft *d, const skin_spec *spec)
     }
 }
 
+static uint32_t fields_stride(const skin_spec *spec)
+{
+    return (2 * spec->electrodes + 4 + 7u) & ~7u;
+}
+
+/* Currents that go in on a circle around the image; no mirror. */
+static void fill_fields(const skin_spec *spec, uint8_t *flds)
+{
+    const double pixel = 6, half = 0.5 * spec->side, radius = 0.6 * spec->side * pixel;
+    small_put_f32(flds, 20.0f);
+    small_put_f32(flds + 4, 3.0f);
+    for (uint32_t j = 0; j < spec->side * spec->side; ++j) {
+        uint8_t *column = flds + 16 + 2 * (size_t)j * fields_stride(spec);
+        const double x = pixel * (j % spec->side + 0.5 - half);
+        const double y = pixel * (j / spec->side + 0.5 - half);
+        for (uint32_t e = 0; e < spec->electrodes; ++e) {
+            const double angle = 2 * acos(-1.0) * e / spec->electrodes;
+            const double dx = x - radius * cos(angle), dy = y - radius * sin(angle);
+            const double unit = radius / 20 / (dx * dx + dy * dy);
+            small_put_u16(column + 2 * e, small_half(unit * dx));
+            small_put_u16(column + 2 * (spec->electrodes + e), small_half(unit * dy));
+        }
+    }
+}
+
 static void fill(const skin_spec *spec, const draft *d, uint32_t stride,
                  uint8_t *const at[SECTIONS])
 {
@@ -149,6 +182,8 @@ static void fill(const skin_spec *spec, const draft *d, uint32_t stride,
         small_put_f32(at[DEFS] + 8 + 4 * i, defaults[i]);
     memcpy(at[META], "{}", 2);
     put_order(at[ORDR], d, spec);
+    if (spec->fields)
+        fill_fields(spec, at[FLDS]);
 }
 
 static void seal(skin_model *made)
@@ -191,7 +226,8 @@ skin_model skin_model_make(const skin_spec *spec)
                                       64,
                                       4 * (2 * d.n_rows + n),
                                       2,
-                                      4 * d.n_rows};
+                                      4 * d.n_rows,
+                                      spec->fields ? 16 + 2 * n * fields_stride(spec) : 16};
     skin_model made = {.size = table};
     for (uint32_t p = 0; p < SECTIONS; ++p)
         made.size += (sizes[p] + 15u) & ~15u;
@@ -200,7 +236,7 @@ skin_model skin_model_make(const skin_spec *spec)
     uint32_t offset = table;
     for (uint32_t p = 0; p < SECTIONS; ++p) {
         uint8_t *entry = made.blob + 64 + 16 * p;
-        memcpy(entry, TAGS[p], 4);
+        memcpy(entry, p == FLDS && !spec->fields ? "NONE" : TAGS[p], 4);
         small_put_u32(entry + 4, offset);
         small_put_u32(entry + 8, sizes[p]);
         small_put_u32(entry + 12, p < META);

@@ -14,6 +14,7 @@ typedef struct skin_spec {
     /* every so many-th row measures the other way round; 0: none */
     uint32_t turned;
     uint32_t order;   /* drive order * k, modulo the drives, at place k; 0: as they stand */
+    int fields;       /* with the currents' fields, so that drives can be followed */
     int wrong_golden; /* the golden image is another than the core gives */
 } skin_spec;
 
@@ -27,6 +28,6 @@ typedef struct skin_model {
 skin_model skin_model_make(const skin_spec *spec);
 void skin_model_free(skin_model *model);
 
-extern const skin_spec SKIN_ADJACENT, SKIN_OPPOSITE, SKIN_BY_SEVEN;
+extern const skin_spec SKIN_ADJACENT, SKIN_OPPOSITE, SKIN_BY_SEVEN, SKIN_WITH_FIELDS;
 
 #endif

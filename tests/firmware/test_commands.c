@@ -92,7 +92,7 @@ static void test_names(void)
 
 static void test_stream_ranges(void)
 {
-    REPLY(host_stream(&b.host, 16, 1, 0), EITS_REPLY_RANGE, 4, 15);
+    REPLY(host_stream(&b.host, 32, 1, 0), EITS_REPLY_RANGE, 4, 31);
     REPLY(host_stream(&b.host, 1, 0, 0), EITS_REPLY_RANGE, 6, 1);
     REPLY(host_stream(&b.host, EITS_STREAM_TOUCHES, 1, 0), EITS_REPLY_NOT_TARED, 0, 0);
     CHECK_EQUAL(host_info(&b.host).streaming, 0);

@@ -52,7 +52,7 @@ typedef struct eits_fast eits_fast;
 
 /* What its size is made of: drives that wait, the state itself, and what is kept of a drive. */
 #define EITS_FAST_WAITING       9u
-#define EITS_FAST_STATE         EITS_ALIGN16(320u + 40u * sizeof(void *) + 688u * sizeof(eits_real))
+#define EITS_FAST_STATE         EITS_ALIGN16(340u + 40u * sizeof(void *) + 698u * sizeof(eits_real))
 #define EITS_FAST_DRIVE         (16u + 3u * EITS_FAST_TOUCHES * sizeof(eits_real))
 #define EITS_FAST_CELLS(nx, ny) (((size_t)(nx) + 1u) / 2u * (((size_t)(ny) + 1u) / 2u))
 #define EITS_FAST_TRIANGLE(drive_rows) ((size_t)(drive_rows) * ((size_t)(drive_rows) + 1u) / 2u)
@@ -104,9 +104,10 @@ eits_status eits_fast_touches(const eits_fast *fast, eits_fast_touch *touches, u
 eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t length,
                             eits_real *aligned, uint32_t *state);
 
-/* What the whole-frame solver found in that frame. A touch that it does not find in two frames on
- * end goes; what it alone finds in two comes. Rows of electrodes that the context named in it are
- * left out of drives until it names them no more. Errors: EITS_E_ARGUMENT. */
+/* What the whole-frame solver found in that frame; drives may have come since. A touch that it does
+ * not find in two frames on end goes; what it alone finds in two comes. Rows of electrodes that the
+ * context named in it are left out of drives until it names them no more. Errors: EITS_E_ARGUMENT.
+ */
 eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count);
 
 #ifdef __cplusplus

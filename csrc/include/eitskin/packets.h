@@ -35,6 +35,8 @@ typedef enum eits_packet_type {
     EITS_PACKET_TOUCHES = 0x12,
     /* what a frame's touches amounted to */
     EITS_PACKET_EVENTS = 0x15,
+    /* touches after a drive */
+    EITS_PACKET_FOLLOWED = 0x17,
     /* the board's counters */
     EITS_PACKET_STATS = 0x13,
     /* a fault that rose or went */
@@ -116,7 +118,10 @@ typedef enum eits_reply_status {
     /* the owner has locked the board: its blue button must be held */
     EITS_REPLY_LOCKED = 17,
     /* the current was above its limit: CLEAR_FAULTS first */
-    EITS_REPLY_TRIPPED = 18
+    EITS_REPLY_TRIPPED = 18,
+    /* touches after each drive want a model with fields, a reference that stays, full scans and
+     * every frame */
+    EITS_REPLY_DRIVES = 19
 } eits_reply_status;
 
 /* Bits of a row's quality byte. */
@@ -194,7 +199,11 @@ typedef enum eits_raw_flags {
     /* only one row of each reciprocal pair was measured */
     EITS_RAW_RECIPROCAL = 2,
     /* a full scan among such, for the check of reciprocity */
-    EITS_RAW_CHECK = 4
+    EITS_RAW_CHECK = 4,
+    /* the touches after each drive brought it to the instant of its last drive */
+    EITS_RAW_ALIGNED = 8,
+    /* and it was solved: its drives are accounted for */
+    EITS_RAW_TRUSTED = 16
 } eits_raw_flags;
 
 /* Bits of what is streamed of each frame. */
@@ -206,7 +215,9 @@ typedef enum eits_stream {
     /* its touches, as TOUCHES */
     EITS_STREAM_TOUCHES = 4,
     /* its events, as EVENTS, also where there are none; a tare forgets fingers */
-    EITS_STREAM_EVENTS = 8
+    EITS_STREAM_EVENTS = 8,
+    /* touches after each drive, as FOLLOWED; of frames only trusted ones are solved */
+    EITS_STREAM_FOLLOWED = 16
 } eits_stream;
 
 /* The board, its model and its settings. */
@@ -397,6 +408,42 @@ typedef struct eits_packet_touch {
     float long_x_mm;
     float long_y_mm;
 } eits_packet_touch;
+
+/* Touches as of an instant within a scan. Where nothing touches it is sent once: when that begins,
+ * or the touches have gone. */
+typedef struct eits_packet_followed {
+    /* number of the frame that is scanned */
+    uint32_t frame;
+    /* that they are told for: the middle of the drive, were no row repeated */
+    uint32_t time_us;
+    /* the frame before which nothing was known */
+    uint32_t begun;
+    /* from the end of the drive until this packet was made; at most 65,535 */
+    uint16_t age_us;
+    /* of it for the update; likewise */
+    uint16_t update_us;
+    /* of the protocol, in the order of first rows */
+    uint16_t drive;
+    /* touches that follow */
+    uint16_t count;
+} eits_packet_followed;
+
+/* A touch, as eits_fast_touch. */
+typedef struct eits_packet_followed_touch {
+    /* from 1, apart from those of TOUCHES; stays with a touch */
+    uint16_t id;
+    /* 1: a whole frame has shown it */
+    uint16_t confirmed;
+    /* of the centre, in the model's coordinates */
+    float x_mm;
+    /* of the centre */
+    float y_mm;
+    /* its velocity */
+    float vx_mm_per_s;
+    float vy_mm_per_s;
+    /* S mm^2/m */
+    float strength_s_per_m_mm2;
+} eits_packet_followed_touch;
 
 /* What happened in a frame; none where the core rejected it. */
 typedef struct eits_packet_events {

@@ -31,6 +31,8 @@ typedef struct fast_drive {
 typedef struct fast_known {
     uint32_t id;
     uint32_t on, off_drives, frames_missed, confirmed;
+    uint32_t aligned; /* it was there when a frame was last aligned, and where */
+    eits_real at[2];
     eits_real energy; /* mean of what it explains of a drive's chi^2 */
     eits_real peak;   /* its greatest strength */
 } fast_known;

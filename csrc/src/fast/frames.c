@@ -67,6 +67,8 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     for (uint32_t k = 0; k < fast->count; ++k) {
         if (has_moved(fast, k))
             align_touch(fast, k, aligned);
+        fast->known[k].aligned = 1;
+        eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
     }
     int explained = fast->held_count == 0;
     for (uint32_t n = 0; n < fast->drives; ++n)
@@ -160,7 +162,10 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     mask_named(fast);
     for (uint32_t k = fast->count; k-- > 0;) {
         fast_known *known = &fast->known[k];
-        const uint32_t n = nearest(fast->state + FAST_SIZE * k, found, taken, count);
+        if (!known->aligned) /* it came after that frame */
+            continue;
+        known->aligned = 0;
+        const uint32_t n = nearest(known->at, found, taken, count);
         if (n < count) {
             taken[n] = 1;
             known->confirmed = 1;

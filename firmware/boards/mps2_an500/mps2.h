@@ -61,6 +61,9 @@ extern const fw_capture_ops mps2_capture_ops;
 extern const fw_link_ops mps2_link_ops;
 extern const fw_store_ops mps2_store_ops;
 
+void mps2_later(void *ctx, void (*work)(void *user), void *user);
+
 void mps2_slot_irq(void);
+void mps2_later_irq(void);
 
 #endif

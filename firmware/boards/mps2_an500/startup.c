@@ -1,5 +1,5 @@
 /* Start of a Cortex-M7 under QEMU's mps2-an500: vectors, FPU on, zeroed memory, semihosting, main.
- * Programs without the interrupt leave its handler out. */
+ * Programs without an interrupt leave its handler out. */
 #include <stdint.h>
 #include <stdlib.h>
 
@@ -14,13 +14,19 @@ extern int main(void);
 void reset(void);
 static void fault(void);
 __attribute__((weak)) void mps2_slot_irq(void);
+__attribute__((weak)) void mps2_later_irq(void);
 
 __attribute__((section(".vectors"),
                used)) static const void *const vectors[CORE_VECTORS + IRQ_TIMER1 + 1] = {
-    [0] = &stack_top,          [1] = (const void *)reset,
-    [2] = (const void *)fault, [3] = (const void *)fault,
-    [4] = (const void *)fault, [5] = (const void *)fault,
-    [6] = (const void *)fault, [CORE_VECTORS + IRQ_TIMER1] = (const void *)mps2_slot_irq};
+    [0] = &stack_top,
+    [1] = (const void *)reset,
+    [2] = (const void *)fault,
+    [3] = (const void *)fault,
+    [4] = (const void *)fault,
+    [5] = (const void *)fault,
+    [6] = (const void *)fault,
+    [14] = (const void *)mps2_later_irq,
+    [CORE_VECTORS + IRQ_TIMER1] = (const void *)mps2_slot_irq};
 
 void reset(void)
 {

@@ -70,8 +70,32 @@ void mps2_wait(void *ctx)
     woken = false;
 }
 
+#define SCB_ICSR  REG32(0xE000ED04u)
+#define SCB_SHPR3 REG32(0xE000ED20u)
+#define PENDSVSET (1u << 28)
+
+static struct {
+    void (*work)(void *user);
+    void *user;
+} waiting;
+
+void mps2_later(void *ctx, void (*work)(void *user), void *user)
+{
+    (void)ctx;
+    waiting.work = work;
+    waiting.user = user;
+    SCB_ICSR = PENDSVSET;
+}
+
+void mps2_later_irq(void)
+{
+    waiting.work(waiting.user);
+    mps2_wake();
+}
+
 void mps2_timebase_start(void)
 {
+    SCB_SHPR3 = 0xFFu << 16; /* after the slots */
     TIMER_RELOAD(TIMER_TIME) = 0xFFFFFFFFu;
     TIMER_VALUE(TIMER_TIME) = last_ticks = 0xFFFFFFFFu;
     TIMER_CTRL(TIMER_TIME) = TIMER_ENABLE;

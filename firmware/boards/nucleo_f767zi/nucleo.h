@@ -32,6 +32,7 @@ extern const uint8_t image_start[], image_end[]; /* of the program, in flash */
 
 /* Urgency of interrupts: upper four bits; less is more urgent. */
 enum { NUCLEO_URGENCY_CAPTURE = 0x10, NUCLEO_URGENCY_LINK = 0x40, NUCLEO_URGENCY_TICK = 0xF0 };
+#define NUCLEO_URGENCY_LATER NUCLEO_URGENCY_TICK
 
 bool nucleo_clock_start(void); /* false: no 8 MHz from the ST-LINK */
 void nucleo_cache_start(void);
@@ -85,6 +86,7 @@ void nucleo_fault_irq(void);
 void nucleo_clock_irq(void);
 void nucleo_supply_irq(void);
 void nucleo_tick_irq(void);
+void nucleo_later_irq(void);
 void nucleo_dma2_stream0_irq(void);
 void nucleo_adc_irq(void);
 void nucleo_dma1_stream1_irq(void);

@@ -17,7 +17,7 @@ __attribute__((section(".vectors"),
     [2] = nucleo_clock_irq,       /* NMI: the clock security system */
     [3 ... 6] = nucleo_fault_irq, /* hard, memory, bus and usage fault */
     [11 ... 12] = nucleo_fault_irq,
-    [14] = nucleo_fault_irq,
+    [14] = nucleo_later_irq, /* PendSV */
     [15] = nucleo_tick_irq,
     [CORE_VECTORS] = nucleo_fault_irq,
     [CORE_VECTORS + IRQ_PVD] = nucleo_supply_irq,

@@ -57,7 +57,8 @@ void nucleo_system_start(void)
 
     STK_LOAD = NUCLEO_SYSCLK_HZ / 1000u - 1u;
     STK_VAL = 0;
-    SCB_SHPR3 = (SCB_SHPR3 & 0x00FFFFFFu) | ((uint32_t)NUCLEO_URGENCY_TICK << 24);
+    SCB_SHPR3 = (SCB_SHPR3 & 0x0000FFFFu) | ((uint32_t)NUCLEO_URGENCY_TICK << 24) |
+                ((uint32_t)NUCLEO_URGENCY_LATER << 16);
     STK_CTRL = STK_CTRL_CLKSOURCE | STK_CTRL_TICKINT | STK_CTRL_ENABLE;
 
     nucleo_pin(GPIOB_BASE, LED_GREEN, PIN_OUTPUT, 0, 0, 0);
@@ -190,6 +191,25 @@ static void set_leds(void *ctx, uint32_t leds)
     GPIO_BSRR(GPIOB_BASE) = on | (all & ~on) << 16;
 }
 
+static struct {
+    void (*work)(void *user);
+    void *user;
+} waiting;
+
+static void later(void *ctx, void (*work)(void *user), void *user)
+{
+    (void)ctx;
+    waiting.work = work;
+    waiting.user = user;
+    SCB_ICSR = SCB_ICSR_PENDSVSET;
+}
+
+void nucleo_later_irq(void)
+{
+    waiting.work(waiting.user);
+    nucleo_wake();
+}
+
 const fw_system_ops nucleo_system_ops = {nucleo_time_us,
                                          sleep_until_interrupt,
                                          nucleo_lock,
@@ -198,4 +218,5 @@ const fw_system_ops nucleo_system_ops = {nucleo_time_us,
                                          nucleo_restart,
                                          stack_used,
                                          set_leds,
-                                         button};
+                                         button,
+                                         later};

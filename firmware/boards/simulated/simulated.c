@@ -193,6 +193,23 @@ static void listen(sim_board *sim)
     fw_drive_heard(&sim->instrument);
 }
 
+static void run_later(sim_board *sim)
+{
+    void (*const work)(void *user) = sim->later;
+    sim->later = NULL;
+    if (work != NULL)
+        work(sim->later_user);
+}
+
+static void later(void *ctx, void (*work)(void *user), void *user)
+{
+    sim_board *sim = ctx;
+    sim->later = work;
+    sim->later_user = user;
+    if (!sim->converter.interrupts)
+        run_later(sim);
+}
+
 /* To the end of the next burst, which the application gets; false where its frame is missing. */
 static bool next_burst(sim_board *sim)
 {
@@ -213,7 +230,10 @@ static bool next_burst(sim_board *sim)
     const fw_burst burst = {.samples = converter->codes,
                             .start_us = (uint32_t)start_us,
                             .next_start_us = (uint32_t)converter->slot_us};
+    converter->interrupts = true;
     converter->done(converter->user, &burst);
+    converter->interrupts = false;
+    run_later(sim);
     if (between && (scan->frame != NULL || scan->frames_scanned != frames))
         scan_has_begun(sim);
     return true;
@@ -327,7 +347,7 @@ static const fw_capture_ops CAPTURE = {configure, start, stop};
 static const fw_link_ops LINK = {.write = write_bytes, .read = read_bytes};
 static const fw_store_ops STORE = {bank_start, erase, program};
 static const fw_system_ops SYSTEM = {time_us, wait_idle, lock,      unlock, nothing,
-                                     nothing, no_stack,  show_leds, button};
+                                     nothing, no_stack,  show_leds, button, later};
 
 void sim_init(sim_board *sim, const sim_setup *setup)
 {

@@ -40,6 +40,7 @@ typedef struct sim_converter {
     void *user;
     fw_capture_setup setup;
     bool running;
+    bool interrupts;  /* `done` is under way */
     uint64_t slot_us; /* when the next slot begins */
     /* of the generator's phase at each sample of a burst, from the first on */
     float cosine[FW_MAX_SAMPLES], sine[FW_MAX_SAMPLES];
@@ -63,6 +64,8 @@ typedef struct sim_board {
     size_t to_board_bytes;
     uint8_t to_host[1 << 18];
     size_t to_host_bytes;
+    void (*later)(void *user); /* after the interrupt; NULL: nothing */
+    void *later_user;
     fw_instrument instrument;
 } sim_board;
 

@@ -24,9 +24,7 @@ from eitskin.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from eitskin.device.link import LinkEvent
-    from eitskin.device.live import LiveFrame, LiveSummary
-    from eitskin.device.wire.packets import Fault
+    from eitskin.device.live import Item, LiveSummary
 
 
 def add_parser(subparsers: Any) -> None:
@@ -79,9 +77,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _until(
-    items: Iterator[LiveFrame | Fault | LinkEvent], seconds: float | None
-) -> Iterator[LiveFrame | Fault | LinkEvent]:
+def _until(items: Iterator[Item], seconds: float | None) -> Iterator[Item]:
     from eitskin.device.live import LiveFrame
 
     for item in items:
@@ -90,13 +86,11 @@ def _until(
             return
 
 
-def _count(
-    items: Iterable[LiveFrame | Fault | LinkEvent], summary: LiveSummary, frames: int
-) -> None:
+def _count(items: Iterable[Item], summary: LiveSummary, frames: int) -> None:
     from tqdm import tqdm
 
     from eitskin.device.events import Events
-    from eitskin.device.live import LiveFrame
+    from eitskin.device.live import LiveDrive, LiveFrame
     from eitskin.device.wire.packets import Fault
 
     events = Events()
@@ -110,4 +104,5 @@ def _count(
                 summary.add(item)
                 bar.update()
             else:
+                summary.drives += isinstance(item, LiveDrive)
                 summary.faults += isinstance(item, Fault) and item.raised

@@ -15,6 +15,7 @@ from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
     add_device,
     add_outputs,
+    add_report,
     add_scan,
     add_zones,
     opened_outputs,
@@ -48,6 +49,7 @@ def add_parser(subparsers: Any) -> None:
         "--mode KIND[,KIND]",
         "raw, image, touches, or several (default: all; of a real board image,touches)",
     )
+    add_report(parser)
     option(parser, "--every N", "every N-th frame (default: as many as the line carries)", int)
     option(parser, "--port PORT", f"to listen on; 0 for any (default: {PORT})", int, default=PORT)
     option(

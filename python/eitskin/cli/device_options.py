@@ -134,9 +134,22 @@ def named_solver(options: argparse.Namespace) -> dict[str, Any]:
 def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
     """What is streamed, and how much of it."""
     option(parser, "--mode KIND[,KIND]", "raw, image, touches, events, or several", default=default)
+    add_report(parser)
     option(parser, "--every N", "every N-th frame (default: as many as the line carries)", int)
     option(
         parser, "--frames N", "stop after N (default: go on until Ctrl-C, or the scene ends)", int
+    )
+
+
+def add_report(parser: argparse.ArgumentParser) -> None:
+    """When touches are told."""
+    option(
+        parser,
+        "--report WHEN",
+        "touches after each frame, or also after each drive, with their velocity, in the middle of"
+        " a scan",
+        choices=("frame", "drive"),
+        default="frame",
     )
 
 
@@ -348,9 +361,12 @@ def session_settings(
     from eitskin.live.session import SessionSettings
 
     every, frames = read_every(options)
+    if options.report == "drive" and every > 1:
+        raise UsageError(f"--report drive needs every frame; leave --every {every} out")
     check_recording(record, options.overwrite)
     return SessionSettings(
         mode=mode,
+        report=options.report,
         every=every,
         frames=frames,
         model=options.model,

@@ -12,7 +12,7 @@ from eitskin.errors import EitskinError, UsageError
 
 if TYPE_CHECKING:
     from eitskin.device.wire.link_table import Stream
-    from eitskin.live.frame import Frame
+    from eitskin.live.frame import Frame, Report
     from eitskin.live.session import Session
     from eitskin.sinks.outputs import Outputs
 
@@ -78,6 +78,15 @@ class Rows:
             )
         return rows
 
+    def moving(self, report: Report) -> list[str]:
+        """Of touches after a drive: where they are, and how fast they go."""
+        time = f"{report.time_s:8.4f}"
+        return [
+            f"{time}  drive {report.live.followed.head.drive:2d}: touch {one.id} at {one.x_mm:.1f},"
+            f" {one.y_mm:.1f} mm, {one.vx_mm_per_s:+.0f}, {one.vy_mm_per_s:+.0f} mm/s"
+            for one in report.touches
+        ] or [f"{time}  no touch"]
+
     def _off(self, frame: Frame, number: int) -> str:
         errors = frame.compared.errors_mm
         if errors is None:
@@ -97,7 +106,7 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
     Raises:
         EitskinError: what ended the stream, after everything up to then was summed up.
     """
-    from eitskin.live.frame import Notice
+    from eitskin.live.frame import Notice, Report
     from eitskin.live.message import encoded
     from eitskin.view.stream_picture import Album, draw_stream, film_stream
 
@@ -110,6 +119,10 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
                 outputs.put(item)
             if isinstance(item, Notice):
                 say(item.text)
+                continue
+            if isinstance(item, Report):
+                for text in [encoded(item.message())] if options.json else rows.moving(item):
+                    print(text, flush=True)
                 continue
             if options.picture is not None or options.film is not None:
                 album.add(item.compared)

@@ -188,7 +188,7 @@ class Device(CommandExchange):
             UsageError: ``what``, ``every`` or ``frames`` cannot be.
             DeviceError: the board refuses (no model, not tared), is gone, or has gone silent.
         """
-        if not 0 < what <= 15 or not 1 <= every <= 0xFFFF or not 0 <= frames < 2**32:
+        if not 0 < what <= 31 or not 1 <= every <= 0xFFFF or not 0 <= frames < 2**32:
             raise UsageError(
                 f"stream: what = {int(what)}, every = {every}, frames = {frames} cannot be"
             )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from eitskin.core.diagnostics import names, words
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame
+from eitskin.device.live import Item, LiveDrive
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FAULT_RAISE_FRAMES, FaultCode
 from eitskin.device.wire.packets import DOUBTFUL_FAULTS, FOUND_FAULTS, Fault, Solved
@@ -42,13 +42,15 @@ class Events:
         ] = {}  # what has been said to be there: frames in a row without it
         self._shown: dict[Key, int] = {}  # what the last frame showed: how many in a row
 
-    def lines(self, item: LiveFrame | Fault | LinkEvent) -> list[str]:
+    def lines(self, item: Item) -> list[str]:
         """What is new with ``item``; of a frame only what it shows and those before it did not, or
         what has gone."""
         if isinstance(item, LinkEvent):
             return [link_text(item)]
         if isinstance(item, Fault):
             return self._fault(item)
+        if isinstance(item, LiveDrive):
+            return []
         return [] if item.solved is None else self._found(item.solved)
 
     def _fault(self, fault: Fault) -> list[str]:

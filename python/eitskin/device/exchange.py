@@ -22,6 +22,7 @@ from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
+    FollowedTouches,
     FrameEvents,
     RawFrame,
     Reply,
@@ -37,7 +38,16 @@ ANSWERED_BY: dict[int, type] = {
     PacketType.GET_STATS: BoardStats,
     PacketType.GET_HASHES: BoardHashes,
 }
-Streamed = RawFrame | SolvedImage | SolvedTouches | FrameEvents | Fault | BoardStats | LinkEvent
+Streamed = (
+    RawFrame
+    | SolvedImage
+    | SolvedTouches
+    | FollowedTouches
+    | FrameEvents
+    | Fault
+    | BoardStats
+    | LinkEvent
+)
 
 Self = TypeVar("Self", bound="CommandExchange")
 

@@ -18,6 +18,7 @@ from eitskin.device.wire.link_table import Stream, StreamCommand
 from eitskin.device.wire.packets import (
     BoardStats,
     Fault,
+    FollowedTouches,
     FrameEvents,
     RawFrame,
     Solved,
@@ -27,6 +28,7 @@ from eitskin.device.wire.packets import (
 from eitskin.errors import DeviceError
 
 WRAP_US = 2**32
+LATE_US = 1_000_000
 CLOCK_TIMER, TIMER_COUNT = 5, 0x24  # of the emulated board: its microsecond clock
 
 
@@ -61,12 +63,22 @@ class LiveFrame:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class LiveDrive:
+    """Touches after a drive, and the instant that they are told for, by the same clocks."""
+
+    time_us: int
+    board_us: int
+    followed: FollowedTouches
+
+
 @dataclass
 class LiveSummary:
     """What a stream amounted to. Times are the board's own, in us: solve and touches of each solved
     frame."""
 
     frames: int = 0
+    drives: int = 0
     refused: int = 0
     faults: int = 0
     first_us: int = 0
@@ -104,6 +116,7 @@ class LiveSummary:
         quantiles = self.solve_quantiles_us or (None, None)
         return {
             "frames": self.frames,
+            "drives": self.drives,
             "refused": self.refused,
             "faults": self.faults,
             "frames_a_second": self.rate_hz,
@@ -127,6 +140,8 @@ class LiveSummary:
         if self.board is not None:
             text += f", {self.board.packets_dropped} dropped by the board"
         lines = [text]
+        if self.drives:
+            lines.append(f"touches were told after {self.drives} drives")
         if self.solve_quantiles_us is not None:
             p50, p99 = self.solve_quantiles_us
             lines.append(
@@ -199,9 +214,12 @@ def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
     return began, events
 
 
+Item = LiveFrame | LiveDrive | Fault | LinkEvent
+
+
 def follow(
     device: Device, what: Stream, *, every: int = 1, frames: int = 0
-) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
+) -> Generator[Item, None, None]:
     """``Device.stream``, the packets of each frame put together. A frame is complete when its last
     kind came or another frame begins.
 
@@ -213,7 +231,7 @@ def follow(
 
 def put_together(
     items: Iterator[Any], what: Stream, clock: Clock | None = None
-) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
+) -> Generator[Item, None, None]:
     """Frames out of a stream's packets, timed by ``clock``; ``items`` is closed with it."""
     try:
         yield from _put_together(items, what, clock or Clock())
@@ -222,15 +240,17 @@ def put_together(
             items.close()
 
 
-def _put_together(
-    items: Iterator[Any], what: Stream, clock: Clock
-) -> Iterator[LiveFrame | Fault | LinkEvent]:
-    wanted = bin(what).count("1")
+def _put_together(items: Iterator[Any], what: Stream, clock: Clock) -> Iterator[Item]:
+    wanted = bin(what & ~Stream.FOLLOWED).count("1")
     parts: dict[str, Any] = {}
     number: int | None = None
     for item in items:
         if isinstance(item, Fault | LinkEvent):
             yield item
+            continue
+        if isinstance(item, FollowedTouches):
+            board_us = item.head.time_us
+            yield LiveDrive(clock.elapsed_us(board_us), board_us, item)
             continue
         kind = _KINDS.get(type(item))
         if kind is None:
@@ -249,13 +269,16 @@ def _put_together(
 
 def replayed(
     device: Device, what: Stream, *, every: int = 1, frames: int = 0
-) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
+) -> Generator[Item, None, None]:
     """As ``follow``, of a recording: what a live stream would have shown, which is all but the
     quiet frames of tares, timed from the first frame that is none."""
     start: int | None = None
     count = 0
     for item in follow(device, what):
-        if not isinstance(item, LiveFrame):
+        if isinstance(item, LiveDrive):
+            start = item.time_us if start is None else start
+            yield replace(item, time_us=item.time_us - start)
+        elif not isinstance(item, LiveFrame):
             yield item
         elif item.raw is None or not item.raw.quiet:
             start = item.time_us if start is None else start
@@ -280,6 +303,8 @@ class Clock:
         """Since the first time that was asked for; a restarted board goes on from where it was."""
         if self._last is not None:
             step = (board_us - self._last) % WRAP_US
+            if step > WRAP_US - LATE_US:  # a frame is told of after drives of the next one
+                return self._elapsed_us + step - WRAP_US
             self._elapsed_us += step if step < WRAP_US // 2 else 0
         self._last = board_us
         return self._elapsed_us

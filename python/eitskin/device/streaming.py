@@ -9,7 +9,13 @@ from eitskin.device.exchange import CommandExchange, Streamed
 from eitskin.device.link import LinkEvent
 from eitskin.device.wire.explain import reply_text
 from eitskin.device.wire.link_table import Drive, Stream, StreamCommand
-from eitskin.device.wire.packets import FrameEvents, RawFrame, SolvedImage, SolvedTouches
+from eitskin.device.wire.packets import (
+    FollowedTouches,
+    FrameEvents,
+    RawFrame,
+    SolvedImage,
+    SolvedTouches,
+)
 from eitskin.errors import DeviceError, EitskinError
 
 SILENCES = 3
@@ -22,13 +28,15 @@ class _Progress:
     def __init__(self, what: Stream, frames: int) -> None:
         self.what, self.wanted = what, frames
         self.restarts = 0  # of the board, when it was last told to stream
-        self._came = {kind: 0 for kind in Stream if kind & what}
+        self._came = {kind: 0 for kind in Stream if kind & what & ~Stream.FOLLOWED}
 
     def take(self, item: Streamed) -> bool:
         """Count ``item``; False where it is a frame's of a kind that was not asked for."""
         kind = _KIND.get(type(item))
         if kind is None:
             return True
+        if kind is Stream.FOLLOWED:  # of drives, not of frames
+            return bool(kind & self.what)
         if kind not in self._came:
             return False
         self._came[kind] += 1
@@ -37,12 +45,12 @@ class _Progress:
     @property
     def complete(self) -> bool:
         """Every kind came for every frame that was wanted."""
-        return bool(self.wanted) and min(self._came.values()) >= self.wanted
+        return bool(self.wanted) and min(self._came.values(), default=0) >= self.wanted
 
     @property
     def rest(self) -> int:
         """Frames that are still to come, 0 where there is no limit."""
-        return max(self.wanted - max(self._came.values()), 1) if self.wanted else 0
+        return max(self.wanted - max(self._came.values(), default=0), 1) if self.wanted else 0
 
 
 _KIND: dict[type, Stream] = {
@@ -50,6 +58,7 @@ _KIND: dict[type, Stream] = {
     SolvedImage: Stream.IMAGE,
     SolvedTouches: Stream.TOUCHES,
     FrameEvents: Stream.EVENTS,
+    FollowedTouches: Stream.FOLLOWED,
 }
 
 
@@ -153,6 +162,10 @@ def _replay(device: CommandExchange, what: Stream, every: int, frames: int) -> I
         kind = _KIND.get(type(item))
         if kind is None:
             yield item
+            continue
+        if isinstance(item, FollowedTouches):
+            if kind & what:
+                yield item
             continue
         assert isinstance(item, (RawFrame, SolvedImage, SolvedTouches, FrameEvents))
         place = numbers.setdefault(item.frame, len(numbers))

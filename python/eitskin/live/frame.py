@@ -14,9 +14,10 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import GestureEvent
 from eitskin.core.notebook import places_text, touches_html
 from eitskin.device.known_model import KnownModel
-from eitskin.device.live import LiveFrame
+from eitskin.device.live import LiveDrive, LiveFrame
+from eitskin.device.wire.link_table import FollowedTouch
 from eitskin.device.wire.packets import Solved
-from eitskin.live.message import frame_table, head, true_table
+from eitskin.live.message import frame_table, head, report_table, true_table
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.stream_check import ComparedFrame
 
@@ -35,6 +36,35 @@ class Notice:
     def message(self) -> dict[str, Any]:
         """For programs (docs/reference/message.md)."""
         return head("notice") | asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """Touches after a drive: where they are at an instant within a scan, and where to they go.
+
+    Attributes:
+        live: its packet as the board sent it.
+        time_unix_s: as a frame's.
+    """
+
+    live: LiveDrive
+    time_unix_s: float | None = None
+
+    @property
+    def time_s(self) -> float:
+        """The instant, by the clock of frames' ``time_s``."""
+        return self.live.time_us / 1e6
+
+    @property
+    def touches(self) -> tuple[FollowedTouch, ...]:
+        """In the order in which they came: mm, mm/s; their ids are not those of frames."""
+        return self.live.followed.touches
+
+    def message(self) -> dict[str, Any]:
+        """For programs (docs/reference/message.md)."""
+        head, times = self.live.followed.head, (self.time_s, self.time_unix_s)
+        message = report_table(head.frame, head.drive, *times, self.touches)
+        return message | {"board_us": self.live.board_us, "age_us": head.age_us}
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from importlib.resources import files
 from typing import Any
 
 from eitskin.core.diagnostics_table import Touch
+from eitskin.device.wire.link_table import FollowedTouch
 from eitskin.scene.random_touches import TrueTouch
 
 VERSION = 1
@@ -65,6 +66,23 @@ def frame_table(
         "found": list(found),
         "refused": refused,
         "info": None if info is None else {key: known(value) for key, value in info.items()},
+    }
+
+
+def report_table(
+    frame: int,
+    drive: int,
+    time_s: float,
+    time_unix_s: float | None,
+    touches: Sequence[FollowedTouch],
+) -> dict[str, Any]:
+    """What the message of touches after a drive has."""
+    return head("report") | {
+        "frame": frame,
+        "drive": drive,
+        "time_s": time_s,
+        "time_unix_s": time_unix_s,
+        "touches": [asdict(touch) for touch in touches],
     }
 
 

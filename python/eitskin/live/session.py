@@ -25,6 +25,8 @@ from eitskin.device.known_model import KnownModel, find_model, need_model
 from eitskin.device.link import LinkEvent, Reconnect
 from eitskin.device.live import (
     Clock,
+    Item,
+    LiveDrive,
     LiveFrame,
     LiveSummary,
     begin_scene,
@@ -40,7 +42,7 @@ from eitskin.device.timing import Pacer, Slowness, WaitingClock, split_timing
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.device.wire.packets import Fault
 from eitskin.errors import EitskinError, UsageError
-from eitskin.live.frame import Frame, Notice
+from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.gestures import GestureTeller
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore, truth_of
 from eitskin.scoring.stream_check import Watcher
@@ -56,7 +58,7 @@ KEPT_ON = (
     " --no-keep-drive  changes that"
 )
 KINDS = ("raw", "image", "touches", "events")
-Item: TypeAlias = LiveFrame | Fault | LinkEvent
+REPORTS = ("frame", "drive")
 Say: TypeAlias = Callable[[str], None]
 T = TypeVar("T")
 
@@ -81,6 +83,7 @@ class SessionSettings:
 
     Attributes:
         mode: what is streamed.
+        report: "frame", or also touches after each "drive", with their velocity.
         every: every n-th frame; 0: as many as the line carries.
         frames: stop after so many; 0: go on until the scene or the recording ends.
         model: a file, where the board's model is not the prebuilt one.
@@ -94,6 +97,7 @@ class SessionSettings:
     """
 
     mode: Stream = Stream.TOUCHES
+    report: str = "frame"
     every: int = 0
     frames: int = 0
     model: Path | None = None
@@ -254,8 +258,8 @@ class Session:
                         if self._over(item):
                             return
                         count += 1
-                        if self.timed:
-                            self.pacer.hold(item.time_us)
+                    if isinstance(item, LiveFrame | LiveDrive) and self.timed:
+                        self.pacer.hold(item.time_us)
                     yield item
                     if self._stopping.is_set() or 0 < self.settings.frames <= count:
                         return
@@ -271,9 +275,9 @@ class Session:
                 return
             self._carry_out()
 
-    def frames(self) -> Generator[Frame | Notice, None, None]:
-        """The same as frames beside the truth and notices of what is new with them, summed up in
-        ``summary`` and ``score``."""
+    def frames(self) -> Generator[Frame | Report | Notice, None, None]:
+        """The same as frames beside the truth, touches after drives where they were asked for, and
+        notices of what is new, summed up in ``summary`` and ``score``."""
         self.start()
         watcher, events, last = Watcher(self.known, self.truth), Events(), None
         gestures = GestureTeller(self.settings.zones)
@@ -283,6 +287,10 @@ class Session:
             for item in items:
                 now_s = None if self.replays else time.time()
                 arrived_ns = time.monotonic_ns()
+                if isinstance(item, LiveDrive):
+                    self.summary.drives += 1
+                    yield Report(item, now_s)
+                    continue
                 if isinstance(item, LiveFrame):
                     last = item.time_us / 1e6
                     if self.url.startswith("emu:"):
@@ -425,7 +433,10 @@ class Session:
             raise UsageError(f"{self.name} is a recording already; copy the file")
 
     def _carried(self) -> int:
-        """Every how manieth frame the line carries."""
+        """Every how manieth frame the line carries; with touches after each drive all are asked
+        for."""
+        if self.settings.report == "drive":
+            return 1
         mode = self.settings.mode
         carried = carried_every(self.device, mode)
         if carried > 1:
@@ -440,21 +451,23 @@ class Session:
         how = self.settings
         if self.replays:
             return self._replayed()
-        frames = max(how.frames - count, 1) if how.frames else 0
-        stream = self.device.stream(how.mode, every=self._every, frames=frames)
-        return put_together(stream, how.mode, clock)
+        frames = max(how.frames - count, 1) if how.frames and how.report == "frame" else 0
+        stream = self.device.stream(self._streamed, every=self._every, frames=frames)
+        return put_together(stream, self._streamed, clock)
 
     def _replayed(self) -> Generator[Item, None, None]:
         """The recording; with ``loop`` again and again, as if it went on."""
         how, offset_us = self.settings, 0
         while True:
             last_us = step_us = 0
-            items = replayed(self.device, how.mode, every=how.every or 1, frames=how.frames)
+            every, frames = how.every or 1, how.frames
+            items = replayed(self.device, self._streamed, every=every, frames=frames)
             for item in items:
                 if isinstance(item, LiveFrame):
                     if self._over(item):
                         break
                     step_us, last_us = item.time_us - last_us, item.time_us
+                if isinstance(item, LiveFrame | LiveDrive):
                     item = replace(item, time_us=item.time_us + offset_us)
                 yield item
             items.close()
@@ -463,6 +476,11 @@ class Session:
             offset_us += last_us + step_us
             self.device.close()
             self.device = self._open()
+
+    @property
+    def _streamed(self) -> Stream:
+        drives = self.settings.report == "drive"
+        return self.settings.mode | (Stream.FOLLOWED if drives else Stream(0))
 
     def _over(self, frame: LiveFrame) -> bool:
         """The scene has ended; an emulated board would hold its last frame for ever."""

@@ -24,13 +24,14 @@ from eitskin.device.wire.link_table import PacketType, Stream
 from eitskin.device.wire.packets import RawFrame
 from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.errors import DeviceError, EitskinError, UsageError
-from eitskin.live.frame import Frame, Notice
+from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.session import KINDS, TARE_FRAMES, Session, SessionSettings
 
 if TYPE_CHECKING:
     from eitskin.page.teacher import Teacher
     from eitskin.sinks.outputs import Outputs
 
+DRAWN_S = 0.015
 FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
 T = TypeVar("T")
 
@@ -95,6 +96,7 @@ class Follower:
         self.state, self.text = "starting", ""
         self.error: Exception | None = None
         self.frames = 0
+        self._reported_s = 0.0
         self._stopping, self._again = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="eitskin view", daemon=True)
 
@@ -154,6 +156,8 @@ class Follower:
                         outputs.put(item)
                     if isinstance(item, Notice):
                         self._notice(item)
+                    elif isinstance(item, Report):
+                        self._report(item)
                     else:
                         self.frames += 1
                         self._on_frame(item)
@@ -163,6 +167,14 @@ class Follower:
                 frames.close()
                 self.settings = replace(session.settings, record=None)
                 self._speed = session.pacer.speed
+
+    def _report(self, report: Report) -> None:
+        """No more of them than a page draws; none that says that nothing touches any more is left
+        out."""
+        if report.touches and 0 <= report.time_s - self._reported_s < DRAWN_S:
+            return
+        self._reported_s = report.time_s
+        self._on_news("report", report.message())
 
     def _notice(self, notice: Notice) -> None:
         self._on_news("notice", notice.message())

@@ -29,7 +29,7 @@ class McapSink:
 
     def write(self, told: Told) -> None:
         message = told.message
-        if message["type"] == "summary":
+        if message["type"] in ("summary", "report"):
             return
         if self._writer is None:
             self._begin(told.frame is not None and told.frame.image is not None)

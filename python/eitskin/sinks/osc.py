@@ -65,6 +65,11 @@ def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
     """Paths and arguments of a message; none of a summary."""
     if message["type"] == "notice":
         return [("/notice", [message["kind"], message["text"]])]
+    if message["type"] == "report":
+        head = [message["frame"] & 0x7FFFFFFF, message["drive"], float(message["time_s"])]
+        names = ("id", "x_mm", "y_mm", "vx_mm_per_s", "vy_mm_per_s", "strength_s_per_m_mm2")
+        moving = [("/moving", [one[name] for name in names]) for one in message["touches"]]
+        return [("/drive", [*head, len(moving)]), *moving]
     if message["type"] != "frame":
         return []
     touches = message["touches"] or []

@@ -13,7 +13,7 @@ from typing import Any
 
 from eitskin.config import nearest
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame, Notice
+from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.message import summary_message
 from eitskin.sinks.sink import Dropped, Sink, Source, Told, without_password
 
@@ -79,7 +79,7 @@ class Outputs:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def put(self, item: Frame | Notice) -> None:
+    def put(self, item: Frame | Report | Notice) -> None:
         """Give it to every sink."""
         told = Told(item)
         for one in self._queues:

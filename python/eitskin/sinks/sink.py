@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame, Notice
+from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.message import encoded
 from eitskin.model.model import Model
 
@@ -40,11 +40,12 @@ class Source:
 
 
 class Told:
-    """A frame or a notice, or the ``summary`` message that ends it all, on its way to sinks. What
-    they share is made once, by the first that asks for it."""
+    """A frame, touches after a drive, a notice, or the ``summary`` message that ends it all, on its
+    way to sinks. What they share is made once, by the first that asks for it."""
 
-    def __init__(self, item: Frame | Notice | dict[str, Any]) -> None:
+    def __init__(self, item: Frame | Report | Notice | dict[str, Any]) -> None:
         self.frame = item if isinstance(item, Frame) else None
+        self.report = item if isinstance(item, Report) else None
         self.notice = item if isinstance(item, Notice) else None
         self._item = item
 

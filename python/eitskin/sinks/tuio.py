@@ -71,7 +71,7 @@ class TuioSink:
 
     def write(self, told: Told) -> None:
         message = told.message
-        if message["type"] == "notice":
+        if message["type"] in ("notice", "report"):
             return
         touches = message.get("touches") or []
         self._time_s = message.get("time_s", self._time_s)

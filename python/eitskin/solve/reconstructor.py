@@ -70,6 +70,11 @@ class Reconstructor:
         return cls(model, engine=engine, options=options, blob=blob)
 
     @property
+    def c_engine(self) -> CoreEngine | None:
+        """The C core's context, for what else works on it; None of another engine."""
+        return self._engine if isinstance(self._engine, CoreEngine) else None
+
+    @property
     def options(self) -> Options:
         """The options in force."""
         return self._options

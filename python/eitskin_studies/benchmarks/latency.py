@@ -2,8 +2,8 @@
 
 Presses come at random times and places, while scans follow one another without a pause; each row is
 measured at its own instant, so that a press lands and lifts in the middle of scans. The scan's part
-is the simulated board's, solve and link the emulated one's, host this machine's; a whole is drawn
-from the parts at random.
+is the simulated board's, update, solve and link the emulated one's, host this machine's; a whole is
+drawn from the parts at random.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from eitskin.device.ports import BAUD
 from eitskin.device.wire.codec import Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream
-from eitskin.live.frame import Frame
+from eitskin.live.frame import Frame, Report
 from eitskin.live.session import Session, SessionSettings
 from eitskin_studies.benchmarks.outputs import BITS_A_BYTE, host_times_ms
 from eitskin_studies.gestures.bench import wilson
@@ -30,17 +30,19 @@ from eitskin_studies.harness.sections import Filling
 
 FloatArray = npt.NDArray[np.float64]
 
-ROWS, ROW_US = 208, 100.0
+ROWS, ROW_US, DRIVES_A_FRAME = 208, 100.0, 16
 RATE_HZ = 1e6 / (ROWS * ROW_US)  # scans without a pause
 RISES_MS = (0, 30, 60, 120)
 QUIET_FRAMES = 64
-APART_S, HELD_S = 0.25, 0.25  # at least from lift to contact; fully pressed
+HELD_S = 0.25  # fully pressed; and at least from lift to contact
 LINGER_S = 0.1  # after a lift a touch may still be told for so long
 REACH_MM = 60.0  # of contacts from the centre
 FALSE_MM = 20.0  # a touch farther off is a false one
 IN_SESSION = 50  # presses; each session takes a reference of its own
 DRAWS = 20_000
-WHOLE = "whole frames"
+WHOLE, DRIVES = "whole frames", "after each drive"
+REPORT = {WHOLE: "frame", DRIVES: "drive"}
+QUICK_S = 0.06  # on the emulated board presses of drives are held so long, and as far apart
 HEAD = ("method", "rise, ms", "missed", "presses with a false touch", "false touches a press",
     "presses with a false diagnostic", "scan, ms", "at the device, ms", "at the host, ms",
     "error then, mm")  # fmt: skip
@@ -66,9 +68,9 @@ class Press:
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What one frame told: its scan from ``began_s`` to ``ended_s`` on the scene's clock, places
-    of touches (k, 2) in mm, names of diagnostics; how long after the scan the packet was made, and
-    takes on the line."""
+    """What one frame or drive told: measured from ``began_s`` to ``ended_s`` on the scene's clock,
+    places of touches (k, 2) in mm, names of diagnostics; how long after it the packet was made, and
+    takes on the line. Where drives tell of touches, frames only tell of diagnostics."""
 
     began_s: float
     ended_s: float
@@ -81,14 +83,15 @@ class Told:
 @dataclass(frozen=True)
 class Judged:
     """The presses of one rise: what was first told of each (``scan_ms``: from the contact to the
-    end of the scan that told); presses with a false touch, how many those were, and presses with a
-    diagnostic."""
+    end of the scan, or drive, that told; ``later_ms``: from there until the packet was made);
+    presses with a false touch, how many those were, and presses with a diagnostic."""
 
     method: str
     rise_ms: int
     presses: int
     scan_ms: tuple[float, ...]
     error_mm: tuple[float, ...]
+    later_ms: tuple[float, ...]
     with_false: int
     false_touches: int
     diagnosed: int
@@ -123,36 +126,47 @@ def run(presses: int, emulated: int, seed: int, order: str = "") -> Latency:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         judged = []
-        for one in ("", order) if order else ("",):
+        orders = ("", order) if order else ("",)
+        for method, one in ((m, o) for m in (DRIVES, WHOLE) for o in reversed(orders)):
             model = _model(place, one)
-            name = f"{WHOLE}, drives {one}" if one else WHOLE
+            name = f"{method}, drives {one}" if one else method
             for rise_ms in RISES_MS:
                 sessions = []
                 for first in range(0, presses, IN_SESSION):
                     own_seed = seed + 10_000 * rise_ms + first
                     count = min(IN_SESSION, presses - first)
                     drawn = draw(count, 1e-3 * rise_ms, own_seed)
-                    sessions.append((drawn, list(follow("sim", place, drawn, own_seed, model))))
+                    told = follow("sim", place, drawn, own_seed, model, REPORT[method])
+                    sessions.append((drawn, list(told)))
                 judged.append(judge(name, rise_ms, sessions))
-        parts = _parts(place, emulated, seed)
+        parts = _parts(place, emulated, seed, order)
     rng = np.random.default_rng(seed)
     whole = tuple(_whole(one, parts, rng) for one in judged)
     shown = {name: (*_spread(values), len(values)) for name, values in parts.items()}
     return Latency(tuple(judged), shown, whole, machine())
 
 
-def _parts(place: Path, emulated: int, seed: int) -> dict[str, FloatArray]:
+def _named(method: str, judged: Judged, told: Sequence[Told], what: str) -> dict[str, FloatArray]:
+    found = [one for one in told if len(one.touches_mm)]
+    return {
+        f"scan, {method}": np.array(judged.scan_ms),
+        f"{what}, {method}": np.array([one.solve_ms for one in found]),
+        f"link, {method}": np.array([one.link_ms for one in found]),
+    }
+
+
+def _parts(place: Path, emulated: int, seed: int, order: str) -> dict[str, FloatArray]:
     """What the emulated board and this host take, ms."""
-    parts = {}
+    parts: dict[str, FloatArray] = {}
     if emulated:
         drawn = draw(emulated, 0.03, seed + 1)
         told = list(follow("emu", place, drawn, seed, None))
-        found = [one for one in told if len(one.touches_mm)]
-        parts = {
-            "scan, emulated": np.array(judge(WHOLE, 30, [(drawn, told)]).scan_ms),
-            "solve": np.array([one.solve_ms for one in found]),
-            "link": np.array([one.link_ms for one in found]),
-        }
+        parts = _named(WHOLE, judge(WHOLE, 30, [(drawn, told)]), told, "solve")
+        quick = draw(emulated, 0.03, seed + 2, QUICK_S)
+        told = list(follow("emu", place, quick, seed, _model(place, order), REPORT[DRIVES]))
+        judged = judge(DRIVES, 30, [(quick, told)])
+        parts |= _named(DRIVES, judged, told, "update")
+        parts[f"first update, {DRIVES}"] = np.array(judged.later_ms)
     steady = _written(place, "steady", draw(2, 0.0, seed), seed)
     return parts | {"host": host_times_ms(steady)}
 
@@ -173,14 +187,14 @@ def _model(place: Path, order: str) -> Path | None:
     return path
 
 
-def draw(count: int, rise_s: float, seed: int) -> list[Press]:
-    """Presses one after another, at random times and places."""
+def draw(count: int, rise_s: float, seed: int, held_s: float = HELD_S) -> list[Press]:
+    """Presses one after another, at random times and places, as far apart as they are held."""
     rng, presses, now = np.random.default_rng(seed), [], 0.0
     for _ in range(count):
-        now += APART_S + float(rng.uniform(0, 2 / RATE_HZ))
+        now += held_s + float(rng.uniform(0, 2 / RATE_HZ))
         reach, angle = REACH_MM * np.sqrt(rng.random()), 2 * np.pi * rng.random()
         x_mm, y_mm = float(reach * np.cos(angle)), float(reach * np.sin(angle))
-        presses.append(Press(now, rise_s, now + rise_s + HELD_S, x_mm, y_mm))
+        presses.append(Press(now, rise_s, now + rise_s + held_s, x_mm, y_mm))
         now = presses[-1].gone_s
     return presses
 
@@ -208,37 +222,53 @@ def _written(place: Path, name: str, presses: Sequence[Press], seed: int) -> Pat
 
 
 def follow(
-    board: str, place: Path, presses: Sequence[Press], seed: int, model: Path | None
+    board: str,
+    place: Path,
+    presses: Sequence[Press],
+    seed: int,
+    model: Path | None,
+    report: str = "frame",
 ) -> Iterator[Told]:
-    """What a board, "sim" or "emu", tells of ``presses``, frame by frame."""
+    """What a board, "sim" or "emu", tells of ``presses``, frame by frame or drive by drive."""
     scene = _written(place, f"{board}-{len(presses)}", presses, seed)
-    settings = SessionSettings(mode=Stream.TOUCHES, tare=QUIET_FRAMES, model=model, every=1)
+    settings = SessionSettings(
+        mode=Stream.TOUCHES, tare=QUIET_FRAMES, model=model, every=1, report=report
+    )
     with Session(f"{board}:{scene}", settings) as session:
         session.start()
         sizes = [0]  # of the last packet with touches
+        teller = PacketType.TOUCHES if report == "frame" else PacketType.FOLLOWED
 
         def tap(packet: Packet) -> None:
-            if packet.type == PacketType.TOUCHES:
+            if packet.type == teller:
                 sizes[0] = len(encode(packet.type, packet.sequence, packet.payload))
 
         session.device.record(tap)
         truth, scan_s = session.truth, 1e-6 * ROWS * session.device.board.slot_us
         assert truth is not None
-        for frame in session.frames():
-            if not isinstance(frame, Frame) or frame.info is None:
+        half_s = scan_s * (ROWS // DRIVES_A_FRAME) / ROWS / 2
+        for item in session.frames():
+            if not isinstance(item, Frame | Report):
                 continue
+            told_us = item.live.board_us
+            if isinstance(item, Report):
+                told_us -= round(1e6 * half_s)
             if truth.began_us is None:  # a simulated board's scene begins with a scan
-                truth.begin(frame.live.board_us)
-            began_s = 1e-6 * (frame.live.board_us - (truth.began_us or 0))
-            places = np.array([(t.x_mm, t.y_mm) for t in frame.touches]).reshape(-1, 2)
-            yield Told(
-                began_s,
-                began_s + scan_s,
-                places,
-                frame.diagnostics,
-                frame.info.age_us / 1e3,
-                1e3 * sizes[0] * BITS_A_BYTE / BAUD,
-            )
+                truth.begin(told_us)
+            began_s = 1e-6 * (told_us - (truth.began_us or 0))
+            link_ms = 1e3 * sizes[0] * BITS_A_BYTE / BAUD
+            if isinstance(item, Report):
+                age_us = item.live.followed.head.age_us
+                yield Told(began_s, began_s + 2 * half_s, _places(item), (), age_us / 1e3, link_ms)
+            elif item.info is not None:
+                shown = _places(item) if report == "frame" else np.zeros((0, 2))
+                age_ms = item.info.age_us / 1e3
+                ended_s = began_s + scan_s
+                yield Told(began_s, ended_s, shown, item.diagnostics, age_ms, link_ms)
+
+
+def _places(item: Frame | Report) -> FloatArray:
+    return np.array([(t.x_mm, t.y_mm) for t in item.touches]).reshape(-1, 2)
 
 
 def judge(
@@ -246,7 +276,7 @@ def judge(
 ) -> Judged:
     """What was told of each press, session by session. False: a touch over ``FALSE_MM`` from the
     press, a second one, one before the contact or over ``LINGER_S`` after the press has gone."""
-    scans, errors, counts, diagnosed = [], [], [], 0
+    scans, errors, later, counts, diagnosed = [], [], [], [], 0
     for presses, told in sessions:
         ends_s = [press.contact_s for press in presses[1:]] + [np.inf]
         at = 0
@@ -261,18 +291,20 @@ def judge(
                 wrong += len(away_mm) - int(there and bool((away_mm <= FALSE_MM).any()))
                 named |= bool(one.diagnostics)
                 if first is None and begun and one.began_s < press.gone_s and len(away_mm):
-                    first = one.ended_s - press.contact_s, float(away_mm.min())
+                    first = one.ended_s - press.contact_s, float(away_mm.min()), one.solve_ms
             counts.append(wrong)
             diagnosed += named
             if first is not None:
                 scans.append(1e3 * first[0])
                 errors.append(first[1])
+                later.append(first[2])
     return Judged(
         method,
         rise_ms,
         len(counts),
         tuple(scans),
         tuple(errors),
+        tuple(later),
         sum(count > 0 for count in counts),
         sum(counts),
         diagnosed,
@@ -293,15 +325,15 @@ def _whole(
     """From contact to report: when the device has it, and when the host has."""
     if not one.scan_ms:
         return {}
-    drawn = {
-        name: rng.choice(parts[name], DRAWS) if len(parts.get(name, ())) else np.zeros(DRAWS)
-        for name in ("solve", "link", "host")
-    }
-    device = rng.choice(one.scan_ms, DRAWS) + drawn["solve"]
-    return {
-        "device": _spread(device),
-        "host": _spread(device + drawn["link"] + drawn["host"]),
-    }
+    method = DRIVES if one.method.startswith(DRIVES) else WHOLE
+    names = (f"first update, {DRIVES}" if method == DRIVES else f"solve, {WHOLE}",
+             f"link, {method}", "host")  # fmt: skip
+    solve, link, host = (
+        rng.choice(parts[name], DRAWS) if len(parts.get(name, ())) else np.zeros(DRAWS)
+        for name in names
+    )
+    device = rng.choice(one.scan_ms, DRAWS) + solve
+    return {"device": _spread(device), "host": _spread(device + link + host)}
 
 
 def _percent(count: int, of: int) -> str:
@@ -352,7 +384,7 @@ def as_text(result: Latency) -> str:
 
 def for_page(result: Latency, command: str) -> Filling:
     """The marks ``latency-run``, ``latency`` and ``latency-parts``."""
-    emulated = result.parts_ms.get("scan, emulated")
+    emulated = result.parts_ms.get(f"scan, {WHOLE}")
     run_text = (
         f"By `{command}`: {result.judged[0].presses} presses a rise on `sim:`,"
         f" {0 if emulated is None else emulated[3]} found on the emulated board;"

@@ -11,7 +11,7 @@ from eitskin.view.sheets import save_picture
 from eitskin_studies.benchmarks.latency import Latency
 
 COLOURS = ("#1f5fa8", "#2a9d8f", "#e9a03b", "#b3202c")
-LINES = ("-", "--", ":")
+LINES = ("-", "--", ":", "-.")
 
 
 def draw_latency(path: Path, result: Latency) -> None:

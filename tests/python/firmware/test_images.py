@@ -20,6 +20,7 @@ MEMORIES = ((FLASH, FLASH_BYTES), (DTCM, DTCM_BYTES), (SRAM, SRAM_BYTES))
 IMAGE = "eitskin_nucleo_f767zi"
 HANDLERS = {
     2: "nucleo_clock_irq",
+    14: "nucleo_later_irq",
     15: "nucleo_tick_irq",
     16 + 1: "nucleo_supply_irq",
     16 + 12: "nucleo_dma1_stream1_irq",

@@ -44,7 +44,7 @@ def test_presses_are_drawn_apart_and_inside(tmp_path: Path) -> None:
     presses = latency.draw(20, 0.03, 5)
     scene = load_scene(latency._written(tmp_path, "x", presses, 1))
     assert len(scene.touches) == 20 and scene.rate_hz == pytest.approx(48.077, abs=1e-3)
-    assert all(b.contact_s - a.gone_s >= latency.APART_S for a, b in pairwise(presses))
+    assert all(b.contact_s - a.gone_s >= latency.HELD_S for a, b in pairwise(presses))
     phases = np.array([press.contact_s * scene.rate_hz % 1 for press in presses])
     assert phases.min() < 0.2 and phases.max() > 0.8
     (one,) = scene.samples_at(np.array([presses[3].contact_s + 0.015]))[3:4]
@@ -54,14 +54,16 @@ def test_presses_are_drawn_apart_and_inside(tmp_path: Path) -> None:
 def test_a_run_fills_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(latency, "RISES_MS", (30,))
     result = latency.run(1, 0, 1)
-    (one,) = result.judged
-    assert (one.method, one.rise_ms, one.missed) == (latency.WHOLE, 30, 0)
-    assert 0 < one.scan_ms[0] < 80
+    assert [one.method for one in result.judged] == [latency.DRIVES, latency.WHOLE]
+    assert all((one.rise_ms, one.missed) == (30, 0) for one in result.judged)
+    drives, frames = (one.scan_ms[0] for one in result.judged)
+    assert 0 < drives < 20 and drives < frames < 80
     assert list(result.parts_ms) == ["host"]
     page = tmp_path / "latency.md"
     page.write_text(PAGE.read_text())
     fill_marks(page, "latency", latency.for_page(result, "eitskin bench latency"))
     assert "1 presses a rise on `sim:`" in page.read_text()
+    assert latency.DRIVES in latency.as_text(result)
     assert "whole frames" in latency.as_text(result)
     ordered = latency._model(tmp_path, "by 7")
     assert ordered is not None and load_model(ordered)[0].protocol.drive_order[1] == 7

@@ -16,9 +16,10 @@ from eitskin.core.gestures import Gestures, event_numbers
 from eitskin.core.results import Info, Options, Reconstruction
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame, follow
+from eitskin.device.live import Item, LiveDrive, LiveFrame, follow
+from eitskin.device.recordings.drives_twin import DrivesTwin
 from eitskin.device.wire.link_table import Quality
-from eitskin.device.wire.packets import Fault, RawFrame, Solved
+from eitskin.device.wire.packets import BoardInfo, FollowedTouches, RawFrame, Solved
 from eitskin.errors import FrameError
 from eitskin.solve.reconstructor import Reconstructor
 
@@ -29,9 +30,9 @@ class HostCheck:
 
     ``same``: every bit of the image, and of the touches but their ids, which count on from whatever
     the board did before, of the events that these touches make, and all that was found in the
-    frame. ``different``: numbers of frames that
-    are not. ``untold``: frames whose solve, touches or reference come from one that was lost on the
-    way. ``alone``: solved on the board without its raw frame here.
+    frame. ``different``: numbers of frames that are not. ``untold``: frames whose solve, touches or
+    reference come from one that was lost on the way. ``alone``: solved on the board without its raw
+    frame here. ``drives``: after which the touches are the same.
     """
 
     same: int = 0
@@ -41,6 +42,8 @@ class HostCheck:
     different: list[int] = field(default_factory=list)
     untold: int = 0
     alone: int = 0
+    drives: int = 0
+    drives_different: int = 0
     worst: float = 0.0
 
     @property
@@ -50,7 +53,8 @@ class HostCheck:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return asdict(self) | {"same_bits": self.compared > 0 and not self.different}
+        wrong = bool(self.different) or self.drives_different > 0
+        return asdict(self) | {"same_bits": self.compared > 0 and not wrong}
 
     def text(self) -> str:
         """In a line."""
@@ -65,18 +69,23 @@ class HostCheck:
         else:
             line = f"same bits: yes, {self.images} images and the touches of {self.touches} frames"
             line += f"; {self.events} events" if self.events else ""
+            line += f"; the touches after {self.drives} drives" if self.drives else ""
+        if self.drives_different:
+            line = f"same bits: NO, of touches after {self.drives_different} drives; {line}"
         return line + (f"; {self.untold} frames after losses not told" if self.untold else "")
 
 
 class HostTwin:
-    """This host's core, kept in step with a board's.
+    """This host's core, kept in step with a board's; with ``board`` also touches after drives.
 
     Raises:
         UsageError: an option is out of range.
     """
 
-    def __init__(self, known: KnownModel, options: Options) -> None:
+    def __init__(self, known: KnownModel, options: Options, board: BoardInfo | None = None) -> None:
         self._core = Reconstructor(known.model, blob=known.blob, options=options)
+        self._drives: DrivesTwin | None = None
+        self._board, self._protocol = board, known.model.protocol
         self._from_before = options.warm_start or options.reference_frames > 0
         self._tracks = options.tracks
         self._quiet: list[RawFrame] = []
@@ -84,11 +93,13 @@ class HostTwin:
         self._gestures = Gestures()
         self.check = HostCheck()
 
-    def follow(self, items: Iterable[LiveFrame | Fault | LinkEvent]) -> HostCheck:
+    def follow(self, items: Iterable[Item]) -> HostCheck:
         """Take everything of a stream or recording, tare included."""
         for item in items:
             if isinstance(item, LiveFrame):
                 self.take(item)
+            elif isinstance(item, LiveDrive):
+                self.hear(item.followed)
             elif isinstance(item, LinkEvent):
                 self.lost()
         return self.check
@@ -97,6 +108,16 @@ class HostTwin:
         """Something is missing here: perhaps a frame from which the next solve began, perhaps a
         quiet one."""
         self._sure, self._lost, self._told = False, True, False
+        if self._drives is not None:
+            self._drives.forget()
+
+    def hear(self, packet: FollowedTouches) -> None:
+        """Touches after a drive; their frame comes later."""
+        engine = self._core.c_engine
+        if self._drives is None and self._board is not None and engine is not None:
+            self._drives = DrivesTwin(engine, self._protocol, self._board)
+        if self._drives is not None:
+            self._drives.hear(packet)
 
     def take(self, frame: LiveFrame) -> Reconstruction | None:
         """The next frame; returns what this host makes of it, None where the board solved
@@ -107,6 +128,7 @@ class HostTwin:
         if self._quiet:
             self._tare()
         self._lost = False
+        aligned = self._drive(frame.raw)
         if frame.solved is None:
             return None
         if frame.raw is None:
@@ -116,7 +138,16 @@ class HostTwin:
         if not self._tared:
             self.check.untold += 1
             return None
-        return self._compare(frame, frame.raw)
+        return self._compare(frame, frame.raw, aligned)
+
+    def _drive(self, raw: RawFrame | None) -> npt.NDArray[np.float32] | None:
+        """The drives of a frame; it as its solver got it, None where that is as it is."""
+        twin = self._drives
+        if twin is None or raw is None or not self._tared:
+            return None
+        aligned = twin.take(raw)
+        self.check.drives, self.check.drives_different = twin.same, twin.different
+        return aligned
 
     def _tare(self) -> None:
         quiet, self._quiet = self._quiet, []
@@ -133,12 +164,18 @@ class HostTwin:
         self._gestures.reset()
         self._tared = self._sure = self._told = True
 
-    def _compare(self, frame: LiveFrame, raw: RawFrame) -> Reconstruction | None:
+    def _compare(
+        self, frame: LiveFrame, raw: RawFrame, aligned: npt.NDArray[np.float32] | None
+    ) -> Reconstruction | None:
+        follows = self._drives is not None and aligned is not None
+        volts = raw.voltage_v if aligned is None else aligned
         try:
-            result = self._core.reconstruct(raw.voltage_v, touches=frame.touches is not None)
+            result = self._core.reconstruct(volts, touches=follows or frame.touches is not None)
         except FrameError:
             self._count(frame, frame.refused is not None, 1.0, self._from_before)
             return None
+        if self._drives is not None and aligned is not None:
+            self._drives.found(result.touches)
         assert frame.solved is not None
         same, difference = (
             frame.refused is None
@@ -200,7 +237,9 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
     with Device(FileTransport(path)) as device:
         known = need_model(device.board, model, str(path), "the comparison")
         twin = HostTwin(
-            known, board_options(known.model, device.board) if options is None else options
+            known,
+            board_options(known.model, device.board) if options is None else options,
+            device.board,
         )
         return (twin.follow(follow(device, recorded_kinds(path))), options is not None)
 

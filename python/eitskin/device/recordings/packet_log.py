@@ -8,13 +8,20 @@ from contextlib import suppress
 
 from eitskin.device.client import Device
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame, put_together
+from eitskin.device.live import Item, put_together
 from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import Stream
-from eitskin.device.wire.packets import Fault, FrameEvents, RawFrame, SolvedImage, SolvedTouches
+from eitskin.device.wire.packets import (
+    Fault,
+    FollowedTouches,
+    FrameEvents,
+    RawFrame,
+    SolvedImage,
+    SolvedTouches,
+)
 from eitskin.device.wire.payloads import MalformedPacket, parse
 
-_Content = RawFrame | SolvedImage | SolvedTouches | FrameEvents | Fault
+_Content = RawFrame | SolvedImage | SolvedTouches | FollowedTouches | FrameEvents | Fault
 
 
 class PacketLog:
@@ -30,7 +37,7 @@ class PacketLog:
         """Keep no more."""
         self._device.link.end_tap(self._tap)
 
-    def frames(self, what: Stream) -> Iterator[LiveFrame | Fault | LinkEvent]:
+    def frames(self, what: Stream) -> Iterator[Item]:
         """The frames so far, faults and gaps between them; ``what`` was streamed."""
         return put_together(self._contents(), what)
 

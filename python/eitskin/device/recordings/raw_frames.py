@@ -11,7 +11,7 @@ from eitskin import __version__
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame, follow
+from eitskin.device.live import Item, LiveFrame, follow
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame
 from eitskin.errors import DeviceError, FrameError
@@ -47,7 +47,7 @@ def collect(device: Device, frames: int) -> RawRun:
     return run
 
 
-def gather(items: Iterable[LiveFrame | Fault | LinkEvent]) -> RawRun:
+def gather(items: Iterable[Item]) -> RawRun:
     """The raw frames of a stream or recording. Of several tares the last counts, and the frames
     after it."""
     run = RawRun()
@@ -57,7 +57,7 @@ def gather(items: Iterable[LiveFrame | Fault | LinkEvent]) -> RawRun:
             run.faults.append(item)
         elif isinstance(item, LinkEvent):
             run.missing += item.missing
-        elif item.raw is not None:
+        elif isinstance(item, LiveFrame) and item.raw is not None:
             if item.raw.quiet and not taring:
                 run.left_out += len(run.frames) + len(run.quiet)
                 run.quiet, run.frames = [], []

@@ -78,6 +78,11 @@ def reply_text(reply: Reply) -> str:
         ReplyStatus.LOCKED: (
             "its owner has locked the board: hold the blue button on it and run this again"
         ),
+        ReplyStatus.DRIVES: (
+            "touches after each drive need a model with fields whose reference stays, full scans,"
+            " every frame and a board that scans by itself; leave  --report drive  out, or use"
+            "  --full  and a model of  eitskin model build"
+        ),
         ReplyStatus.TRIPPED: (
             "the current was above its limit and is off; look for a short or a wrong part, then run"
             "  eitskin board --clear-faults"

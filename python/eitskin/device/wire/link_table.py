@@ -28,6 +28,7 @@ class PacketType(IntEnum):
     IMAGE = 0x11  # a frame's image
     TOUCHES = 0x12  # a frame's touches
     EVENTS = 0x15  # what a frame's touches amounted to
+    FOLLOWED = 0x17  # touches after a drive
     STATS = 0x13  # the board's counters
     FAULT = 0x14  # a fault that rose or went
     HASHES = 0x16  # SHA-256 of the model and of the firmware
@@ -72,6 +73,9 @@ class ReplyStatus(IntEnum):
     SELF_TEST = 16  # [0] difference to the golden image in parts per 1e9 of its peak
     LOCKED = 17  # the owner has locked the board: its blue button must be held
     TRIPPED = 18  # the current was above its limit: CLEAR_FAULTS first
+    # touches after each drive want a model with fields, a reference that stays, full scans and
+    # every frame
+    DRIVES = 19
 
 
 class Quality(IntFlag):
@@ -137,6 +141,8 @@ class RawFlags(IntFlag):
     REFERENCE = 1  # a frame of a tare
     RECIPROCAL = 2  # only one row of each reciprocal pair was measured
     CHECK = 4  # a full scan among such, for the check of reciprocity
+    ALIGNED = 8  # the touches after each drive brought it to the instant of its last drive
+    TRUSTED = 16  # and it was solved: its drives are accounted for
 
 
 class Stream(IntFlag):
@@ -146,6 +152,7 @@ class Stream(IntFlag):
     IMAGE = 2  # its image, as an IMAGE
     TOUCHES = 4  # its touches, as TOUCHES
     EVENTS = 8  # its events, as EVENTS, also where there are none; a tare forgets fingers
+    FOLLOWED = 16  # touches after each drive, as FOLLOWED; of frames only trusted ones are solved
 
 
 @dataclass(frozen=True)
@@ -294,6 +301,41 @@ class TouchPacket(Payload):
     y_variance_mm2: float
     long_x_mm: float  # half of the long axis as a vector; 0, 0: a disc, or not known
     long_y_mm: float
+
+
+@dataclass(frozen=True)
+class FollowedHead(Payload):
+    """eits_packet_followed: Touches as of an instant within a scan. Where nothing touches it is
+    sent once: when that begins, or the touches have gone.
+    """
+
+    LAYOUT: ClassVar[Layout] = Layout(
+        "eits_packet_followed", "frame:I time_us:I begun:I age_us:H update_us:H drive:H count:H"
+    )
+    frame: int  # number of the frame that is scanned
+    time_us: int  # that they are told for: the middle of the drive, were no row repeated
+    begun: int  # the frame before which nothing was known
+    age_us: int  # from the end of the drive until this packet was made; at most 65,535
+    update_us: int  # of it for the update; likewise
+    drive: int  # of the protocol, in the order of first rows
+    count: int  # touches that follow
+
+
+@dataclass(frozen=True)
+class FollowedTouch(Payload):
+    """eits_packet_followed_touch: A touch, as eits_fast_touch."""
+
+    LAYOUT: ClassVar[Layout] = Layout(
+        "eits_packet_followed_touch",
+        "id:H confirmed:H:flag x_mm:f y_mm:f vx_mm_per_s:f vy_mm_per_s:f strength_s_per_m_mm2:f",
+    )
+    id: int  # from 1, apart from those of TOUCHES; stays with a touch
+    confirmed: bool  # 1: a whole frame has shown it
+    x_mm: float  # of the centre, in the model's coordinates
+    y_mm: float  # of the centre
+    vx_mm_per_s: float  # its velocity
+    vy_mm_per_s: float
+    strength_s_per_m_mm2: float  # S mm^2/m
 
 
 @dataclass(frozen=True)

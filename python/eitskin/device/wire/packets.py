@@ -18,6 +18,8 @@ from eitskin.device.wire.link_table import (
     Drive,
     FaultCode,
     FaultPacket,
+    FollowedHead,
+    FollowedTouch,
     HashesPacket,
     InfoPacket,
     RawFlags,
@@ -189,6 +191,18 @@ class SolvedTouches:
 
 
 @dataclass(frozen=True)
+class FollowedTouches:
+    """Touches after a drive, in the order in which they came."""
+
+    head: FollowedHead
+    touches: tuple[FollowedTouch, ...]
+
+    @property
+    def frame(self) -> int:
+        return self.head.frame
+
+
+@dataclass(frozen=True)
 class FrameEvents:
     """What happened in a frame whose scan began at ``time_us``, as the board's core tells it."""
 
@@ -218,6 +232,7 @@ FromBoard = (
     | RawFrame
     | SolvedImage
     | SolvedTouches
+    | FollowedTouches
     | FrameEvents
     | BoardStats
     | Fault

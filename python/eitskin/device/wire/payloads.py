@@ -18,6 +18,8 @@ from eitskin.device.wire.link_table import (
     STAGES,
     EventPacket,
     EventsHead,
+    FollowedHead,
+    FollowedTouch,
     PacketType,
     RawHead,
     StageStats,
@@ -28,6 +30,7 @@ from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
+    FollowedTouches,
     FrameEvents,
     FromBoard,
     RawFrame,
@@ -142,6 +145,17 @@ def parse_touches(payload: bytes) -> SolvedTouches:
     return SolvedTouches(solved, tuple(map(known_touch, found)))
 
 
+def parse_followed(payload: bytes) -> FollowedTouches:
+    head, each = unpack(FollowedHead, payload, "FOLLOWED", more=True), FollowedTouch.LAYOUT
+    _check_rest(payload, head, each.size * head.count, "FOLLOWED")
+    rest = payload[head.LAYOUT.size :]
+    parts = (rest[k : k + each.size] for k in range(0, len(rest), each.size))
+    found = tuple(unpack(FollowedTouch, part, "FOLLOWED") for part in parts)
+    if not np.isfinite([astuple(touch)[2:] for touch in found]).all():
+        raise MalformedPacket("FOLLOWED: a touch whose place, velocity or strength is no number")
+    return FollowedTouches(head, found)
+
+
 def parse_events(payload: bytes) -> FrameEvents:
     head, each = unpack(EventsHead, payload, "EVENTS", more=True), EventPacket.LAYOUT
     _check_rest(payload, head, each.size * head.count, "EVENTS")
@@ -166,6 +180,7 @@ _PARSERS: dict[int, Callable[[bytes], FromBoard]] = {
     PacketType.IMAGE: parse_image,
     PacketType.TOUCHES: parse_touches,
     PacketType.EVENTS: parse_events,
+    PacketType.FOLLOWED: parse_followed,
     PacketType.STATS: lambda payload: unpack(BoardStats, payload, "STATS"),
     PacketType.HASHES: lambda payload: unpack(BoardHashes, payload, "HASHES"),
     PacketType.FAULT: lambda payload: unpack(Fault, payload, "FAULT"),

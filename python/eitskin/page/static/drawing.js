@@ -1,5 +1,6 @@
 // What is drawn: the skin with its image, touches and electrodes, and the raw voltages.
 
+const AHEAD_S = 0.05;
 const TRAIL_S = 1.5;
 const PLACE_90 = 4.605; // chi-squared of two numbers that 90 % lie below
 
@@ -115,6 +116,22 @@ export class SkinDrawing {
     if (options.trails) this.drawTrails(context, frame.message.time_s);
     if (options.truth) for (const touch of frame.message.true || []) this.drawTrue(context, touch);
     for (const touch of frame.message.touches || []) this.drawTouch(context, touch);
+    for (const touch of (options.report || {}).touches || []) this.drawMoving(context, touch);
+  }
+
+  // where a touch after a drive will be in AHEAD_S
+  drawMoving(context, touch) {
+    const x = this.x(touch.x_mm), y = this.y(touch.y_mm);
+    context.strokeStyle = context.fillStyle = this.colours.accent;
+    context.lineWidth = 3;
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(this.x(touch.x_mm + AHEAD_S * touch.vx_mm_per_s), this.y(touch.y_mm + AHEAD_S * touch.vy_mm_per_s));
+    context.stroke();
+    context.beginPath();
+    context.arc(x, y, 5, 0, 2 * Math.PI);
+    if (touch.confirmed) context.fill();
+    else context.stroke();
   }
 
   drawImage(context, outline, image) {

@@ -64,6 +64,12 @@ function takeFrame(buffer) {
   soon();
 }
 
+// touches after a drive, newer than the newest frame
+function takeReport(message) {
+  page.report = message;
+  soon();
+}
+
 function soon() {
   if (page.asked) return;
   page.asked = true;
@@ -79,6 +85,7 @@ function take(message) {
   if (message.type === "state") return setState(message.state, message.text);
   if (message.type === "answer") return answer(message);
   if (message.type === "notice") return note(message);
+  if (message.type === "report") return takeReport(message);
   if (message.type === "teach") return showTeach(message);
   if (message.type === "page") {
     page.dropped = message.dropped + message.skipped;
@@ -101,6 +108,7 @@ function setState(state, text) {
 function takeSetup(setup) {
   const before = page.setup;
   page.setup = setup;
+  page.report = null;
   $("device").textContent = `${setup.url} · ${setup.board}, ${setup.electrodes} electrodes`;
   document.title = `${setup.url} · eitskin`;
   const same = before && before.model_crc === setup.model_crc && before.url === setup.url && Boolean(before.skin) === Boolean(setup.skin);
@@ -231,7 +239,7 @@ function rate() {
 
 function draw() {
   const { frame, setup } = page;
-  skin.draw(frame, { health: page.health, trails: $("trails").checked, truth: $("truth").checked,
+  skin.draw(frame, { report: page.report, health: page.health, trails: $("trails").checked, truth: $("truth").checked,
     zones: setup ? setup.zones : [], pressed: page.pressed, teach: page.teach });
   if (!frame || !setup) return;
   const { message } = frame, { info } = message, touches = message.touches || [];

@@ -87,6 +87,7 @@ class _Known:
     off_drives: int = 0
     frames_missed: int = 0
     confirmed: bool = False
+    at: FloatArray | None = None  # where, when a frame was last aligned
 
 
 @dataclass(eq=False)
@@ -372,6 +373,7 @@ class FastPath:
         out = volts.copy()
         for k, known in enumerate(self._known):
             now = self.tracks.state[k, :3]
+            known.at = now[:2].copy()
             then = [past.state.get(known.id, np.array([*now[:2], 0.0])) for past in self._past]
             if not self._moved(k, now, np.array(then)):
                 continue
@@ -400,8 +402,11 @@ class FastPath:
         places = np.array([(one.x_mm, one.y_mm) for one in found]).reshape(-1, 2)
         free = np.ones(len(places), dtype=np.bool_)
         for k in reversed(range(len(self.tracks))):
-            known, state = self._known[k], self.tracks.state[k]
-            x, y = (places - state[:2]).T
+            known = self._known[k]
+            at, known.at = known.at, None
+            if at is None:  # it came after that frame
+                continue
+            x, y = (places - at).T
             square = np.where(free, x * x + y * y, np.inf)
             nearest = int(np.argmin(square)) if len(places) else -1
             if nearest >= 0 and square[nearest] < FAST_CONFIRM_MM * FAST_CONFIRM_MM:

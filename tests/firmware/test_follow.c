@@ -1,0 +1,182 @@
+/* Touches after each drive: drives are looked at while the main loop is busy, none is left out or
+ * told twice, whole frames are brought to one instant, and all begins anew where it must. */
+#include "app/follow.h"
+#include "bench.h"
+#include "check.h"
+
+#include <string.h>
+
+enum { DRIVES = 16, DRIVE_US = 1300, SCAN_MS = 21, ALL = 31 & ~EITS_STREAM_IMAGE };
+
+static bench b;
+
+static void set_up(const skin_spec *spec)
+{
+    bench_start(&b, spec);
+    b.board.noise_codes = 0.5;
+    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+}
+
+static eits_packet_followed followed(uint32_t k)
+{
+    eits_packet_followed head = {0};
+    const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_FOLLOWED, k);
+    CHECK(packet != NULL);
+    if (packet != NULL) {
+        memcpy(&head, packet->payload, sizeof head);
+        CHECK_EQUAL(packet->size, sizeof head + head.count * sizeof(eits_packet_followed_touch));
+    }
+    return head;
+}
+
+/* Frames that were streamed with all of these flags. */
+static uint32_t with_flags(uint32_t flags)
+{
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
+        eits_packet_raw head;
+        memcpy(&head, host_packet_of(&b.host, EITS_PACKET_RAW, k)->payload, sizeof head);
+        count += (head.flags & flags) == flags;
+    }
+    return count;
+}
+
+static void test_what_is_refused(void)
+{
+    set_up(&SKIN_ADJACENT); /* without fields */
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
+    bench_stop(&b);
+    set_up(&SKIN_WITH_FIELDS);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 2, 0).status, EITS_REPLY_DRIVES);
+    eits_command_scan scan = host_default_scan();
+    scan.check_every = 4;
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
+    bench_stop(&b);
+}
+
+/* A still skin: one packet says that it begins, all frames are brought to one instant and solved,
+ * with the bits that they have. */
+static void test_a_still_skin(void)
+{
+    set_up(&SKIN_WITH_FIELDS);
+    host_forget(&b.host);
+    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 20 * SCAN_MS);
+    const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
+    CHECK(frames >= 18);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_FOLLOWED), 1);
+    CHECK_EQUAL(followed(0).count, 0);
+    CHECK_EQUAL(followed(0).begun, followed(0).frame);
+    CHECK(with_flags(EITS_RAW_ALIGNED | EITS_RAW_TRUSTED) >= frames - 1); /* one was under way */
+    CHECK(host_count(&b.host, EITS_PACKET_TOUCHES) >= frames - 1);
+    const fw_engine *engine = &b.host.instrument.engine;
+    CHECK(memcmp(engine->aligned, engine->frames[(b.host.instrument.scan.taken - 1) % 2u].volts,
+                 engine->model.n_rows * sizeof(float)) == 0);
+    CHECK_EQUAL(b.host.gaps, 0);
+    bench_stop(&b);
+}
+
+/* A touch: packets of drives in the order that they are measured, each for its own instant. */
+static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
+{
+    set_up(&SKIN_WITH_FIELDS);
+    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 5 * SCAN_MS);
+    b.board.clock_cost_ns = clock_cost_ns;
+    b.board.write_cost_ns = write_cost_ns;
+    const uint32_t begun = b.host.instrument.follow.begun;
+    host_forget(&b.host);
+    sheet_touch(&b.sheet, -2, 1, 1.6, 4);
+    sheet_solve(&b.sheet);
+    const uint32_t scanned = b.host.instrument.scan.frames_scanned;
+    const uint64_t from_ns = b.board.now_ns;
+    host_run(&b.host, 30 * SCAN_MS);
+    const uint32_t count = host_count(&b.host, EITS_PACKET_FOLLOWED);
+    CHECK(count > DRIVES);
+    for (uint32_t k = 1; k < count; ++k) {
+        const eits_packet_followed before = followed(k - 1), now = followed(k);
+        CHECK_EQUAL(now.begun, begun);
+        CHECK(now.count <= EITS_FAST_TOUCHES);
+        if (before.count == 0)
+            continue;
+        CHECK_EQUAL(now.drive, (before.drive + 7u) % DRIVES);
+        CHECK_EQUAL(now.time_us - before.time_us, DRIVE_US);
+        CHECK_EQUAL(now.frame - before.frame, now.drive == 0);
+    }
+    /* the scan went on, whatever the main loop did */
+    const uint64_t scans = (b.board.now_ns - from_ns) / (DRIVES * DRIVE_US * 1000u);
+    CHECK(b.host.instrument.scan.frames_scanned - scanned + 1 >= scans);
+    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, 0);
+    CHECK_EQUAL(b.host.gaps, 0);
+    CHECK(b.host.instrument.follow.running);
+    bench_stop(&b);
+}
+
+/* A main loop that is slower than the scan: frames are left out, drives are not, and a frame that
+ * is looked at is the one that was scanned last. */
+static void test_a_slow_main_loop(void)
+{
+    set_up(&SKIN_WITH_FIELDS);
+    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 5 * SCAN_MS);
+    const uint32_t begun = b.host.instrument.follow.begun;
+    const uint32_t scanned = b.host.instrument.scan.frames_scanned;
+    host_forget(&b.host);
+    b.board.write_cost_ns = 30000000u;
+    host_run(&b.host, 40 * SCAN_MS);
+    const uint32_t raws = host_count(&b.host, EITS_PACKET_RAW), aligned = with_flags(8);
+    CHECK(b.host.instrument.scan.frames_scanned - scanned >= 38);
+    CHECK(raws >= 4 && raws < 20); /* each costs three writes of 30 ms */
+    CHECK_EQUAL(aligned, raws);
+    CHECK(host_count(&b.host, EITS_PACKET_TOUCHES) <= aligned + 1);
+    CHECK(b.host.instrument.follow.running);
+    CHECK_EQUAL(b.host.instrument.follow.begun, begun);
+    bench_stop(&b);
+}
+
+/* Commands that change what drives build on begin anew; questions do not. Drives that waited too
+ * long are left out: then too. */
+static void test_beginning_anew(void)
+{
+    set_up(&SKIN_WITH_FIELDS);
+    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 3 * SCAN_MS);
+    const fw_follow *follow = &b.host.instrument.follow;
+    uint32_t begun = follow->begun;
+    (void)host_info(&b.host);
+    (void)host_stats(&b.host, 0);
+    host_run(&b.host, 2 * SCAN_MS);
+    CHECK_EQUAL(follow->begun, begun);
+    eits_command_mask_row mask = {.row = 3, .masked = 1};
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
+                EITS_REPLY_OK);
+    host_run(&b.host, 2 * SCAN_MS);
+    CHECK(follow->begun > begun && follow->running);
+    begun = follow->begun;
+    fw_follow_hold(&b.host.instrument);
+    fake_advance(&b.board, 3 * SCAN_MS * 1000000u);
+    fw_follow_release(&b.host.instrument);
+    host_run(&b.host, 3 * SCAN_MS);
+    CHECK(follow->begun > begun && follow->running);
+    begun = follow->begun;
+    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    host_run(&b.host, 2 * SCAN_MS);
+    CHECK(follow->begun > begun && follow->running);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_TOUCHES, 1, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 2 * SCAN_MS);
+    CHECK(!follow->running && b.host.instrument.scan.drive_done == NULL);
+    bench_stop(&b);
+}
+
+int main(void)
+{
+    test_what_is_refused();
+    test_a_still_skin();
+    test_a_touch(0, 0);
+    test_a_touch(2000, 300000);
+    test_a_slow_main_loop();
+    test_beginning_anew();
+    return checks_report("follow");
+}

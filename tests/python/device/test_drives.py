@@ -1,0 +1,154 @@
+"""Touches after each drive of a simulated board: where and when they are told, what a recording
+gives again to the bit, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+from eitskin.device.recordings.host_check import check_recording
+from eitskin.device.settings import ScanSettings
+from eitskin.device.wire.codec import Decoder, encode
+from eitskin.device.wire.link_table import FollowedHead, FollowedTouch, PacketType, Stream
+from eitskin.device.wire.payloads import MalformedPacket, pack, parse
+from eitskin.errors import DeviceError
+from eitskin.live.frame import Frame, Report
+from eitskin.live.message import schema
+from eitskin.live.session import Session, SessionSettings
+
+DRIVE_S, SCAN_S = 1.3e-3, 20.8e-3
+CONTACT_S, MOVES_S, STOPS_S = 0.0527, 0.1, 0.2
+SPEED_MM_PER_S = 400.0
+SCENE = f"""[scene]
+name = "swipe"
+seed = 4
+rate_hz = {1 / SCAN_S!r}
+frames = 12
+quiet_frames = 16
+elements = 3500
+[[touch]]
+radius_mm = 8.0
+contrast = 5.0
+path = [{{t_s = {CONTACT_S}, x_mm = -20.0, y_mm = 10.0}},
+        {{t_s = {MOVES_S}, x_mm = -20.0, y_mm = 10.0}},
+        {{t_s = {STOPS_S}, x_mm = 20.0, y_mm = 10.0}}]
+[effects.noise]
+snr_db = 60.0
+[effects.contact_impedance]
+spread = 0.2
+"""
+SETTINGS = SessionSettings(mode=Stream.RAW | Stream.TOUCHES, report="drive", tare=16)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path: Path = tmp_path_factory.mktemp("drives") / "swipe.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    return path
+
+
+def followed(url: str, settings: SessionSettings) -> list[Any]:
+    with Session(url, settings) as session:
+        return [item for item in session.frames() if isinstance(item, Frame | Report)]
+
+
+@pytest.fixture(scope="module")
+def recorded(scene: Path) -> tuple[Path, list[Any]]:
+    path = scene.with_name("swipe.eits")
+    return path, followed(f"sim:{scene}", replace(SETTINGS, record=path))
+
+
+def test_they_are_told_soon_where_they_are_and_how_fast(recorded: tuple[Path, list[Any]]) -> None:
+    reports = [item for item in recorded[1] if isinstance(item, Report)]
+    begun = reports[0].time_s - DRIVE_S / 2  # the scene's time 0
+    told = [(one.time_s - begun, one.touches) for one in reports if one.touches]
+    assert reports[0].touches == () and 0 < told[0][0] - CONTACT_S < 4 * DRIVE_S
+    assert {len(touches) for _, touches in told} == {1}
+    assert {touch.id for _, touches in told for touch in touches} == {told[0][1][0].id}
+    x_mm = [-20 + SPEED_MM_PER_S * min(max(s - MOVES_S, 0), 0.1) for s, _ in told]
+    off_mm = [np.hypot(t.x_mm - x, t.y_mm - 10) for x, (_, (t,)) in zip(x_mm, told, strict=True)]
+    assert off_mm[0] < 6 and np.median(off_mm) < 2 and max(off_mm) < 8
+    speeds = [t.vx_mm_per_s for s, (t,) in told if MOVES_S + 0.03 < s < STOPS_S]
+    assert np.median(speeds) == pytest.approx(SPEED_MM_PER_S, rel=0.15)
+    assert told[-1][1][0].confirmed and not told[0][1][0].confirmed
+    frames = [item for item in recorded[1] if isinstance(item, Frame)]
+    assert not any(frame.diagnostics for frame in frames)
+    assert any(len(frame.touches) == 1 for frame in frames)
+
+
+def test_their_messages_keep_to_the_schema(recorded: tuple[Path, list[Any]]) -> None:
+    validator = Draft202012Validator(schema())
+    for item in recorded[1]:
+        validator.validate(item.message())
+    report = next(item for item in recorded[1] if isinstance(item, Report) and item.touches)
+    broken = report.message() | {"touches": [{"id": 1}]}
+    assert not validator.is_valid(broken)
+
+
+def test_a_recording_gives_them_again_to_the_bit(recorded: tuple[Path, list[Any]]) -> None:
+    path, items = recorded
+    again = followed(f"file:{path}", replace(SETTINGS, tare=None))
+
+    def numbers(found: list[Any]) -> list[Any]:
+        return [(one.live.followed.touches, one.live.board_us) for one in found
+                if isinstance(one, Report)]  # fmt: skip
+
+    assert numbers(again) == numbers(items)
+    frames = sum(isinstance(item, Frame) for item in items)
+    check, _ = check_recording(path, None)
+    assert check.as_dict()["same_bits"] and check.drives == 16 * frames
+    without = followed(f"file:{path}", replace(SETTINGS, tare=None, report="frame"))
+    assert not any(isinstance(item, Report) for item in without) and len(without) == frames
+
+
+def test_another_bit_is_noticed(recorded: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    packets = Decoder().feed(recorded[0].read_bytes())
+    (first, *_) = [one for one in packets if one.type == PacketType.FOLLOWED and
+                   len(one.payload) > FollowedHead.LAYOUT.size]  # fmt: skip
+    changed = bytearray(first.payload)
+    changed[FollowedHead.LAYOUT.size + 4] ^= 1  # of x
+    path = tmp_path / "changed.eits"
+    path.write_bytes(b"".join(
+        encode(one.type, one.sequence, bytes(changed) if one is first else one.payload)
+        for one in packets
+    ))  # fmt: skip
+    check, _ = check_recording(path, None)
+    assert check.drives_different == 1 and not check.as_dict()["same_bits"]
+    assert "after 1 drives" in check.text()
+
+
+@pytest.mark.parametrize("scan", [ScanSettings(check_every=0), ScanSettings(check_every=4)])
+def test_half_scans_are_refused(scene: Path, scan: ScanSettings) -> None:
+    with pytest.raises(DeviceError, match=r"leave {2}--report drive {2}out"):
+        followed(f"sim:{scene}", replace(SETTINGS, scan=scan))
+
+
+HEAD = FollowedHead(3, 100, 2, 50, 40, 5, 1)
+TOUCH = FollowedTouch(1, True, 1.0, 2.0, 3.0, 4.0, 5.0)
+GOOD = pack(HEAD) + pack(TOUCH)
+
+
+def test_a_packet_of_a_drive_is_read() -> None:
+    found: Any = parse(PacketType.FOLLOWED, GOOD)
+    assert (found.head, found.touches, found.frame) == (HEAD, (TOUCH,), 3)
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        GOOD[:-1],
+        GOOD + b"\0",
+        pack(HEAD),
+        pack(replace(HEAD, count=2)) + pack(TOUCH),
+        pack(HEAD) + pack(replace(TOUCH, vx_mm_per_s=float("nan"))),
+        pack(HEAD) + pack(replace(TOUCH, x_mm=float("inf"))),
+    ],
+)
+def test_a_malformed_packet_of_a_drive_is_refused(payload: bytes) -> None:
+    with pytest.raises(MalformedPacket, match="FOLLOWED"):
+        parse(PacketType.FOLLOWED, payload)

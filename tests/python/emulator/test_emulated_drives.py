@@ -1,0 +1,55 @@
+"""Touches after each drive on the emulated board: told while whole frames are solved, at the frame
+rate, and the bits of this host."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from eitskin.device.recordings.host_check import check_recording
+from eitskin.device.wire.link_table import Stream
+from eitskin.emulator.peripherals.nvic import PENDSV
+from eitskin.live.frame import Frame, Report
+from eitskin.live.session import Session, SessionSettings
+
+DRIVE_US, SCAN_US, FRAMES = 1300, 20_800, 9
+SCENE = f"""[scene]
+name = "press"
+seed = 4
+rate_hz = {1e6 / SCAN_US!r}
+frames = {FRAMES}
+quiet_frames = 4
+elements = 2500
+[[touch]]
+radius_mm = 8.0
+contrast = 5.0
+path = [{{t_s = 0.012, x_mm = 10.0, y_mm = 30.0}}, {{t_s = 0.2, x_mm = 30.0, y_mm = 10.0}}]
+[effects.noise]
+snr_db = 60.0
+"""
+
+
+def test_drives_do_not_wait_for_frames(tmp_path: Path) -> None:
+    scene, run = tmp_path / "press.toml", tmp_path / "run.eits"
+    scene.write_text(SCENE, encoding="utf-8")
+    settings = SessionSettings(mode=Stream.RAW | Stream.TOUCHES, report="drive", tare=4, record=run)
+    with Session(f"emu:{scene}", settings) as session:
+        items = [item for item in session.frames() if isinstance(item, Frame | Report)]
+        stats = session.device.stats()
+        interrupts = session.device.transport.board.record.interrupts  # type: ignore[attr-defined]
+    frames = [item for item in items if isinstance(item, Frame)]
+    told = [item.live for item in items if isinstance(item, Report) and item.touches]
+    solved = [frame.info for frame in frames if frame.info is not None]
+    # solves take several drives' time; drives are told within their own
+    assert max(one.solve_us + one.touch_us for one in solved) > 3 * DRIVE_US
+    ages_us = [one.followed.head.age_us for one in told]
+    assert np.quantile(ages_us, 0.8) < DRIVE_US and len(told) > 16 * (FRAMES - 4)
+    # the frame rate holds: no scan waited, no row was late
+    assert {int(us) for us in np.diff([frame.live.board_us for frame in frames])} == {SCAN_US}
+    assert {int(us) for us in np.diff([one.board_us for one in told])} == {DRIVE_US}
+    assert (stats.slots_repeated, stats.packets_dropped) == (0, 0)
+    assert interrupts[PENDSV] >= 16 * FRAMES
+    assert stats.stack_used < 0.75 * stats.stack_bytes
+    check, _ = check_recording(run, None)
+    assert check.as_dict()["same_bits"] and check.drives >= 16 * (FRAMES - 1)
