@@ -263,6 +263,20 @@ static void two_fingers_turn_either_way(void)
     }
 }
 
+/* A change is told for each so much of way, not for each frame: 0.6 mm here, of 72. */
+static void a_slow_turn_is_told_by_its_way(void)
+{
+    begin(&b);
+    for (int k = 0; k < 120; ++k) {
+        const double angle = 3.0 + 0.01 * k;
+        const eits_touch two[] = {touch(1, 30 * cos(angle), 30 * sin(angle)),
+                                  touch(2, -30 * cos(angle), -30 * sin(angle))};
+        frame(&b, two, 2);
+    }
+    CHECK(count_of(&b, EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) > 8);
+    CHECK(count_of(&b, EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) < 80);
+}
+
 static void fingers_that_rest_or_are_three_do_nothing_together(void)
 {
     begin(&b);
@@ -612,6 +626,7 @@ int main(void)
     two_fingers_pinch_and_the_end_says_by_how_much();
     a_pinch_that_opens_again_becomes_a_spread();
     two_fingers_turn_either_way();
+    a_slow_turn_is_told_by_its_way();
     fingers_that_rest_or_are_three_do_nothing_together();
     a_scan_that_a_finger_lands_in_invents_nothing();
     a_scan_that_a_finger_lifts_in_does_not_move_it();

@@ -241,6 +241,9 @@ static void test_solver(void)
     CHECK_EQUAL(options->warm_start, 0);
     CHECK_EQUAL(options->mac_limit, 0);
     CHECK_EQUAL(options->iterations, 30);
+    c = (eits_command_solver){.iterations = 1, .max_touches = 1}; /* the least of each */
+    REPLY(solver_with(c), EITS_REPLY_OK, 0, 0);
+    CHECK_EQUAL(options->diagnostics, 0);
     REPLY(solver_with(good), EITS_REPLY_OK, 0, 0);
     CHECK_EQUAL(options->iterations, 7);
     CHECK_EQUAL(options->max_touches, 3);
