@@ -384,6 +384,8 @@ BAD_OPTIONS = [
     ({"touch_test": -1}, "touch_test"),
     ({"noise_floor_v": float("nan")}, "noise_floor_v"),
     ({"test_columns": -1}, "test_columns"),
+    ({"touch_seek": 2}, "touch_seek"),
+    ({"reference_frames": -1}, "reference_frames"),
     ({"iteration": 5}, "'iteration' is unknown; did you mean 'iterations'"),
 ]
 
