@@ -38,7 +38,13 @@ def add_parser(actions: Any) -> None:
             " out, q ends."
         ),
     )
-    option(parser, "--plan PLAN.csv", "from  teach plan, or x_mm,y_mm by hand", Path, required=True)
+    option(
+        parser,
+        "--plan PLAN.csv",
+        "from  teach plan, or x_mm,y_mm by hand; or a scene that presses, as  hydrogel",
+        Path,
+        required=True,
+    )
     option(parser, "-o --output PRESSES.npz", None, Path, required=True)
     option(parser, "--overwrite", "begin again where the output exists")
     option(parser, "--skin SKIN.toml", "kept in the file, for  teach fit", Path)
@@ -62,9 +68,14 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.skin.skin import load_skin
     from eitskin.teaching.plan import load_plan
 
-    plan = _with_given(load_plan(options.plan), options)
+    if options.plan.suffix == ".toml" or not (options.plan.suffix or options.plan.exists()):
+        from eitskin.teaching.practice import plan_of_scene
+
+        plan, text = plan_of_scene(str(options.plan))
+    else:
+        plan, text = load_plan(options.plan), ""
+    plan = _with_given(plan, options)
     refuse_unwritable(options.output)
-    text = ""
     if options.skin is not None:
         load_skin(options.skin)
         text = read_bytes(options.skin, "skin description", 1_000_000).decode("utf-8")

@@ -5,6 +5,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
+from eitskin.config import load_toml
+from eitskin.fileio import read_bytes
+from eitskin.scene.description import load_scene
+from eitskin.scene.library_scenes import scene_path
 from eitskin.skin.skin import Skin
 from eitskin.teaching.plan import Plan
 
@@ -42,3 +48,21 @@ def practice_scene(skin: Skin, path: Path, plan: Plan) -> str:
             f"to_s = {start + PRESS_S:.3f}",
         ]
     return "\n".join(lines) + "\n"
+
+
+def plan_of_scene(name: str) -> tuple[Plan, str]:
+    """Where the touches of a scene, a file or one of the library, press, and the text of its skin's
+    description; empty for the paper's.
+
+    Raises:
+        FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
+    """
+    path = scene_path(name)
+    scene = load_scene(path)
+    first = sorted((track.keyframes[0] for track in scene.touches), key=lambda one: one.t_s)
+    unknown = np.full(len(first), np.nan)
+    plan = Plan(np.array([(one.x_mm, one.y_mm) for one in first]).reshape(-1, 2), unknown, unknown)
+    skin = str(load_toml(path, "scene")["scene"].get("skin", "paper"))
+    if skin == "paper":
+        return plan, ""
+    return plan, read_bytes(path.parent / skin, "skin description", 1_000_000).decode("utf-8")

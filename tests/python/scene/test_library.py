@@ -23,7 +23,7 @@ EXPECTED = {
     "drying_gel", "resting_hand", "loose_electrode", "bridged", "mains_hum", "drift", "real_board",
     "random_touches", "demo", "two_fingers",
     "tap", "double_tap", "hold", "swipe_right", "swipe_up", "swipe_left", "swipe_down", "spread",
-    "drum_beat", "ring_turn", "page_turns",
+    "drum_beat", "ring_turn", "page_turns", "hydrogel",
 }  # fmt: skip
 BENCH = MeshCache()
 
@@ -40,7 +40,7 @@ def test_every_library_scene_runs(name: str) -> None:
     scene = replace(find_scene(name), elements=ELEMENTS)
     compiled = compile_scene(scene, mesh_cache=BENCH)
     frames = simulate_frames(compiled).voltage_v
-    assert frames.shape == (scene.n_frames, 208)
+    assert frames.shape == (scene.n_frames, scene.protocol.n_rows)
     quiet, noise_v = (
         frames[: scene.quiet_frames].mean(axis=0),
         frames[: scene.quiet_frames].std(axis=0).max(),
