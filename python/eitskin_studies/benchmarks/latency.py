@@ -338,7 +338,7 @@ def _whole(
 
 def _percent(count: int, of: int) -> str:
     low, high = wilson(count, of)
-    return f"{100 * count / of:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+    return f"{100 * count / of:.0f} % ({100 * max(low, 0.0):.0f} to {100 * high:.0f})"
 
 
 def _times(values: tuple[float, float, float] | None) -> str:
