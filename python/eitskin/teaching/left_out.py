@@ -16,13 +16,14 @@ FloatArray = npt.NDArray[np.float64]
 
 CHI2_90 = 4.605  # the .9 quantile of two squared normal numbers
 MISFIT = 4.0  # times the median: a press that does not fit the others
+MOST_OF_NOISE = 0.95  # that one press's residual may be of the noise along itself
 TEMPERATURE = 2.0  # of scores as probabilities: residuals are heavier than normal
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
     """n presses, each placed by the others: ``place_mm`` (n, 2); ``error_mm`` (n,);
-    ``mahalanobis2`` (n,) of the error in the fit's own covariance; ``score`` (n, k) on the grid,
+    ``mahalanobis2`` (n,) of the error in the others' own covariance; ``score`` (n, k) on the grid,
     chi^2 less its least; ``misfit`` (n,) the residual at the press's given place over the median;
     ``explained`` (m,) of each row's energy."""
 
@@ -35,7 +36,8 @@ class LeftOut:
 
 
 def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
-    """Place each press by the others, at the least of |W (y - a s(q))|^2 over q and a > 0."""
+    """Place each press by the others, at the least of |W (y - a s(q))|^2 over q and a > 0; W, too,
+    is that of the others' residuals; not for ``score``, whose ``TEMPERATURE`` was chosen so."""
     process, whitening = learned.process, learned.noise.whitening
     at = grid.centres_mm()
     mean = process.mean(at)
@@ -49,7 +51,9 @@ def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
     for i in range(count):
         answer = (mean - (h[:, i : i + 1] + v[i] * w) * residual[i]) @ whitening.T
         scores[i] = _scores(answer, seen[i])
-        found[i], covariance = _moments(scores[i], at, grid.pixel_mm)
+        both = np.vstack([answer, seen[i]])
+        both += without_own(white_residual[i], (1 - learned.noise.shrinkage) / count, both)
+        found[i], covariance = _moments(_scores(both[:-1], both[-1]), at, grid.pixel_mm)
         error = found[i] - process.place_mm[i]
         mahalanobis2[i] = error @ np.linalg.solve(covariance, error)
     explained = 1 - np.sum(residual**2, axis=0) / np.maximum(
@@ -59,6 +63,22 @@ def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
         found, np.linalg.norm(found - process.place_mm, axis=1), mahalanobis2, scores,
         misfit / np.median(misfit), explained,
     )  # fmt: skip
+
+
+def without_own(residual: FloatArray, share: float, data: FloatArray) -> FloatArray:
+    """What to add to whitened data (k, m), so that they are whitened by a covariance without the
+    ``share`` that one press's whitened ``residual`` r (m,) has of it: by (I - share r r')^-1/2."""
+    energy = max(float(residual @ residual), 1e-300)
+    factor = 1 / np.sqrt(1 - min(share * energy, MOST_OF_NOISE)) - 1
+    return np.outer(data @ residual, residual * (factor / energy))
+
+
+def ellipse_factor(mahalanobis2: FloatArray) -> float:
+    """What the covariance of a place is multiplied by, so that 90 % ellipses cover 90 % of new
+    presses: split conformal, the ceil(.9 (n + 1))-th least of ``mahalanobis2`` (n,)."""
+    count = len(mahalanobis2)
+    rank = min(int(np.ceil(0.9 * (count + 1))), count)
+    return float(np.sort(mahalanobis2)[rank - 1] / CHI2_90)
 
 
 def _scores(answer: FloatArray, seen: FloatArray) -> FloatArray:

@@ -22,9 +22,9 @@ from eitskin.teaching.fit import Learned, chosen_kernel, default_kernel, differe
 from eitskin.teaching.fit import first_amplitudes as begin_amplitudes
 from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity, placement_text
 from eitskin.teaching.left_out import (
-    CHI2_90,
     MISFIT,
     LeftOut,
+    ellipse_factor,
     leave_one_out,
     refined_places,
     stranger_note,
@@ -320,7 +320,6 @@ def _report(
     placement, kernel = learned.kernel.placement, learned.kernel
     strangers = np.flatnonzero(left_out.misfit > MISFIT)
     silent = np.flatnonzero(left_out.explained < NOTHING)
-    factor = float(np.quantile(left_out.mahalanobis2, 0.9) / CHI2_90)
     few = len(presses) < FEW_PRESSES
     if few:
         notes.append(f"{len(presses)} presses are too few to tell 90 % ellipses")
@@ -345,7 +344,7 @@ def _report(
             "of_a_press": round(float(np.sqrt(np.mean(learned.process.left_out() ** 2))), 3),
             "shrinkage": round(learned.noise.shrinkage, 3),
         },
-        "ellipse_factor": None if few else round(factor, 3),
+        "ellipse_factor": None if few else round(ellipse_factor(left_out.mahalanobis2), 3),
         "placement": {
             "turn_deg": round(placement.turn_deg % 360, 2),
             "scale": round(placement.scale, 4),

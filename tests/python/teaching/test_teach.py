@@ -11,7 +11,13 @@ import pytest
 
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.teaching.left_out import leave_one_out
+from eitskin.teaching.left_out import (
+    CHI2_90,
+    ellipse_factor,
+    leave_one_out,
+    placed,
+    without_own,
+)
 from eitskin.teaching.make import taught_model
 from eitskin.teaching.presses import Presses
 from eitskin.teaching.teach import Taught, solve_presses, teach
@@ -34,6 +40,25 @@ def test_presses_never_seen_are_found(taught: Taught) -> None:
     assert turn == pytest.approx(TRUE.turn_deg, abs=3)
     assert not taught.report["placement"]["mirrored"]
     assert taught.report["notes"][0].startswith("touches have a force: depth")
+
+
+def test_ellipses_cover_what_they_say(taught: Taught) -> None:
+    judged, factor = presses(100, seed=2), ellipse_factor(taught.left_out.mahalanobis2)
+    place, covariance = placed(taught.learned, taught.model.grid, judged.difference)
+    away = place - judged.place_mm
+    squared = np.einsum("ni,nij,nj->n", away, np.linalg.inv(covariance), away)
+    assert 0.8 < np.mean(squared < CHI2_90 * factor) < 0.97
+    assert ellipse_factor(np.arange(1.0, 51.0)) == 46 / CHI2_90
+
+
+def test_a_press_left_out_has_no_part_in_the_noise() -> None:
+    """Products are those of the inverse covariance without its residual."""
+    draw = np.random.default_rng(4)
+    residual, data = draw.normal(size=8), draw.normal(size=(3, 8))
+    share = 0.7 / (residual @ residual)
+    white = data + without_own(residual, share, data)
+    inverse = np.linalg.inv(np.eye(8) - share * np.outer(residual, residual))
+    assert white @ white.T == pytest.approx(data @ inverse @ data.T)
 
 
 def test_shuffled_places_teach_nothing() -> None:
