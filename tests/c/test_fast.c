@@ -343,6 +343,20 @@ static void spoil_dead(bench *b)
     }
 }
 
+/* Measured with electrode 3, which floats: suspect at once, and no frame is believed meanwhile. */
+static void spoil_open(bench *b)
+{
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+        const uint8_t *row = b->skin.model.protocol + 4 * i;
+        if (row[2] == 3 || row[3] == 3)
+            b->frame[i] = (eits_real)(i % 2 == 0 ? 5.0 : -1.0) * b->quiet[i];
+    }
+    if (b->next == 0 && b->fast->wild > 0) {
+        confirm(b, (const double[][2]){{-40, 0}}, 1);
+        CHECK(b->fast->seeds == 0 && b->fast->wild == 0);
+    }
+}
+
 static void spoil_drift(bench *b)
 {
     b->gain_drift = fmin(b->gain_drift + 2e-6, 4e-4);
@@ -350,7 +364,8 @@ static void spoil_drift(bench *b)
 
 static void test_other_things_than_touches(void)
 {
-    void (*const spoils[])(bench *) = {spoil_glitch, spoil_missing, spoil_dead, spoil_drift};
+    void (*const spoils[])(bench *) = {spoil_glitch, spoil_missing, spoil_dead, spoil_open,
+                                       spoil_drift};
     for (size_t how = 0; how < sizeof spoils / sizeof spoils[0]; ++how) {
         bench *b = bench_open(EITS_SIGN_INCREASE);
         for (uint32_t k = 0; k < 264; ++k) {
@@ -363,6 +378,8 @@ static void test_other_things_than_touches(void)
             give(b);
         }
         check_told(b, 1.0);
+        CHECK_EQUAL(b->fast->suspect[3] > EITS_FAST_SUSPECT,
+                    spoils[how] == spoil_open || spoils[how] == spoil_dead);
         bench_close(b);
     }
 }

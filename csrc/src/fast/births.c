@@ -37,36 +37,6 @@ int eits_fast_invert(const eits_real h[4][4], uint32_t n, eits_real inverse[4][4
     return 1;
 }
 
-/* What each cell adds to a drive's explanation, onto `score`, beside a touch that answers `known`
- * (whitened; NULL: none). */
-static void add_cells(eits_fast *fast, const fast_held *held, const eits_real *known,
-                      eits_real *score)
-{
-    const uint32_t rows = fast->drive[held->drive].count;
-    const eits_real energy = known == NULL ? 0 : fast_dot(known, known, rows);
-    const eits_real size = energy > 0 ? fast_dot(known, held->white, rows) / energy : 0;
-    eits_real *answer = fast->spare;
-    for (uint32_t n = 0; n < fast->cells; ++n) {
-        eits_fast_answer_of_pixel(fast, held->drive, fast->cell[n], answer);
-        fast_whiten(held->factor, answer, rows);
-        eits_real along = fast_dot(answer, held->white, rows);
-        if (energy > 0) {
-            const eits_real shared = fast_dot(known, answer, rows);
-            fast_axpy(answer, -(shared / energy), known, rows);
-            along = fast_dot(answer, held->white, rows) - size * fast_dot(answer, known, rows);
-        }
-        along *= fast->sign;
-        const eits_real own = fast_dot(answer, answer, rows);
-        if (along > 0 && own > 0)
-            score[n] += along * along / own;
-    }
-}
-
-void eits_fast_map(eits_fast *fast, const fast_held *held)
-{
-    add_cells(fast, held, NULL, fast->score);
-}
-
 /* Least squares of `white` by one or two answers, none of the wrong sign. */
 static void solve_strengths(const eits_fast *fast, const eits_real *const g[2], uint32_t count,
                             const eits_real *white, uint32_t rows, eits_real *strength)
@@ -92,65 +62,82 @@ static void solve_strengths(const eits_fast *fast, const eits_real *const g[2], 
     }
 }
 
-/* What a drive says of moving the touches, onto h and b: derivatives less what strengths can do of
- * them. `answer` are the touches' whitened answers; derivatives are spent, answers become an
- * orthonormal basis. */
-static void add_normal(fast_fit *fit, eits_real *const answer[2], size_t stride,
-                       const eits_real *strength, const eits_real *rest, uint32_t rows)
+/* An answer and its derivatives, each L^-1 of it. Without known touches L is a diagonal. */
+static void whiten_ways(const fast_held *held, eits_real *answer, size_t stride, uint32_t rows)
+{
+    eits_real *v[FAST_WAYS] = {answer, answer + stride, answer + 2 * stride};
+    for (uint32_t i = 0; i < rows; ++i) {
+        const eits_real *line = fast_line(held->factor, i);
+        eits_real sum[FAST_WAYS] = {0, 0, 0};
+        for (uint32_t j = held->alone ? i : 0; j < i; ++j) {
+            for (uint32_t way = 0; way < FAST_WAYS; ++way)
+                sum[way] += line[j] * v[way][j];
+        }
+        for (uint32_t way = 0; way < FAST_WAYS; ++way)
+            v[way][i] = (v[way][i] - sum[way]) / line[i];
+    }
+}
+
+/* Answers become an orthonormal basis, those of a touch without strength aside; how many. */
+static uint32_t make_basis(fast_share *share, uint32_t count, eits_real *const answer[2],
+                           uint32_t rows, const eits_real *unit[2])
 {
     uint32_t basis = 0;
-    const eits_real *unit[2] = {NULL, NULL};
-    for (uint32_t i = 0; i < fit->count; ++i) {
-        fit->variance[i] = 0;
-        for (uint32_t way = 1; way < FAST_WAYS; ++way) {
-            for (uint32_t r = 0; r < rows; ++r)
-                answer[i][way * stride + r] *= strength[i];
-        }
-        if (strength[i] == 0)
+    for (uint32_t i = 0; i < count; ++i) {
+        share->variance[i] = 0;
+        if (share->strength[i] == 0)
             continue;
         for (uint32_t q = 0; q < basis; ++q)
             fast_axpy(answer[i], -fast_dot(unit[q], answer[i], rows), unit[q], rows);
-        fit->variance[i] = 1 / fast_dot(answer[i], answer[i], rows);
-        const eits_real scale = eits_sqrt(fit->variance[i]);
+        share->variance[i] = 1 / fast_dot(answer[i], answer[i], rows);
+        const eits_real scale = eits_sqrt(share->variance[i]);
         for (uint32_t r = 0; r < rows; ++r)
             answer[i][r] *= scale;
         unit[basis++] = answer[i];
     }
-    for (uint32_t i = 0; i < 2 * fit->count; ++i) {
+    return basis;
+}
+
+/* What a drive says of moving the touches: derivatives less what strengths can do of them.
+ * `answer` are the touches' whitened answers, all of which are spent. */
+static void say_normal(fast_share *share, uint32_t count, eits_real *const answer[2], size_t stride,
+                       const eits_real *rest, uint32_t rows)
+{
+    const eits_real *unit[2] = {NULL, NULL};
+    const uint32_t basis = make_basis(share, count, answer, rows, unit);
+    uint32_t at = 0;
+    for (uint32_t i = 0; i < 2 * count; ++i) {
         eits_real *slope = answer[i / 2] + (1 + i % 2) * stride;
+        for (uint32_t r = 0; r < rows; ++r)
+            slope[r] *= share->strength[i / 2];
         for (uint32_t q = 0; q < basis; ++q)
             fast_axpy(slope, -fast_dot(unit[q], slope, rows), unit[q], rows);
-        fit->b[i] += fast_dot(slope, rest, rows);
-        for (uint32_t j = 0; j <= i; ++j) {
-            fit->h[i][j] += fast_dot(slope, answer[j / 2] + (1 + j % 2) * stride, rows);
-            fit->h[j][i] = fit->h[i][j];
-        }
+        share->b[i] = fast_dot(slope, rest, rows);
+        for (uint32_t j = 0; j <= i; ++j)
+            share->h[at++] = fast_dot(slope, answer[j / 2] + (1 + j % 2) * stride, rows);
     }
 }
 
-/* One drive of a fit; 0 where a place is off the skin. */
-static int add_drive(eits_fast *fast, const fast_held *held, uint32_t number, fast_fit *fit)
+/* What one drive says of a fit; 0 where a place is off the skin. */
+static int say_drive(eits_fast *fast, const fast_held *held, const fast_fit *fit, fast_share *share)
 {
     const uint32_t rows = fast->drive[held->drive].count;
     const size_t stride = fast->most_rows;
     eits_real *answer[2] = {fast->answer, fast->answer + FAST_WAYS * stride};
     const eits_real *g[2] = {answer[0], answer[1]};
-    eits_real *rest = fast->spare, *strength = fit->strength[number];
+    eits_real *rest = fast->spare;
     for (uint32_t i = 0; i < fit->count; ++i) {
         if (!eits_fast_answer(fast, held->drive, fit->place[i], answer[i]))
             return 0;
-        for (uint32_t way = 0; way < FAST_WAYS; ++way)
-            fast_whiten(held->factor, answer[i] + way * stride, rows);
+        whiten_ways(held, answer[i], stride, rows);
     }
-    solve_strengths(fast, g, fit->count, held->white, rows, strength);
+    solve_strengths(fast, g, fit->count, held->white, rows, share->strength);
     eits_copy(rest, held->white, rows);
     for (uint32_t i = 0; i < fit->count; ++i)
-        fast_axpy(rest, -strength[i], g[i], rows);
-    const eits_real left = fast_dot(rest, rest, rows);
+        fast_axpy(rest, -share->strength[i], g[i], rows);
     const eits_real all = fast_dot(held->white, held->white, rows);
-    fit->left[number] = left;
-    fit->left_all += left;
-    fit->score += all - left;
+    share->left = fast_dot(rest, rest, rows);
+    share->score = all - share->left;
     for (uint32_t i = 0; i < fit->count; ++i) {
         eits_real without = all, other = 0;
         if (fit->count == 2) {
@@ -160,21 +147,41 @@ static int add_drive(eits_fast *fast, const fast_held *held, uint32_t number, fa
                 (other * fast_dot(g[o], g[o], rows) - 2 * fast_dot(g[o], held->white, rows)) *
                 other;
         }
-        fit->own[i] += without - left;
+        share->own[i] = without - share->left;
     }
-    add_normal(fit, answer, stride, strength, rest, rows);
+    say_normal(share, fit->count, answer, stride, rest, rows);
     return 1;
 }
 
-int eits_fast_fit_at(eits_fast *fast, uint32_t from, fast_fit *fit)
+static void add_share(fast_fit *fit, const fast_share *share)
 {
-    fast_fit made = {.count = fit->count};
-    memcpy(made.place, fit->place, sizeof made.place);
+    uint32_t at = 0;
+    fit->left_all += share->left;
+    fit->score += share->score;
+    for (uint32_t i = 0; i < fit->count; ++i) {
+        fit->own[i] += share->own[i];
+        fit->variance[i] = share->variance[i];
+    }
+    for (uint32_t i = 0; i < 2 * fit->count; ++i) {
+        fit->b[i] += share->b[i];
+        for (uint32_t j = 0; j <= i; ++j) {
+            fit->h[i][j] += share->h[at++];
+            fit->h[j][i] = fit->h[i][j];
+        }
+    }
+}
+
+int eits_fast_fit_at(eits_fast *fast, uint32_t from, uint32_t known, fast_fit *fit)
+{
     for (uint32_t n = from; n < fast->held_count; ++n) {
-        if (!add_drive(fast, &fast->held[n], n - from, &made))
+        if ((known >> n & 1u) == 0 && !say_drive(fast, &fast->held[n], fit, &fit->share[n]))
             return 0;
     }
-    *fit = made;
+    fit->left_all = fit->score = fit->own[0] = fit->own[1] = 0;
+    eits_zero(fit->b, 4);
+    eits_zero(fit->h[0], 16);
+    for (uint32_t n = from; n < fast->held_count; ++n)
+        add_share(fit, &fit->share[n]);
     return 1;
 }
 
@@ -200,24 +207,23 @@ static eits_real damped_step(const fast_fit *fit, eits_real shorter, eits_real *
     return EITS_FAST_MAX_STEP_MM;
 }
 
-/* Damped Gauss-Newton steps from fit->place; 0 where it is off the skin. */
-static int refine(eits_fast *fast, uint32_t from, fast_fit *fit)
+/* Damped Gauss-Newton steps from fit->place, of which drives in the bits of `known` have said what
+ * they do; 0 where it is off the skin. */
+static int refine(eits_fast *fast, uint32_t from, uint32_t steps, uint32_t known, fast_fit *fit)
 {
-    const uint32_t answers = (fast->held_count - from) * fit->count;
-    uint32_t steps = EITS_FAST_ANSWERS / answers;
-    steps = steps > 1 + EITS_FAST_STEPS ? EITS_FAST_STEPS : steps > 2 ? steps - 1 : 1;
     eits_real shorter = 1, step[4];
-    if (!eits_fast_fit_at(fast, from, fit))
+    if (!eits_fast_fit_at(fast, from, known, fit))
         return 0;
     for (; steps > 0; --steps) {
         const eits_real length = damped_step(fit, shorter, step);
         if (length < 0)
             return 1;
-        fast_fit trial = *fit;
+        fast_fit *trial = &fast->trial;
+        trial->count = fit->count;
         for (uint32_t i = 0; i < 2 * fit->count; ++i)
-            trial.place[i / 2][i % 2] += step[i];
-        if (eits_fast_fit_at(fast, from, &trial) && trial.score > fit->score) {
-            *fit = trial;
+            trial->place[i / 2][i % 2] = fit->place[i / 2][i % 2] + step[i];
+        if (eits_fast_fit_at(fast, from, 0, trial) && trial->score > fit->score) {
+            *fit = *trial;
             shorter = 1;
         } else {
             shorter *= EITS_FAST_SHORTER;
@@ -226,6 +232,18 @@ static int refine(eits_fast *fast, uint32_t from, fast_fit *fit)
             return 1;
     }
     return 1;
+}
+
+/* Steps from one of the starts: both share what may be spent, and take turns at what is left. One
+ * that no search has come to takes a step's work to look at. */
+static uint32_t steps_of(const eits_fast *fast, uint32_t from, uint32_t touches, uint32_t start,
+                         int is_new)
+{
+    const uint32_t spend = EITS_FAST_ANSWERS / ((fast->held_count - from) * touches);
+    const uint32_t all = spend > 1 ? spend : 1;
+    uint32_t steps = all / 2 + (start == fast->turn ? all % 2 : 0);
+    steps -= steps > 0 && is_new;
+    return steps < EITS_FAST_STEPS ? steps : EITS_FAST_STEPS;
 }
 
 /* The pixel's centre, mm. */
@@ -258,71 +276,82 @@ static int peak(const eits_fast *fast, const eits_real *score, const eits_real (
     return greatest > 0;
 }
 
-/* Where the last drive's search from about there has come to. */
-static void go_on(const eits_fast *fast, eits_real *place)
+/* Where the last search from about there has come to, with what drives said of it then: their bits
+ * in `known`. 0 where there is none. */
+static int go_on(const eits_fast *fast, fast_fit *fit, uint32_t *known)
 {
     for (uint32_t k = 0; k < fast->last_count; ++k) {
-        if (!fast_apart(place, fast->last[k])) {
-            eits_copy(place, fast->last[k], 2);
-            return;
+        if (fast_apart(fit->place[0], fast->last[k]))
+            continue;
+        eits_copy(fit->place[0], fast->last[k], 2);
+        for (uint32_t n = 0; n < fast->held_count; ++n) {
+            if ((fast->held[n].said >> k & 1u) == 0)
+                continue;
+            *known |= 1u << n;
+            fit->share[n] = fast->held[n].share[k];
         }
+        return 1;
+    }
+    return 0;
+}
+
+/* The next search goes on from these. */
+static void keep(eits_fast *fast, uint32_t from, const fast_fit *const fits[], uint32_t count)
+{
+    fast->last_count = count;
+    for (uint32_t k = 0; k < count; ++k)
+        eits_copy(fast->last[k], fits[k]->place[0], 2);
+    for (uint32_t n = 0; n < fast->held_count; ++n) {
+        fast->held[n].said = (uint8_t)(n < from ? 0u : (1u << count) - 1u);
+        for (uint32_t k = 0; k < count; ++k)
+            fast->held[n].share[k] = fits[k]->share[n];
     }
 }
 
-/* The map beside a first touch, of the newest drives that wait. */
-static void map_beside(eits_fast *fast, const eits_real *first)
+/* Fits from the greatest cells of a map, in their order; how many. */
+static uint32_t fits_from(eits_fast *fast, uint32_t from, const eits_real *first, fast_fit *fit)
 {
-    const uint32_t from =
-        fast->held_count > EITS_FAST_PAIR_DRIVES ? fast->held_count - EITS_FAST_PAIR_DRIVES : 0;
-    eits_zero(fast->pair_score, fast->cells);
-    for (uint32_t n = from; n < fast->held_count; ++n) {
-        const fast_held *held = &fast->held[n];
-        (void)eits_fast_answer(fast, held->drive, first, fast->answer);
-        fast_whiten(held->factor, fast->answer, fast->drive[held->drive].count);
-        add_cells(fast, held, fast->answer, fast->pair_score);
-    }
-}
-
-int eits_fast_find(eits_fast *fast, uint32_t from, const eits_real *first, fast_fit *best,
-                   eits_real *lead)
-{
-    fast_fit fit[EITS_FAST_STARTS];
     eits_real taken[1 + EITS_FAST_STARTS][2];
-    const eits_real *score = fast->score;
+    const eits_real *score = first == NULL ? fast->score : fast->pair_score;
+    const uint32_t touches = first == NULL ? 1 : 2;
     uint32_t found = 0, places = 0;
-    if (first != NULL) {
-        map_beside(fast, first);
-        score = fast->pair_score;
+    if (first != NULL)
         eits_copy(taken[places++], first, 2);
-    }
     for (uint32_t start = 0; start < EITS_FAST_STARTS; ++start) {
         eits_real *place = taken[places];
+        uint32_t known = 0;
+        int is_new = 0;
         if (!peak(fast, score, (const eits_real(*)[2])taken, places, place))
             break;
         ++places;
-        fit[found].count = first == NULL ? 1 : 2;
-        eits_copy(fit[found].place[fit[found].count - 1], place, 2);
+        fit[found].count = touches;
+        eits_copy(fit[found].place[touches - 1], place, 2);
         if (first == NULL)
-            go_on(fast, fit[found].place[0]);
+            is_new = !go_on(fast, &fit[found], &known);
         else
             eits_copy(fit[found].place[0], first, 2);
-        found += (uint32_t)refine(fast, from, &fit[found]);
+        found += (uint32_t)refine(fast, from, steps_of(fast, from, touches, start, is_new), known,
+                                  &fit[found]);
     }
-    if (first == NULL)
-        fast->last_count = found;
-    if (found == 0)
-        return 0;
+    fast->turn ^= 1;
+    return found;
+}
+
+const fast_fit *eits_fast_find(eits_fast *fast, uint32_t from, const eits_real *first,
+                               eits_real *lead)
+{
+    fast_fit *fit = fast->fit;
+    const uint32_t found = fits_from(fast, from, first, fit);
     /* the best first; the first of two alike */
     const uint32_t winner = found == 2 && fit[1].score > fit[0].score;
-    const uint32_t own = fit[winner].count - 1;
-    *best = fit[winner];
-    *lead = best->score;
-    if (found == 2 && fast_apart(best->place[own], fit[1 - winner].place[own]))
-        *lead -= fit[1 - winner].score > 0 ? fit[1 - winner].score : 0;
-    if (first == NULL) {
-        eits_copy(fast->last[0], fit[winner].place[0], 2);
-        if (found == 2)
-            eits_copy(fast->last[1], fit[1 - winner].place[0], 2);
-    }
-    return 1;
+    const fast_fit *const ranked[EITS_FAST_STARTS] = {&fit[winner], &fit[1 - winner]};
+    if (first == NULL)
+        keep(fast, from, ranked, found);
+    if (found == 0)
+        return NULL;
+    const uint32_t own = ranked[0]->count - 1;
+    *lead = ranked[0]->score;
+    if (found == 2 && fast_apart(ranked[0]->place[own], ranked[1]->place[own]))
+        *lead -= ranked[1]->score > 0 ? ranked[1]->score : 0;
+    return ranked[0];
 }

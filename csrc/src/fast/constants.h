@@ -34,9 +34,20 @@
  * touches lose a row */
 #define EITS_FAST_GLITCH R(60.0)
 
-/* a row with less is dead [of the reference]. larger: strong touches kill rows; smaller: open
+/* a row with less is wild [of the reference]. larger: strong touches kill rows; smaller: open
  * electrodes look like touches */
-#define EITS_FAST_DEAD R(0.08)
+#define EITS_FAST_DEAD R(0.2)
+
+/* and one with more [of the reference]. as FAST_DEAD */
+#define EITS_FAST_WILD R(3.0)
+
+/* wild less not wild, above which an electrode's are left out [rows]. larger: an open electrode
+ * spoils more drives; smaller: one glitch takes an electrode */
+#define EITS_FAST_SUSPECT 2
+
+/* that are counted [rows]. larger: an electrode that is well again is out for longer; smaller:
+ * comes and goes */
+#define EITS_FAST_SUSPECT_MOST 16
 
 /* least reference of such a row [of noise]. as FAST_DEAD */
 #define EITS_FAST_DEAD_NOISE R(10.0)
@@ -56,7 +67,7 @@
 
 /* change of strength in such a drive [of the greatest]. larger: strengths jitter; smaller: at 40 dB
  * a touch that lifts slides to where it would be weak */
-#define EITS_FAST_STRENGTH_NOISE R(0.03)
+#define EITS_FAST_STRENGTH_NOISE R(0.06)
 
 /* change of strength where rows are news [of the greatest]. as FAST_STRENGTH_NOISE */
 #define EITS_FAST_STRENGTH_JUMP R(0.15)
@@ -101,14 +112,14 @@
 /* of a search, at most [steps]. larger: work; smaller: places lag */
 #define EITS_FAST_STEPS 5
 
-/* answered for in a search from one place: bounds its work [drives]. as FAST_STEPS */
-#define EITS_FAST_ANSWERS 16
+/* answered for by the steps of a search: bounds its work [drives]. as FAST_STEPS */
+#define EITS_FAST_ANSWERS 12
 
 /* that two touches at once are looked for in [drives]. larger: work; smaller: pairs come late */
-#define EITS_FAST_PAIR_HELD 4
+#define EITS_FAST_PAIR_HELD 3
 
 /* the map beside a first touch is made of [drives]. larger: work; smaller: misses the second */
-#define EITS_FAST_PAIR_DRIVES 2
+#define EITS_FAST_PAIR_DRIVES 1
 
 /* between touches, and between a place and its rivals [mm]. larger: near fingers wait for a frame;
  * smaller: one touch becomes two */
@@ -135,7 +146,7 @@
 
 /* rms of what it may leave beside noise [of the signal]. larger: two touches are born as one
  * between them; smaller: none that the model does not fit */
-#define EITS_FAST_BIRTH_ERROR R(0.12)
+#define EITS_FAST_BIRTH_ERROR R(0.08)
 
 /* greatest deviation of its place [mm]. larger: wrong first places; smaller: late */
 #define EITS_FAST_SPREAD_MM R(1.8)

@@ -37,24 +37,37 @@ typedef struct fast_known {
     eits_real peak;   /* its greatest strength */
 } fast_known;
 
-/* A drive that waits: rows and the triangle that whitened them, in memory of its own. */
+/* What one drive says of touches at places: how it is explained, and how to move them. */
+typedef struct fast_share {
+    eits_real strength[2], variance[2];
+    eits_real left, score; /* of its chi^2, and explained of it */
+    eits_real own[2];      /* what each explains beside the other */
+    eits_real b[4], h[10]; /* normal equations, h by rows up to the diagonal */
+} fast_share;
+
+/* A drive that waits: rows and the triangle that whitened them, in memory of its own; and what it
+ * said of the places that the last search came to, bits in `said`. */
 typedef struct fast_held {
     eits_real *white, *factor;
-    uint32_t drive, rows, news;
+    uint16_t drive, rows;
+    uint8_t news, alone; /* alone: no touch was known */
+    uint8_t said;
+    fast_share share[EITS_FAST_STARTS];
 } fast_held;
 
 /* Touches as they explain drives that wait. */
 typedef struct fast_fit {
     uint32_t count; /* of touches: 1 or 2 */
     eits_real place[2][2];
-    eits_real strength[EITS_FAST_HELD][2];
-    eits_real left[EITS_FAST_HELD]; /* of each drive's chi^2 */
-    eits_real left_all, score;
-    eits_real own[2];      /* what each explains beside the other */
-    eits_real h[4][4];     /* normal equations of moving them */
-    eits_real b[4];        /* and their right side */
+    fast_share share[EITS_FAST_HELD]; /* by drives that wait; and their sums: */
+    eits_real left_all, score, own[2];
+    eits_real h[4][4], b[4];
     eits_real variance[2]; /* of the strengths in the last drive */
 } fast_fit;
+
+/* What the next search is for: a drive's work is bounded, so that two touches at once take three.
+ */
+typedef enum fast_stage { FAST_ONE, FAST_BESIDE, FAST_TWO } fast_stage;
 
 struct eits_fast {
     const eits_context *ctx;
@@ -70,7 +83,9 @@ struct eits_fast {
     uint32_t time_us, timed, begun, next_id;
     uint32_t unexplained; /* a bit for each of the last 32 drives */
     uint32_t unexplained_frames;
-    uint32_t glitched, changed; /* in the last drive; within this one */
+    uint32_t glitched, changed;           /* in the last drive; within this one */
+    uint32_t wild;                        /* rows since the last frame */
+    uint8_t suspect[EITS_MAX_ELECTRODES]; /* wild rows of each electrode, less those that are not */
     /* tracks */
     uint32_t count;
     fast_known known[EITS_FAST_MAX_TOUCHES];
@@ -83,8 +98,11 @@ struct eits_fast {
     eits_real *moved;  /* P H', FAST_NUMBERS a row */
     eits_real *factor; /* a triangle: S = L L' */
     /* births */
-    uint32_t held_count, quiet, waited, has_first, last_count;
+    uint32_t held_count, quiet, waited, last_count;
+    fast_stage stage;
+    uint32_t turn; /* of which start has the step that is left over */
     fast_held held[EITS_FAST_HELD];
+    fast_fit fit[EITS_FAST_STARTS], trial;
     eits_real *score, *pair_score; /* by cell */
     eits_real first[2], last[EITS_FAST_STARTS][2];
     uint32_t seeds;
@@ -141,9 +159,6 @@ static inline int fast_apart(const eits_real *a, const eits_real *b)
  * `out` has FAST_WAYS rows of most_rows numbers. 0 where no pixel is near enough; `out` is then
  * zero. */
 int eits_fast_answer(const eits_fast *fast, uint32_t drive, const eits_real *place, eits_real *out);
-/* The same to a touch no larger than a pixel, without derivatives. */
-void eits_fast_answer_of_pixel(const eits_fast *fast, uint32_t drive, uint32_t pixel,
-                               eits_real *out);
 /* Whether a pixel is near enough to answer. */
 int eits_fast_on_skin(const eits_fast *fast, const eits_real *place);
 
@@ -162,18 +177,25 @@ void eits_fast_add(eits_fast *fast, const eits_real *state, const eits_real *var
                    eits_real xy);
 void eits_fast_forget(eits_fast *fast, uint32_t k);
 
+/* ---- map.c ---- */
+
+/* A drive enters the map of what a touch at each cell would explain. */
+void eits_fast_map(eits_fast *fast, const fast_held *held);
+/* The map beside a first touch, of the newest drives that wait. */
+void eits_fast_map_beside(eits_fast *fast, const eits_real *first);
+
 /* ---- births.c ---- */
 
 /* The inverse of a symmetric matrix (n x n, n at most 4); 0 where it is not well above zero. */
 int eits_fast_invert(const eits_real h[4][4], uint32_t n, eits_real inverse[4][4]);
-/* A drive enters the map of what a touch at each cell would explain. */
-void eits_fast_map(eits_fast *fast, const fast_held *held);
-/* How `fit->place` explains the drives held from `from` on; 0 where one is off the skin. */
-int eits_fast_fit_at(eits_fast *fast, uint32_t from, fast_fit *fit);
-/* Looks for one touch in them, or for a second beside `first`; the best, with its lead over the
- * next best elsewhere; 0 where there is none. */
-int eits_fast_find(eits_fast *fast, uint32_t from, const eits_real *first, fast_fit *best,
-                   eits_real *lead);
+/* How `fit->place` explains the drives held from `from` on; its shares of those in the bits of
+ * `known` are there. 0 where a place is off the skin. */
+int eits_fast_fit_at(eits_fast *fast, uint32_t from, uint32_t known, fast_fit *fit);
+/* Looks for one touch in them, or by the map beside it for a second at `first`; the best, with its
+ * lead over the next best elsewhere; NULL where there is none. It is the room's until the next
+ * search. */
+const fast_fit *eits_fast_find(eits_fast *fast, uint32_t from, const eits_real *first,
+                               eits_real *lead);
 
 /* ---- wait.c ---- */
 

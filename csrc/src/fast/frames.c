@@ -174,6 +174,8 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
             eits_fast_forget(fast, k);
         }
     }
-    seed(fast, found, taken, count);
+    /* a frame with rows that are no touch's may show any */
+    seed(fast, found, taken, fast->wild == 0 ? count : 0);
+    fast->wild = 0;
     return EITS_OK;
 }

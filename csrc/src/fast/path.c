@@ -2,19 +2,63 @@
  * them. The order of the questions is that of their cost, and of how often they are answered. */
 #include "fast/fast.h"
 
+/* A row that no touch can have changed so: it is dead, turned over, or far above its reference. */
+static int is_wild(const eits_fast *fast, eits_real v, eits_real v0)
+{
+    const eits_real square = fast_square(v0);
+    return eits_fabs(v0) > EITS_FAST_DEAD_NOISE * fast->noise_v &&
+           (v * v0 < EITS_FAST_DEAD * square || v * v0 > EITS_FAST_WILD * square);
+}
+
+/* An electrode is suspect while more of its rows are wild than are not. */
+static void suspect(eits_fast *fast, const uint8_t *row, int wild)
+{
+    for (uint32_t k = 2; k < 4; ++k) {
+        uint8_t *of = &fast->suspect[row[k]];
+        if (wild)
+            *of = *of < EITS_FAST_SUSPECT_MOST ? (uint8_t)(*of + 1) : *of;
+        else
+            *of = *of > 0 ? (uint8_t)(*of - 1) : 0;
+    }
+}
+
+/* Rows that are measured; `wild` ones are an electrode's doing, or where it is most of them the
+ * drive's. Rows of an electrode that is suspect are out as well. */
+static void choose_rows(eits_fast *fast, const fast_drive *d, const eits_real *volts)
+{
+    const eits_real *v0 = fast->ctx->reference.v0;
+    uint8_t wild[EITS_FAST_MAX_ROWS];
+    uint32_t wild_rows = 0;
+    for (uint32_t i = 0; i < d->count; ++i) {
+        const uint32_t row = fast->row[d->first + i];
+        fast->used[i] = eits_is_finite(volts[i]) && eits_is_finite(v0[row]) && !fast->masked[row];
+        wild[i] = fast->used[i] && is_wild(fast, volts[i], v0[row]);
+        wild_rows += wild[i];
+    }
+    fast->wild += wild_rows;
+    for (uint32_t i = 0; i < d->count; ++i) {
+        const uint8_t *row = eits_row(fast->ctx, fast->row[d->first + i]);
+        if (fast->used[i] && 2 * wild_rows <= d->count)
+            suspect(fast, row, wild[i]);
+    }
+    for (uint32_t i = 0; i < d->count; ++i) {
+        const uint8_t *row = eits_row(fast->ctx, fast->row[d->first + i]);
+        if (wild[i] || fast->suspect[row[2]] > EITS_FAST_SUSPECT ||
+            fast->suspect[row[3]] > EITS_FAST_SUSPECT)
+            fast->used[i] = 0;
+    }
+}
+
 /* z of the drive's rows in the model's volts, where they are used, and the direction in which a
- * drift of the gain moves them; how many are used. A dead row is an electrode's doing. */
+ * drift of the gain moves them; how many are used. */
 static uint32_t take_rows(eits_fast *fast, const fast_drive *d, const eits_real *volts)
 {
     const eits_real *v0 = fast->ctx->reference.v0;
     uint32_t used = 0;
+    choose_rows(fast, d, volts);
     for (uint32_t i = 0; i < d->count; ++i) {
         const uint32_t row = fast->row[d->first + i];
-        const eits_real size = eits_fabs(v0[row]);
-        int use = eits_is_finite(volts[i]) && eits_is_finite(v0[row]) && !fast->masked[row];
-        if (use && eits_fabs(volts[i]) < EITS_FAST_DEAD * size &&
-            size > EITS_FAST_DEAD_NOISE * fast->noise_v)
-            use = 0;
+        int use = fast->used[i];
         const eits_real z = use ? fast->gain[row] * (volts[i] - (1 + fast->drift) * v0[row]) : R(0);
         use = use && eits_fabs(z) < EITS_FAST_FAR * fast->sigma;
         fast->used[i] = (uint8_t)use;

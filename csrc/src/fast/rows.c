@@ -4,8 +4,7 @@
  * each pixel counts (1 - d^2 / rho^2)^2 at a distance d below rho, which has a derivative
  * everywhere and needs no root. One pass over some ten pixels gives E_drive . E for all electrodes;
  * a row is a difference of two. */
-#include "base/half.h"
-#include "fast/fast.h"
+#include "fast/fields.h"
 
 /* Sums over pixels, by way and electrode. */
 typedef struct sums {
@@ -13,32 +12,23 @@ typedef struct sums {
     eits_real weight[FAST_WAYS];
 } sums;
 
-static const uint16_t *column_of(const eits_fast *fast, uint32_t pixel)
-{
-    const eits_matrix *at = &fast->model->fields.at;
-    return (const uint16_t *)at->data + (size_t)pixel * at->stride;
-}
-
-static eits_real number(uint16_t half)
-{
-    return (eits_real)eits_half_to_float(half);
-}
-
-/* E_drive . E of each electrode's current at a pixel, `ways` times by weights, onto the sums. */
-static void add_pixel(const eits_fast *fast, const fast_drive *d, uint32_t pixel, uint32_t ways,
-                      const eits_real *weight, sums *s)
+/* E_drive . E of each electrode's current at a pixel, times each way's weight, onto the sums. */
+static void add_pixel(const eits_fast *fast, const fast_drive *d, uint32_t pixel, eits_real left,
+                      eits_real slope_x, eits_real slope_y, sums *s)
 {
     const uint32_t electrodes = fast->model->n_electrodes;
-    const uint16_t *x = column_of(fast, pixel), *y = x + electrodes;
-    const eits_real along_x = number(x[d->plus]) - number(x[d->minus]);
-    const eits_real along_y = number(y[d->plus]) - number(y[d->minus]);
+    const uint16_t *x = fast_column(fast, pixel), *y = x + electrodes;
+    const eits_real along_x = fast_number(x[d->plus]) - fast_number(x[d->minus]);
+    const eits_real along_y = fast_number(y[d->plus]) - fast_number(y[d->minus]);
     for (uint32_t e = 0; e < electrodes; ++e) {
-        const eits_real product = along_x * number(x[e]) + along_y * number(y[e]);
-        for (uint32_t way = 0; way < ways; ++way)
-            s->of[way][e] += weight[way] * product;
+        const eits_real product = along_x * fast_number(x[e]) + along_y * fast_number(y[e]);
+        s->of[0][e] += left * product;
+        s->of[1][e] += slope_x * product;
+        s->of[2][e] += slope_y * product;
     }
-    for (uint32_t way = 0; way < ways; ++way)
-        s->weight[way] += weight[way];
+    s->weight[0] += left;
+    s->weight[1] += slope_x;
+    s->weight[2] += slope_y;
 }
 
 static void over_rows(const eits_fast *fast, const fast_drive *d, const eits_real *seen,
@@ -85,8 +75,7 @@ static uint32_t gather(const eits_fast *fast, const fast_drive *d, const eits_re
             ++near;
             if (s == NULL)
                 return near;
-            const eits_real weight[FAST_WAYS] = {left * left, slope * left * dx, slope * left * dy};
-            add_pixel(fast, d, j, FAST_WAYS, weight, s);
+            add_pixel(fast, d, j, left * left, slope * left * dx, slope * left * dy, s);
         }
     }
     return near;
@@ -114,18 +103,6 @@ int eits_fast_answer(const eits_fast *fast, uint32_t drive, const eits_real *pla
     for (uint32_t way = 0; way < FAST_WAYS; ++way)
         over_rows(fast, d, s.of[way], out + (size_t)way * fast->most_rows);
     return 1;
-}
-
-void eits_fast_answer_of_pixel(const eits_fast *fast, uint32_t drive, uint32_t pixel,
-                               eits_real *out)
-{
-    const fast_drive *d = &fast->drive[drive];
-    const eits_real weight = 1;
-    sums s;
-    s.weight[0] = 0;
-    eits_zero(s.of[0], fast->model->n_electrodes);
-    add_pixel(fast, d, pixel, 1, &weight, &s);
-    over_rows(fast, d, s.of[0], out);
 }
 
 int eits_fast_on_skin(const eits_fast *fast, const eits_real *place)

@@ -152,6 +152,8 @@ eits_status eits_fast_begin(eits_fast *fast)
     fast->sigma = reference->noise_v * eits_sqrt(energy / (eits_real)rows);
     fast->sign = fast->ctx->options.sign == EITS_SIGN_DECREASE ? R(-1) : R(1);
     fast->drift = 0;
+    fast->wild = 0;
+    memset(fast->suspect, 0, sizeof fast->suspect);
     fast->count = fast->held_count = fast->quiet = fast->waited = fast->seeds = 0;
     fast->timed = fast->unexplained = fast->unexplained_frames = fast->glitched = 0;
     for (uint32_t n = 0; n < fast->drives; ++n) {

@@ -8,7 +8,8 @@ void eits_fast_wait(eits_fast *fast, uint32_t drive, uint32_t rows, int news)
     const int begins = fast->held_count == 0 || fast->waited > EITS_FAST_MAX_WAIT;
     if (begins) {
         eits_zero(fast->score, fast->cells);
-        fast->held_count = fast->waited = fast->has_first = fast->last_count = 0;
+        fast->held_count = fast->waited = fast->last_count = fast->turn = 0;
+        fast->stage = FAST_ONE;
     }
     if (fast->held_count == EITS_FAST_HELD) {
         const fast_held oldest = fast->held[0];
@@ -18,13 +19,16 @@ void eits_fast_wait(eits_fast *fast, uint32_t drive, uint32_t rows, int news)
     }
     fast_held *held = &fast->held[fast->held_count++];
     const uint32_t count = fast->drive[drive].count;
-    held->drive = drive;
-    held->rows = rows;
-    held->news = (uint32_t)news;
+    held->drive = (uint16_t)drive;
+    held->rows = (uint16_t)rows;
+    held->news = news != 0;
+    held->alone = fast->count == 0;
+    held->said = 0;
     eits_copy(held->white, fast->white, count);
     eits_copy(held->factor, fast->factor, (size_t)count * (count + 1) / 2);
-    if (!begins)
-        eits_fast_map(fast, held); /* but the first: a touch landed while it was measured */
+    /* but the first: a touch landed while it was measured; nor where the drive's work is another */
+    if (!begins && fast->stage != FAST_TWO)
+        eits_fast_map(fast, held);
     fast->quiet = news ? 0 : fast->quiet + 1;
 }
 
@@ -96,7 +100,7 @@ static void give_birth(eits_fast *fast, const fast_fit *fit, uint32_t from,
     for (uint32_t i = 0; i < fit->count; ++i) {
         forget_near(fast, fit->place[i]);
         const uint32_t k = fast->count, at = 2 * i;
-        const eits_real c = fit->strength[drives - 1][i];
+        const eits_real c = fit->share[fast->held_count - 1].strength[i];
         const eits_real place = fast_square(EITS_FAST_BORN_MM);
         const eits_real speed = fast_square(EITS_FAST_FIRST_SPEED);
         const eits_real state[FAST_SIZE] = {fit->place[i][0], fit->place[i][1], c, 0, 0};
@@ -110,24 +114,24 @@ static void give_birth(eits_fast *fast, const fast_fit *fit, uint32_t from,
             d->there[k] = d->explained = 1;
             d->then[k][FAST_X] = fit->place[i][0];
             d->then[k][FAST_Y] = fit->place[i][1];
-            d->then[k][FAST_C] = fit->strength[n][i];
+            d->then[k][FAST_C] = fit->share[from + n].strength[i];
         }
     }
     fast->held_count = 0;
 }
 
 /* `fit` is born where it is believed: without the first drive that waits, or with it. */
-static int try(eits_fast *fast, fast_fit *fit, uint32_t from, eits_real lead)
+static int try(eits_fast *fast, const fast_fit *fit, uint32_t from, eits_real lead)
 {
     eits_real inverse[4][4];
     int believed = is_believed(fast, fit, from, lead, inverse);
     if (!believed && fit->count == 1) {
-        fast_fit whole = *fit;
+        fast_fit *whole = &fast->trial;
+        *whole = *fit;
+        fit = whole;
         from = 0;
-        believed =
-            eits_fast_fit_at(fast, from, &whole) && is_believed(fast, &whole, from, lead, inverse);
-        if (believed)
-            *fit = whole;
+        believed = eits_fast_fit_at(fast, from, ~1u, whole) &&
+                   is_believed(fast, whole, from, lead, inverse);
     }
     if (believed)
         give_birth(fast, fit, from, (const eits_real(*)[4])inverse);
@@ -137,14 +141,39 @@ static int try(eits_fast *fast, fast_fit *fit, uint32_t from, eits_real lead)
 /* A drive that spoils the fit alone, not the newest, waits no more; 1 where there was one. */
 static int drop_spoiled(eits_fast *fast, const fast_fit *fit)
 {
-    uint32_t worst = 0;
-    for (uint32_t n = 1; n + 1 < fast->held_count; ++n)
-        worst = fit->left[n] > fit->left[worst] ? n : worst;
-    if (!(fit->left[worst] > EITS_FAST_NEWS && fit->left[worst] > fit->left_all / 2) ||
-        worst + 2 >= fast->held_count)
+    uint32_t worst = 1;
+    for (uint32_t n = 2; n < fast->held_count; ++n)
+        worst = fit->share[n].left > fit->share[worst].left ? n : worst;
+    const eits_real left = fit->share[worst].left;
+    if (!(left > EITS_FAST_NEWS && left > fit->left_all / 2) || worst + 1 >= fast->held_count)
         return 0;
-    drop(fast, 1 + worst);
+    drop(fast, worst);
     return 1;
+}
+
+static int find_one(eits_fast *fast)
+{
+    eits_real lead;
+    const fast_fit *fit = eits_fast_find(fast, 1, NULL, &lead);
+    fast->stage = FAST_ONE;
+    if (fit == NULL)
+        return 0;
+    if (try(fast, fit, 1, lead))
+        return 1;
+    eits_copy(fast->first, fit->place[0], 2);
+    if (!drop_spoiled(fast, fit) && fast->held_count > 2)
+        fast->stage = FAST_BESIDE;
+    return 0;
+}
+
+static int find_two(eits_fast *fast)
+{
+    const uint32_t from =
+        fast->held_count > EITS_FAST_PAIR_HELD + 1 ? fast->held_count - EITS_FAST_PAIR_HELD : 1;
+    eits_real lead;
+    const fast_fit *fit = eits_fast_find(fast, from, fast->first, &lead);
+    fast->stage = FAST_ONE;
+    return fit != NULL && try(fast, fit, from, lead);
 }
 
 int eits_fast_find_births(eits_fast *fast)
@@ -155,22 +184,11 @@ int eits_fast_find_births(eits_fast *fast)
         ++unexplained;
     if (fast->held_count < 2 || room < 1 || unexplained > EITS_FAST_UNEXPLAINED)
         return 0;
-    fast_fit fit;
-    eits_real lead;
-    if (fast->has_first && room >= 2) {
-        const uint32_t from =
-            fast->held_count > EITS_FAST_PAIR_HELD + 1 ? fast->held_count - EITS_FAST_PAIR_HELD : 1;
-        fast->has_first = 0;
-        return eits_fast_find(fast, from, fast->first, &fit, &lead) && try(fast, &fit, from, lead);
-    }
-    if (!eits_fast_find(fast, 1, NULL, &fit, &lead))
-        return 0;
-    const fast_fit found = fit;
-    if (try(fast, &fit, 1, lead))
-        return 1;
-    fast->has_first = fast->held_count > 2;
-    eits_copy(fast->first, found.place[0], 2);
-    if (drop_spoiled(fast, &found))
-        fast->has_first = 0;
+    if (fast->stage == FAST_ONE || room < 2)
+        return find_one(fast);
+    if (fast->stage == FAST_TWO)
+        return find_two(fast);
+    eits_fast_map_beside(fast, fast->first);
+    fast->stage = FAST_TWO;
     return 0;
 }

@@ -26,7 +26,13 @@ from eitskin.core.constants_table import (
     FAST_STEPS,
 )
 from eitskin_studies.twins.fast.rows import Drive, RowModel
-from eitskin_studies.twins.fast.tracks import dot, lower_factor, lower_solve, summed
+from eitskin_studies.twins.fast.tracks import (
+    dot,
+    lower_factor,
+    lower_solve,
+    lower_solve_back,
+    summed,
+)
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -115,7 +121,8 @@ class Births:
 
     def begin(self) -> None:
         """A wait begins: nothing is in the map."""
-        self.score, self._last = np.zeros(len(self.cells)), np.zeros((0, 2))
+        self.score, self._last, self._turn = np.zeros(len(self.cells)), np.zeros((0, 2)), 0
+        self._beside = np.zeros(len(self.cells))
 
     def add(self, one: Held) -> None:
         """A drive enters the map."""
@@ -127,44 +134,58 @@ class Births:
         self._last = np.array([fit.places[0] for fit in fits]).reshape(-1, 2)
         return fits
 
-    def two(self, held: list[Held], first: FloatArray) -> list[Fit]:
-        """Fits of a second touch beside one at ``first`` (1, 2), the best first."""
-        score = np.zeros(len(self.cells))
+    def map_beside(self, held: list[Held], first: FloatArray) -> None:
+        """The map of a second touch beside one at ``first`` (1, 2)."""
+        self._beside = np.zeros(len(self.cells))
         for one in held[-FAST_PAIR_DRIVES:]:
-            score = score + self._explained_at_cells(one, first)
-        return self._refined(held[-FAST_PAIR_HELD:], score, first)
+            self._beside = self._beside + self._explained_at_cells(one, first)
+
+    def two(self, held: list[Held], first: FloatArray) -> list[Fit]:
+        """Fits of that second touch, the best first."""
+        return self._refined(held[-FAST_PAIR_HELD:], self._beside, first)
 
     def _refined(self, held: list[Held], score: FloatArray, places: FloatArray) -> list[Fit]:
         starts = self._peaks(score, places)
-        for start in starts:  # where the last drive's search has come to
+        spend = max(1, FAST_ANSWERS // (len(held) * (1 + len(places))))
+        steps = [spend // 2 + (spend % 2 if k == self._turn else 0) for k in range(len(starts))]
+        self._turn = 1 - self._turn
+        for k, start in enumerate(starts if not len(places) else []):
             near = ~apart(self._last, start)
-            if not len(places) and near.any():
+            if near.any():  # where the last search has come to
                 start[:] = self._last[int(np.argmax(near))]
-        fits = [self._refine(held, np.vstack([places, start])) for start in starts]
+            else:  # which takes a step's work to look at
+                steps[k] -= steps[k] > 0
+        fits = [
+            self._refine(held, np.vstack([places, start]), min(FAST_STEPS, number))
+            for start, number in zip(starts, steps, strict=True)
+        ]
         return sorted((fit for fit in fits if fit is not None), key=lambda fit: -fit.score)
 
-    def _at_cells(self, drive: Drive) -> FloatArray:
-        """Each row's answer at the cells (r, n)."""
-        first = int(drive.rows[0])
-        if first not in self._kept:
-            self._kept[first] = self.model.at_pixels(drive, self.cells).T
-        return self._kept[first]
-
     def _explained_at_cells(self, one: Held, places: FloatArray) -> FloatArray:
-        """What a touch at each cell (n,) would explain of a drive's chi^2, beside those at
-        ``places`` (k, 2)."""
-        answer, white = lower_solve(one.factor, self._at_cells(one.drive)), one.white[:, None]
-        along = summed(answer * white)
+        """About what a touch at each cell (n,) would explain of a drive's chi^2, beside one at
+        ``places`` (0 or 1, 2): with the diagonal of the factor where squares are asked for."""
+        seen, per = self._at_cells(one.drive), 1 / np.diag(one.factor)
+        left, own = one.white, self.model.squares(one.drive, seen, per)
         for place in places:
-            known = lower_solve(one.factor, self.model.answer(one.drive, *place)[0][0])
-            energy = dot(known, known)
+            known = self.model.answer(one.drive, *place)[0][0]
+            white = lower_solve(one.factor, known)
+            energy, over = dot(white, white), known * per * per
+            shared = summed(seen * self.model.over_electrodes(one.drive, over), axis=1)
+            if dot(over, known) > 0:
+                own = own - shared * shared / dot(over, known)
             if energy > 0:
-                answer = answer - summed(known[:, None] * answer) / energy * known[:, None]
-                size = dot(known, one.white) / energy
-                along = summed(answer * white) - size * summed(answer * known[:, None])
-        along, own = self.sign * along, summed(answer * answer)
+                left = left - dot(white, left) / energy * white
+        toward = self.model.over_electrodes(one.drive, lower_solve_back(one.factor, left))
+        along = self.sign * summed(seen * toward, axis=1)
         tells = (along > 0) & (own > 0)
         return np.where(tells, along * along / np.where(tells, own, 1.0), 0.0)
+
+    def _at_cells(self, drive: Drive) -> FloatArray:
+        """E_drive . E of each electrode at the cells (n, L)."""
+        first = int(drive.rows[0])
+        if first not in self._kept:
+            self._kept[first] = self.model.products(drive, self.cells)
+        return self._kept[first]
 
     def _peaks(self, score: FloatArray, places: FloatArray) -> FloatArray:
         """The greatest cells, apart from each other and from ``places``, (c, 2) mm."""
@@ -215,10 +236,10 @@ class Births:
             h, b = h + summed(jac[:, None] * jac, axis=2), b + summed(jac * rest, axis=1)
         return Fit(places, strength, left, score, own, h, b, variance)
 
-    def _refine(self, held: list[Held], places: FloatArray) -> Fit | None:
-        """Damped Gauss-Newton steps from ``places`` (k, 2), the fewer the more drives wait."""
+    def _refine(self, held: list[Held], places: FloatArray, steps: int) -> Fit | None:
+        """Damped Gauss-Newton steps from ``places`` (k, 2)."""
         fit, shorter = self.fit(held, places), 1.0
-        for _ in range(min(FAST_STEPS, max(1, FAST_ANSWERS // (len(held) * len(places)) - 1))):
+        for _ in range(steps):
             if fit is None:
                 return None
             damped = inverted(fit.h + np.diag(FAST_DAMPING * np.diag(fit.h)))

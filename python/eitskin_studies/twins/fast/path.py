@@ -51,13 +51,16 @@ from eitskin.core.constants_table import (
     FAST_SEED_STRENGTH,
     FAST_SPREAD_MM,
     FAST_STRENGTH_JUMP,
+    FAST_SUSPECT,
+    FAST_SUSPECT_MOST,
     FAST_UNEXPLAINED,
+    FAST_WILD,
 )
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.fast import AlignedFrame, FastTouch
 from eitskin.model.model import Model
 from eitskin_studies.twins.fast.births import Births, Fit, Held, apart, inverted
-from eitskin_studies.twins.fast.rows import RowModel, drives_of
+from eitskin_studies.twins.fast.rows import Drive, RowModel, drives_of
 from eitskin_studies.twins.fast.tracks import (
     SIZE,
     VX,
@@ -124,9 +127,11 @@ class FastPath:
         self.tracks, self._known = Tracks(), list[_Known]()
         self._held, self._quiet, self._waited, self._glitched = list[Held](), 0, 0, False
         self._first: FloatArray | None = None
+        self._beside = False  # whether the map beside it is made
         self._unexplained, self._unexplained_frames = [False] * _MEMORY, 0
         self._past = [_Past() for _ in self.drives]
         self._masked = np.zeros(len(v0), dtype=np.bool_)
+        self._wild, self._suspect = 0, np.zeros(int(self._table.max()) + 1, dtype=np.int64)
         self._seeds: list[tuple[float, float]] = []
 
     # ---- a drive ----
@@ -136,9 +141,7 @@ class FastPath:
         ``time_s``, which counts by microseconds; returns what touches the skin."""
         drive = self.drives[number]
         v0 = self._v0[drive.rows]
-        used = np.isfinite(volts) & np.isfinite(v0) & ~self._masked[drive.rows]
-        dead = np.abs(volts) < FAST_DEAD * np.abs(v0)
-        used &= ~(dead & (np.abs(v0) > FAST_DEAD_NOISE * self._noise_v))
+        used = self._chosen(drive, volts, v0)
         z = self._gain[drive.rows] * np.where(used, volts - (1 + self._drift) * v0, 0.0)
         used &= np.abs(z) < FAST_FAR * self._sigma
         z = np.where(used, z, 0.0)
@@ -155,6 +158,21 @@ class FastPath:
         for known, state in zip(self._known, self.tracks.state, strict=True):
             self._past[number].state[known.id] = state[:3].copy()
         return self.touches()
+
+    def _chosen(self, drive: Drive, volts: FloatArray, v0: FloatArray) -> BoolArray:
+        """Rows (r,) that are measured, not wild, and of no electrode of which most rows are: no
+        touch changes a row so far."""
+        used = np.isfinite(volts) & np.isfinite(v0) & ~self._masked[drive.rows]
+        far = (volts * v0 < FAST_DEAD * (v0 * v0)) | (volts * v0 > FAST_WILD * (v0 * v0))
+        wild = used & far & (np.abs(v0) > FAST_DEAD_NOISE * self._noise_v)
+        self._wild += int(wild.sum())
+        measured = self._table[drive.rows, 2:]
+        if 2 * int(wild.sum()) <= len(used):  # else it is the drive's doing
+            for pair, one in zip(measured[used], wild[used], strict=True):
+                for e in pair:
+                    step = 1 if one else -1
+                    self._suspect[e] = min(max(self._suspect[e] + step, 0), FAST_SUSPECT_MOST)
+        return np.asarray(used & ~wild & ~(self._suspect[measured] > FAST_SUSPECT).any(axis=1))
 
     def touches(self) -> list[FastTouch]:
         """What touches the skin, as of the last drive."""
@@ -250,8 +268,8 @@ class FastPath:
         self._waited += 1
         if not self._held or self._waited > FAST_MAX_WAIT:
             self._births.begin()
-            self._held, self._waited, self._first = [], 0, None
-        else:
+            self._held, self._waited, self._first, self._beside = [], 0, None, False
+        elif not self._beside:
             self._births.add(one)  # but the first: a touch landed while it was measured
         self._held = [*self._held, one][-FAST_HELD:]
         self._quiet = 0 if one.news else self._quiet + 1
@@ -263,8 +281,13 @@ class FastPath:
             return False
         held = self._held[1:]
         if self._first is not None and room >= 2:
-            first, self._first = self._first, None
+            if not self._beside:
+                self._births.map_beside(held, self._first)
+                self._beside = True
+                return False
+            first, self._first, self._beside = self._first, None, False
             return self._try(self._births.two(held, first), held[-FAST_PAIR_HELD:])
+        self._first, self._beside = None, False
         fits = self._births.one(held)
         if self._try(fits, held):
             return True
@@ -416,6 +439,9 @@ class FastPath:
             if known.on and known.frames_missed >= FAST_LOST_FRAMES:
                 self._forget(k)
         strength = [one.strength_s_per_m_mm2 for one in found]
+        if self._wild:  # a frame with rows that are no touch's may show any
+            free[:] = False
+        self._wild = 0
         self._seed(places[free], np.array(strength)[free])
         return self.touches()
 

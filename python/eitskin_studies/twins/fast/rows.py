@@ -67,17 +67,28 @@ class RowModel:
         left, to_x, to_y = left[near], to_x[near], to_y[near]
         slope = 4 * self._grid.pixel_mm / self._rho2
         weights = np.array([left * left, slope * left * to_x, slope * left * to_y])
-        seen = summed(weights[:, :, None] * self._products(drive, near), axis=1)
+        seen = summed(weights[:, :, None] * self.products(drive, near), axis=1)
         sums = summed(weights, axis=1)
         seen[0] *= 1 / sums[0]
         seen[1:] = (seen[1:] - sums[1:, None] * seen[0]) * (1 / sums[0])
         return self._over_rows(drive, seen), True
 
-    def at_pixels(self, drive: Drive, pixels: IntArray) -> FloatArray:
-        """The rows' answer to a touch no larger than each of ``pixels`` (k,), (k, r)."""
-        return self._over_rows(drive, self._products(drive, pixels))
+    def squares(self, drive: Drive, seen: FloatArray, per: FloatArray) -> FloatArray:
+        """The sum of squares (k,) of the rows that electrodes' products ``seen`` (k, L) give, each
+        times ``per`` (r,)."""
+        measure, weight = self._table[drive.rows, 2:], self._volts * per
+        differences = seen[:, measure[:, 0]] - seen[:, measure[:, 1]]
+        return summed(weight * weight * (differences * differences), axis=1)
 
-    def _products(self, drive: Drive, pixels: IntArray) -> FloatArray:
+    def over_electrodes(self, drive: Drive, u: FloatArray) -> FloatArray:
+        """What u'g is by electrode, (L,)."""
+        out = np.zeros(self._x.shape[1])
+        for (plus, minus), one in zip(self._table[drive.rows, 2:], u, strict=True):
+            out[plus] += -self._volts * one
+            out[minus] -= -self._volts * one
+        return out
+
+    def products(self, drive: Drive, pixels: IntArray) -> FloatArray:
         """E_drive . E of each electrode's current (k, L)."""
         x, y = self._x[pixels], self._y[pixels]
         along_x = x[:, drive.plus] - x[:, drive.minus]

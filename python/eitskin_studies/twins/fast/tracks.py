@@ -45,6 +45,15 @@ def lower_solve(factor: FloatArray, right: FloatArray) -> FloatArray:
     return out
 
 
+def lower_solve_back(factor: FloatArray, right: FloatArray) -> FloatArray:
+    """L'^-1 times ``right`` (r,)."""
+    out = right.copy()
+    for i in reversed(range(len(factor))):
+        out[i] /= factor[i, i]
+        out[:i] -= factor[i, :i] * out[i]
+    return out
+
+
 def lower_factor(s: FloatArray, otherwise: float) -> FloatArray:
     """L with L L' = ``s`` (r, r); a pivot that is not positive is ``otherwise``."""
     factor = np.zeros_like(s)

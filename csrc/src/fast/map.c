@@ -1,0 +1,117 @@
+/* What a touch at each cell would explain of drives that wait: where a search begins.
+ *
+ * A cell's answer is g = D f, f_e = E_drive . E_e of each electrode, and D the rows' differences.
+ * So g'S^-1 e = f . (D'S^-1 e), in which the bracket is the drive's: a cell costs one pass over the
+ * electrodes. g'S^-1 g is made with the diagonal of S's factor alone: it is exact where no touch is
+ * known, and what known touches may do beside it only tells where to begin. */
+#include "fast/fields.h"
+
+/* One drive against all cells. */
+typedef struct sight {
+    uint8_t plus, minus;
+    uint32_t rows;
+    eits_real toward[EITS_MAX_ELECTRODES]; /* D'S^-1 of what is unexplained */
+    eits_real shared[EITS_MAX_ELECTRODES]; /* what a cell has in common with the known touch */
+    eits_real energy;                      /* of that touch; 0: none is known */
+    eits_real weight[EITS_FAST_MAX_ROWS];  /* of a row's square */
+    const uint8_t *measured[EITS_FAST_MAX_ROWS];
+} sight;
+
+/* D'u of the drive's rows, by electrode. */
+static void over_electrodes(const eits_fast *fast, const sight *s, const eits_real *u,
+                            eits_real *out)
+{
+    const eits_real volts = -(eits_real)fast->model->fields.volts;
+    eits_zero(out, fast->model->n_electrodes);
+    for (uint32_t i = 0; i < s->rows; ++i) {
+        out[s->measured[i][0]] += volts * u[i];
+        out[s->measured[i][1]] -= volts * u[i];
+    }
+}
+
+/* u <- L'^-1 u, L a triangle. */
+static void whiten_back(eits_real *factor, eits_real *u, uint32_t rows)
+{
+    for (uint32_t i = rows; i-- > 0;) {
+        const eits_real *line = fast_line(factor, i);
+        u[i] /= line[i];
+        fast_axpy(u, -u[i], line, i);
+    }
+}
+
+/* What is the same for all cells. `known`: a touch's answer, NULL for none. */
+static void look_at(eits_fast *fast, const fast_held *held, const eits_real *known, sight *s)
+{
+    const fast_drive *d = &fast->drive[held->drive];
+    const eits_real volts = (eits_real)fast->model->fields.volts;
+    eits_real *left = fast->spare, *own = fast->e;
+    s->plus = d->plus;
+    s->minus = d->minus;
+    s->rows = d->count;
+    s->energy = 0;
+    eits_copy(left, held->white, s->rows);
+    for (uint32_t i = 0; i < s->rows; ++i) {
+        const eits_real per = 1 / fast_line(held->factor, i)[i];
+        s->weight[i] = fast_square(volts * per);
+        s->measured[i] = eits_row(fast->ctx, fast->row[d->first + i]) + 2;
+        own[i] = known == NULL ? 0 : known[i] * per * per;
+    }
+    if (known != NULL) {
+        eits_real *white = fast->white;
+        eits_copy(white, known, s->rows);
+        s->energy = fast_dot(own, known, s->rows);
+        over_electrodes(fast, s, own, s->shared);
+        fast_whiten(held->factor, white, s->rows);
+        const eits_real energy = fast_dot(white, white, s->rows);
+        if (energy > 0)
+            fast_axpy(left, -(fast_dot(white, left, s->rows) / energy), white, s->rows);
+    }
+    whiten_back(held->factor, left, s->rows);
+    over_electrodes(fast, s, left, s->toward);
+}
+
+static eits_real explained(const eits_fast *fast, const sight *s, uint32_t pixel)
+{
+    const uint32_t electrodes = fast->model->n_electrodes;
+    const uint16_t *x = fast_column(fast, pixel), *y = x + electrodes;
+    const eits_real along_x = fast_number(x[s->plus]) - fast_number(x[s->minus]);
+    const eits_real along_y = fast_number(y[s->plus]) - fast_number(y[s->minus]);
+    eits_real f[EITS_MAX_ELECTRODES], own = 0, along = 0;
+    for (uint32_t e = 0; e < electrodes; ++e) {
+        f[e] = along_x * fast_number(x[e]) + along_y * fast_number(y[e]);
+        along += f[e] * s->toward[e];
+    }
+    along *= fast->sign;
+    if (!(along > 0))
+        return 0;
+    for (uint32_t i = 0; i < s->rows; ++i)
+        own += s->weight[i] * fast_square(f[s->measured[i][0]] - f[s->measured[i][1]]);
+    if (s->energy > 0)
+        own -= fast_square(fast_dot(f, s->shared, electrodes)) / s->energy;
+    return own > 0 ? along * along / own : 0;
+}
+
+static void add_cells(eits_fast *fast, const fast_held *held, const eits_real *known,
+                      eits_real *score)
+{
+    sight s;
+    look_at(fast, held, known, &s);
+    for (uint32_t n = 0; n < fast->cells; ++n)
+        score[n] += explained(fast, &s, fast->cell[n]);
+}
+
+void eits_fast_map(eits_fast *fast, const fast_held *held)
+{
+    add_cells(fast, held, NULL, fast->score);
+}
+
+void eits_fast_map_beside(eits_fast *fast, const eits_real *first)
+{
+    const uint32_t from =
+        fast->held_count > EITS_FAST_PAIR_DRIVES ? fast->held_count - EITS_FAST_PAIR_DRIVES : 0;
+    eits_zero(fast->pair_score, fast->cells);
+    for (uint32_t n = from; n < fast->held_count; ++n) {
+        (void)eits_fast_answer(fast, fast->held[n].drive, first, fast->answer);
+        add_cells(fast, &fast->held[n], fast->answer, fast->pair_score);
+    }
+}
