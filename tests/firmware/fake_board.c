@@ -287,7 +287,10 @@ static bool link_write(void *ctx, const uint8_t *bytes, size_t size)
         f->host_room -= size;
     memcpy(f->to_host + f->to_host_size, bytes, size);
     f->to_host_size += size;
+    f->nested_writes += f->writing;
+    f->writing = true;
     fake_advance(f, f->write_cost_ns);
+    f->writing = false;
     return true;
 }
 

@@ -95,7 +95,9 @@ typedef struct fake_board {
 
     /* link; the bytes under way last, so that a copy may leave them out */
     size_t to_board_size, to_board_at, to_host_size;
-    size_t host_room; /* bytes that the link still takes; SIZE_MAX: any */
+    bool writing;
+    uint32_t nested_writes; /* that began within another */
+    size_t host_room;       /* bytes that the link still takes; SIZE_MAX: any */
     bool ended;
     uint8_t to_board[FAKE_WIRE], to_host[FAKE_WIRE];
 } fake_board;

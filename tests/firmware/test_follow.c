@@ -110,6 +110,7 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
     CHECK(b.host.instrument.scan.frames_scanned - scanned + 1 >= scans);
     CHECK_EQUAL(b.host.instrument.scan.slots_repeated, 0);
     CHECK_EQUAL(b.host.gaps, 0);
+    CHECK_EQUAL(b.board.nested_writes, 0);
     CHECK(b.host.instrument.follow.running);
     bench_stop(&b);
 }
@@ -156,7 +157,9 @@ static void test_beginning_anew(void)
     CHECK(follow->begun > begun && follow->running);
     begun = follow->begun;
     fw_follow_hold(&b.host.instrument);
+    const uint32_t looked_at = b.host.instrument.scan.drives_taken;
     fake_advance(&b.board, 3 * SCAN_MS * 1000000u);
+    CHECK_EQUAL(b.host.instrument.scan.drives_taken, looked_at);
     fw_follow_release(&b.host.instrument);
     host_run(&b.host, 3 * SCAN_MS);
     CHECK(follow->begun > begun && follow->running);
@@ -175,7 +178,7 @@ int main(void)
     test_what_is_refused();
     test_a_still_skin();
     test_a_touch(0, 0);
-    test_a_touch(2000, 300000);
+    test_a_touch(2000, 900000);
     test_a_slow_main_loop();
     test_beginning_anew();
     return checks_report("follow");
