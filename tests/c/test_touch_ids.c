@@ -6,8 +6,7 @@
 #include "base/vec.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "touch/disc.h"
-#include "touch/tracker.h"
+#include "touch/touch.h"
 
 #include <math.h>
 #include <string.h>

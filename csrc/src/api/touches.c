@@ -13,7 +13,7 @@
 #include "evidence/evidence.h"
 #include "frame/reference.h"
 #include "touch/disc_fit.h"
-#include "touch/tracker.h"
+#include "touch/touch.h"
 
 /* Whether the image says that there may be touches. */
 static int may_have_touches(const eits_context *ctx)

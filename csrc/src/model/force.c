@@ -4,6 +4,45 @@
 
 #include "base/vec.h"
 #include "model/constants.h"
+#include "model/sections.h"
+
+/* Strictly, since forces are interpolated between two points: equal ones would divide by zero. */
+static int ascends_from_zero(const float *values, uint32_t count)
+{
+    for (uint32_t k = 1; k < count; ++k) {
+        if (!eits_between(values[k], 0, 1e30f) || !(values[k] > values[k - 1]))
+            return 0;
+    }
+    return values[0] == 0.0f;
+}
+
+eits_status eits_read_force(eits_model *model, const eits_section *found)
+{
+    eits_force *force = &model->force;
+    if (found->data == NULL)
+        return EITS_OK;
+    if (found->size < sizeof(eits_force_head))
+        return EITS_E_MODEL_SECTION;
+    const eits_force_head *head = (const eits_force_head *)(const void *)found->data;
+    if (head->points < 2 || head->points > EITS_MAX_FORCE_POINTS ||
+        head->order > EITS_MAX_FORCE_ORDER || !eits_between(head->radius_mm, 1e-6f, 1e30f) ||
+        !eits_between(head->reach, 0, 1e3f) || !eits_between(head->uncertainty, 0, 1e30f))
+        return EITS_E_MODEL_VALUE;
+    /* bounded above, so that the size below is small and exact */
+    const uint32_t terms = (head->order + 1) * (head->order + 2) / 2;
+    if (found->size != sizeof *head + (2 * head->points + terms) * 4)
+        return EITS_E_MODEL_SECTION;
+    const float *numbers = (const float *)(const void *)(head + 1);
+    *force = (eits_force){head, numbers, numbers + head->points, numbers + 2 * head->points};
+    if (!ascends_from_zero(force->strength, head->points) ||
+        !ascends_from_zero(force->force_n, head->points))
+        return EITS_E_MODEL_VALUE;
+    for (uint32_t k = 0; k < terms; ++k) {
+        if (!eits_between(force->gain[k], -1e6f, 1e6f))
+            return EITS_E_MODEL_VALUE;
+    }
+    return EITS_OK;
+}
 
 /* The place in units of the calibration's radius, no further out than it was calibrated. */
 static void place_of(const eits_force *force, eits_real x_mm, eits_real y_mm, eits_real *u,

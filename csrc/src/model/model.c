@@ -327,44 +327,6 @@ static eits_status read_fields(eits_model *model, const eits_section *flds)
     return EITS_OK;
 }
 
-/* Strictly, since forces are interpolated between two points: equal ones would divide by zero. */
-static int ascends_from_zero(const float *values, uint32_t count)
-{
-    for (uint32_t k = 1; k < count; ++k) {
-        if (!eits_between(values[k], 0, 1e30f) || !(values[k] > values[k - 1]))
-            return 0;
-    }
-    return values[0] == 0.0f;
-}
-
-/* The optional calibration of forces. */
-static eits_status read_force(eits_force *force, const eits_section *found)
-{
-    if (found->data == NULL)
-        return EITS_OK;
-    if (found->size < sizeof(eits_force_head))
-        return EITS_E_MODEL_SECTION;
-    const eits_force_head *head = (const eits_force_head *)(const void *)found->data;
-    if (head->points < 2 || head->points > EITS_MAX_FORCE_POINTS ||
-        head->order > EITS_MAX_FORCE_ORDER || !eits_between(head->radius_mm, 1e-6f, 1e30f) ||
-        !eits_between(head->reach, 0, 1e3f) || !eits_between(head->uncertainty, 0, 1e30f))
-        return EITS_E_MODEL_VALUE;
-    /* bounded above, so that the size below is small and exact */
-    const uint32_t terms = (head->order + 1) * (head->order + 2) / 2;
-    if (found->size != sizeof *head + (2 * head->points + terms) * 4)
-        return EITS_E_MODEL_SECTION;
-    const float *numbers = (const float *)(const void *)(head + 1);
-    *force = (eits_force){head, numbers, numbers + head->points, numbers + 2 * head->points};
-    if (!ascends_from_zero(force->strength, head->points) ||
-        !ascends_from_zero(force->force_n, head->points))
-        return EITS_E_MODEL_VALUE;
-    for (uint32_t k = 0; k < terms; ++k) {
-        if (!eits_between(force->gain[k], -1e6f, 1e6f))
-            return EITS_E_MODEL_VALUE;
-    }
-    return EITS_OK;
-}
-
 /* Section SUMS: what made them, then one word a frame. Those of another core say nothing here. */
 static eits_status read_sums(eits_golden *golden, const eits_section *found)
 {
@@ -426,7 +388,7 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
     if (status == EITS_OK)
         status = read_fields(&opened, &found.flds);
     if (status == EITS_OK)
-        status = read_force(&opened.force, &found.force);
+        status = eits_read_force(&opened, &found.force);
     if (status == EITS_OK)
         status = eits_read_row_form(&opened, &found.whit);
     if (status == EITS_OK)

@@ -32,6 +32,11 @@ static inline int eits_between(float value, float low, float high)
     return eits_is_finite_f32(value) && value >= low && value <= high;
 }
 
+/* Section LOAD, where there is one, into model->force: the calibration of forces.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers out of range, or points
+ * that do not ascend from zero). */
+eits_status eits_read_force(eits_model *model, const eits_section *found);
+
 /* Section WHIT, where there is one, into model->row_form; model->reduction is known and finite.
  * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (does not fit P). */
 eits_status eits_read_row_form(eits_model *model, const eits_section *found);

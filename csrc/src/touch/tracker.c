@@ -19,11 +19,10 @@
  *
  * Invariants: at most EITS_MAX_TOUCHES are followed; no id is 0; whatever
  * would be no number or off the skin starts again from what was found. */
-#include "touch/tracker.h"
+#include "touch/touch.h"
 
 #include "base/vec.h"
 #include "touch/constants.h"
-#include "touch/disc.h"
 
 enum { NONE = EITS_MAX_TOUCHES };
 
