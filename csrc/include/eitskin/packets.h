@@ -414,7 +414,7 @@ typedef struct eits_packet_touch {
 typedef struct eits_packet_followed {
     /* number of the frame that is scanned */
     uint32_t frame;
-    /* that they are told for: the middle of the drive, were no row repeated */
+    /* the instant they hold for: the middle of the drive, were no row repeated */
     uint32_t time_us;
     /* the frame before which nothing was known */
     uint32_t begun;

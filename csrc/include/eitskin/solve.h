@@ -46,8 +46,8 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
  * in it. Errors: EITS_E_ARGUMENT, EITS_E_NOT_FINITE. */
 eits_status eits_solve(eits_context *ctx, const eits_real *y);
 
-/* Checksums that the section SUMS of a model has, one a frame. */
-#define EITS_SELF_TEST_SUMS     6
+/* Checksums that the section SUMS of a model has: six of a frame each, two of four scenes each. */
+#define EITS_SELF_TEST_SUMS     8
 /* Counts up with every change of what the core's bits are: sums of another revision are not
  * compared. */
 #define EITS_SELF_TEST_REVISION 1u
@@ -60,9 +60,9 @@ eits_status eits_solve(eits_context *ctx, const eits_real *y);
 eits_status eits_self_test(eits_context *ctx, eits_real *difference);
 
 /* The checksums for this model, as the float32 core has them: of image, touches and numbers of six
- * frames made of the golden two, with each solver, a lost electrode, noise, a learned reference.
- * The context must be fresh from eits_init. Errors: those of eits_reference_set;
- * EITS_E_ARITHMETIC in float64. */
+ * frames made of the golden two, with each solver, a lost electrode, noise, a learned reference,
+ * and of two sets of four scenes of one to four touches. The context must be fresh from eits_init.
+ * Errors: those of eits_reference_set; EITS_E_ARITHMETIC in float64. */
 eits_status eits_self_test_sums(eits_context *ctx, uint32_t sums[EITS_SELF_TEST_SUMS]);
 
 #ifdef __cplusplus

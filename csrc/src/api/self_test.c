@@ -19,6 +19,8 @@
 
 enum { TRIALS = 6, SCENES = 4 };
 
+_Static_assert(TRIALS < EITS_SELF_TEST_SUMS, "the others are of scenes");
+
 typedef struct trial {
     eits_solver solver;
     eits_sign sign;

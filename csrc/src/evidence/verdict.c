@@ -68,6 +68,8 @@ void eits_look_at_shapes(const eits_context *ctx, const eits_scratch *scratch,
 static void places_of(const eits_context *ctx, const eits_scratch *scratch,
                       const eits_likelihood *likelihood, eits_verdict *v)
 {
+    /* `step` and the inverse are in pixels; results are in millimetres. best_mm is where one more
+     * Gauss-Newton step would put the disc. */
     const uint32_t p = v->answer.parameters;
     const size_t stride = EITS_STRIDE(likelihood->count);
     const eits_real pixel = (eits_real)ctx->model->pixel_mm,

@@ -7,6 +7,9 @@
  * start damped Gauss-Newton steps, of which there are the fewer the more drives wait. */
 #include "fast/fast.h"
 
+/* Scaled to a unit diagonal first: millimetres of two touches of unlike strength differ by orders
+ * of magnitude, and a limit on pivots means something only between numbers of one size. Cholesky
+ * then finds a matrix that is not positive by a root that fails, which also catches a NaN. */
 int eits_fast_invert(const eits_real h[4][4], uint32_t n, eits_real inverse[4][4])
 {
     eits_real scale[4], factor[10], half[4][4];
@@ -50,6 +53,9 @@ static void solve_strengths(const eits_fast *fast, const eits_real *const g[2], 
     }
     if (count == 1)
         return;
+    /* Both of the right sign: the usual two by two system. Otherwise the best answer lies on the
+     * border, where the better of the two stands alone; a touch of the wrong sign would let two
+     * near places cancel each other and explain any noise. */
     const eits_real cross = fast_dot(g[0], g[1], rows), both = gram[0] * gram[1];
     const eits_real det = both - cross * cross;
     const eits_real first = gram[1] * toward[0] - cross * toward[1];
@@ -138,6 +144,8 @@ static int say_drive(eits_fast *fast, const fast_held *held, const fast_fit *fit
     const eits_real all = fast_dot(held->white, held->white, rows);
     share->left = fast_dot(rest, rest, rows);
     share->score = all - share->left;
+    /* What a touch explains beside the other is the loss when it alone is taken away, with the
+     * other free to take over what it can. The sum over drives decides about births. */
     for (uint32_t i = 0; i < fit->count; ++i) {
         eits_real without = all, other = 0;
         if (fit->count == 2) {
@@ -153,6 +161,8 @@ static int say_drive(eits_fast *fast, const fast_held *held, const fast_fit *fit
     return 1;
 }
 
+/* The sums are made again from all drives, in the order in which they wait: to subtract the share
+ * of one that goes would leave rounding that depends on the history. */
 static void add_share(fast_fit *fit, const fast_share *share)
 {
     uint32_t at = 0;
@@ -192,6 +202,8 @@ static eits_real damped_step(const fast_fit *fit, eits_real shorter, eits_real *
     const uint32_t n = 2 * fit->count;
     eits_real damped[4][4], inverse[4][4], length = 0;
     memcpy(damped, fit->h, sizeof damped);
+    /* In proportion to the diagonal, so that damping means the same near the rim, where answers are
+     * many times larger, as in the middle. */
     for (uint32_t i = 0; i < n; ++i)
         damped[i][i] = fit->h[i][i] + EITS_FAST_DAMPING * fit->h[i][i];
     if (!eits_fast_invert((const eits_real(*)[4])damped, n, inverse))
@@ -222,6 +234,8 @@ static int refine(eits_fast *fast, uint32_t from, uint32_t steps, uint32_t known
         trial->count = fit->count;
         for (uint32_t i = 0; i < 2 * fit->count; ++i)
             trial->place[i / 2][i % 2] = fit->place[i / 2][i % 2] + step[i];
+        /* Only a step that explains more is taken. A shorter one from the same place costs one
+         * look; a line search would cost several, and the work of a drive is bounded. */
         if (eits_fast_fit_at(fast, from, 0, trial) && trial->score > fit->score) {
             *fit = *trial;
             shorter = 1;
@@ -259,6 +273,7 @@ static void centre(const eits_fast *fast, uint32_t pixel, eits_real *place)
 static int peak(const eits_fast *fast, const eits_real *score, const eits_real (*places)[2],
                 uint32_t count, eits_real *place)
 {
+    /* One pass without sorting: a map has hundreds of cells and at most two peaks are wanted. */
     eits_real greatest = 0;
     for (uint32_t n = 0; n < fast->cells; ++n) {
         eits_real here[2];

@@ -7,6 +7,8 @@
 static const eits_real *was(const fast_drive *d, uint32_t k, const eits_real *now,
                             eits_real spare[FAST_WAYS])
 {
+    /* No touch yet when that drive was measured: it gives nothing to the frame there, and the frame
+     * gets the whole touch. */
     if (d->there[k])
         return d->then[k];
     spare[FAST_X] = now[FAST_X];
@@ -22,6 +24,8 @@ static int has_moved(const eits_fast *fast, uint32_t k)
     const eits_real *now = fast->state + at;
     const eits_real place = eits_sqrt(fast->p[at][at] + fast->p[at + 1][at + 1]);
     const eits_real strength = eits_sqrt(fast->p[at + FAST_C][at + FAST_C]);
+    /* A still touch keeps the frame's bits: what the filter's own noise moves is below these
+     * limits, and a frame that nothing has changed in is solved as it was measured. */
     eits_real far = EITS_FAST_MOVED_SD * place, much = EITS_FAST_MOVED_SD * strength;
     const eits_real least = EITS_FAST_MOVED_STRENGTH * eits_fabs(now[FAST_C]);
     far = far > EITS_FAST_MOVED_MM ? far : EITS_FAST_MOVED_MM;
@@ -44,6 +48,8 @@ static void align_touch(eits_fast *fast, uint32_t k, eits_real *aligned)
         const fast_drive *d = &fast->drive[n];
         eits_real spare[FAST_WAYS], *before = fast->answer + FAST_WAYS * rows;
         const eits_real *then = was(d, k, now, spare);
+        /* Only the difference of two answers by the same linear model is added, so that its errors
+         * largely cancel; what the touch really does to the rows stays as measured. */
         (void)eits_fast_answer(fast, n, now, fast->answer);
         (void)eits_fast_answer(fast, n, then, before);
         for (uint32_t i = 0; i < d->count; ++i) {
@@ -70,6 +76,9 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
         fast->known[k].aligned = 1;
         eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
     }
+    /* A frame with drives that nothing explains would be named faulty, or solved into touches that
+     * are not there. After EITS_FAST_FRAMES such frames the fault is real, or a touch too slow to
+     * be born; the solver decides. */
     int explained = fast->held_count == 0;
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
@@ -137,6 +146,8 @@ static void seed(eits_fast *fast, const eits_touch *found, const uint8_t *taken,
         const eits_real state[FAST_SIZE] = {found[n].x_mm, found[n].y_mm, c, 0, 0};
         if (taken[n])
             continue;
+        /* Two frames on end: in a single one, a touch that landed while it was scanned may stand at
+         * a wrong place. */
         if (!near_any(state, (const eits_real(*)[2])before, known)) {
             if (fast->seeds < EITS_FAST_MAX_TOUCHES)
                 eits_copy(fast->seed[fast->seeds++], state, 2);
@@ -157,6 +168,8 @@ static void seed(eits_fast *fast, const eits_touch *found, const uint8_t *taken,
 eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count)
 {
     uint8_t taken[EITS_MAX_TOUCHES] = {0};
+    /* The comparison is with where touches were when the frame was aligned: a swipe at 600 mm/s is
+     * 6 mm further after a solve of 10 ms. */
     if (fast == NULL || (found == NULL && count > 0) || count > EITS_MAX_TOUCHES)
         return EITS_E_ARGUMENT;
     mask_named(fast);

@@ -84,6 +84,8 @@ static int is_glitch(eits_fast *fast, uint32_t rows)
     }
     if (!(greatest > EITS_FAST_GLITCH) || fast->glitched)
         return 0;
+    /* One row, and not twice on end: a second such drive is a faulty electrode or a touch beside
+     * it, and taking rows out drive by drive would hide either. */
     fast->used[worst] = 0;
     if (eits_fast_innovate(fast, rows) < EITS_FAST_NEWS)
         return 1;
@@ -102,6 +104,8 @@ static int is_drift(eits_fast *fast, uint32_t rows)
     if (!(energy > 0))
         return 0;
     const eits_real size = fast_dot(drift, fast->white, rows) / energy;
+    /* A drift is along v0 and small. A touch in the middle of the skin answers almost alike, but
+     * stronger than EITS_FAST_MAX_DRIFT. */
     const eits_real left = fast_dot(fast->white, fast->white, rows) - size * size * energy;
     if (!(left < EITS_FAST_NEWS && eits_fabs(size) < EITS_FAST_MAX_DRIFT))
         return 0;
@@ -188,6 +192,8 @@ static void update_known(eits_fast *fast)
         eits_real *state = fast->state + FAST_SIZE * k;
         const eits_real strength = fast->sign * state[FAST_C];
         known->peak = strength > known->peak ? strength : known->peak;
+        /* Two limits, so that a touch near one does not come and go. While it is off it keeps its
+         * id: a finger that bounces is the same finger. */
         if (!(strength >= EITS_FAST_OFF * known->peak && known->energy >= EITS_FAST_FAINT))
             known->on = 0;
         else if (strength > EITS_FAST_ON * known->peak && known->energy > 2 * EITS_FAST_FAINT)
@@ -209,6 +215,8 @@ eits_status eits_fast_drive(eits_fast *fast, uint32_t drive, const eits_real *vo
     if (!fast->begun)
         return EITS_E_NO_REFERENCE;
     fast_drive *d = &fast->drive[drive];
+    /* Unsigned, so that the clock may wrap after 71 minutes; one that goes back is taken as no time
+     * at all. */
     const uint32_t gone_us = time_us - fast->time_us;
     if (fast->timed && gone_us > 0 && gone_us < UINT32_MAX / 2)
         eits_fast_predict(fast, (eits_real)gone_us * R(1e-6));

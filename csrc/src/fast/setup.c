@@ -21,6 +21,8 @@ static void count_rows(const eits_model *model, uint32_t i, uint32_t *before, ui
     }
 }
 
+/* Every fourth pixel: a peak of the map is far wider than two pixels, and Gauss-Newton steps go the
+ * rest of the way. */
 static int is_cell(const eits_pixel *pixel)
 {
     return pixel->ix % 2 == 0 && pixel->iy % 2 == 0;
@@ -139,10 +141,13 @@ eits_status eits_fast_begin(eits_fast *fast)
         return EITS_E_ARGUMENT;
     const eits_reference *reference = &fast->ctx->reference;
     fast->begun = 0;
+    /* Without noise every residual would be news, and chi-squares infinite. */
     if (!reference->ready || !(reference->noise_v > 0))
         return EITS_E_NO_REFERENCE;
     const uint32_t rows = fast->model->n_rows;
     eits_real energy = 0;
+    /* Copied once: after a tare the caller begins again, so that a touch is never seen by two sets
+     * of gains. */
     for (uint32_t i = 0; i < rows; ++i) {
         fast->gain[i] = reference->gain * reference->row_gain[i];
         fast->masked[i] = 0;
@@ -157,6 +162,8 @@ eits_status eits_fast_begin(eits_fast *fast)
     fast->count = fast->held_count = fast->quiet = fast->waited = fast->seeds = 0;
     fast->timed = fast->unexplained = fast->unexplained_frames = fast->glitched = 0;
     for (uint32_t n = 0; n < fast->drives; ++n) {
+        /* Nothing is wrong with drives that were not measured yet; the first frame is not held back
+         * for them. */
         fast->drive[n].explained = 1;
         for (uint32_t k = 0; k < EITS_FAST_MAX_TOUCHES; ++k)
             fast->drive[n].there[k] = 0;

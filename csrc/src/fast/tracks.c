@@ -10,6 +10,9 @@
 void eits_fast_predict(eits_fast *fast, eits_real dt_s)
 {
     const uint32_t n = FAST_SIZE * fast->count;
+    /* F P F' without a matrix product: F adds dt times the speed to a place, so that rows change
+     * first, then columns. The noise that comes with time is in proportion to it, whatever the
+     * scan's rate. */
     const eits_real drives = dt_s / EITS_FAST_DRIVE_S;
     for (uint32_t k = 0; k < n; k += FAST_SIZE) {
         for (uint32_t axis = 0; axis < 2; ++axis) {
@@ -79,6 +82,8 @@ static void factor_row(eits_fast *fast, uint32_t i, eits_real diagonal)
         const eits_real *other = fast_line(fast->factor, j);
         line[j] = (line[j] - fast_dot(line, other, j)) / other[j];
     }
+    /* P loses digits in float32 after thousands of updates. A pivot that is not positive says that
+     * the row is already known to its noise. */
     const eits_real pivot = diagonal - fast_dot(line, line, i);
     line[i] = eits_sqrt(pivot > 0 ? pivot : fast_square(fast->sigma));
 }
@@ -101,6 +106,8 @@ eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
                 for (uint32_t way = 0; way < FAST_WAYS; ++way)
                     fast_axpy(moved, h[k][way], fast->p[FAST_SIZE * k + way], n);
             }
+            /* S_ij = h_i P h_j', of which P h_j' stands in `moved`: only the three numbers of a
+             * touch that a row can see are multiplied, not all five. */
             for (uint32_t j = 0; j <= i; ++j) {
                 const eits_real *other = fast->moved + (size_t)FAST_NUMBERS * j;
                 eits_real sum = 0;
@@ -130,6 +137,8 @@ void eits_fast_update(eits_fast *fast, uint32_t rows)
         for (uint32_t k = 0; k < n; ++k)
             w[k] /= line[i];
         fast_axpy(fast->state, fast->white[i], w, n);
+        /* Every element of P is written, not one half and its mirror: both halves get the same
+         * products in the same order, so that P stays symmetric to the bit. */
         for (uint32_t k = 0; k < n; ++k)
             fast_axpy(fast->p[k], -w[k], w, n);
     }
@@ -154,6 +163,8 @@ void eits_fast_add(eits_fast *fast, const eits_real *state, const eits_real *var
 void eits_fast_forget(eits_fast *fast, uint32_t k)
 {
     const uint32_t from = FAST_SIZE * k, n = FAST_SIZE * fast->count;
+    /* The others move up. What they have in common with the touch that goes is lost with it, which
+     * leaves the others as sure as they are. */
     for (uint32_t i = from; i + FAST_SIZE < n; ++i) {
         fast->state[i] = fast->state[i + FAST_SIZE];
         eits_copy(fast->p[i], fast->p[i + FAST_SIZE], n);
@@ -162,6 +173,7 @@ void eits_fast_forget(eits_fast *fast, uint32_t k)
         eits_copy(fast->p[i] + from, fast->p[i] + from + FAST_SIZE, n - from - FAST_SIZE);
     for (uint32_t i = k; i + 1 < fast->count; ++i) {
         fast->known[i] = fast->known[i + 1];
+        /* Drives remember places by a touch's number, which changes here. */
         for (uint32_t d = 0; d < fast->drives; ++d) {
             fast->drive[d].there[i] = fast->drive[d].there[i + 1];
             eits_copy(fast->drive[d].then[i], fast->drive[d].then[i + 1], FAST_WAYS);

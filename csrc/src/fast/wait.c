@@ -11,6 +11,8 @@ void eits_fast_wait(eits_fast *fast, uint32_t drive, uint32_t rows, int news)
         fast->held_count = fast->waited = fast->last_count = fast->turn = 0;
         fast->stage = FAST_ONE;
     }
+    /* Buffers go round: the oldest drive's memory becomes the newest's, and nothing is copied but
+     * the small record. */
     if (fast->held_count == EITS_FAST_HELD) {
         const fast_held oldest = fast->held[0];
         for (uint32_t n = 1; n < EITS_FAST_HELD; ++n)
@@ -41,7 +43,8 @@ static void drop(eits_fast *fast, uint32_t n)
     fast->held[n] = dropped;
 }
 
-/* What is left of chi^2 for each degree of freedom, at least 1. */
+/* What is left of chi^2 for each degree of freedom, at least 1. A model that is wrong by more than
+ * the noise leaves more; all that is believed is then asked for in that proportion. */
 static eits_real excess(const eits_fast *fast, const fast_fit *fit, uint32_t from)
 {
     const uint32_t drives = fast->held_count - from, spent = fit->count * (drives + 2);
@@ -77,6 +80,8 @@ static int is_believed(const eits_fast *fast, const fast_fit *fit, uint32_t from
             !(kappa * spread < fast_square(EITS_FAST_SPREAD_MM)))
             return 0;
     }
+    /* 12 rows a drive leave 12 in the mean with a variance of 24; four deviations more are hardly
+     * luck. Beside that, a part of what is explained is left by a touch that is no disc. */
     const eits_real noise = 12 * drives + 4 * eits_sqrt(24 * drives);
     const eits_real clear = EITS_FAST_AMBIGUOUS * fit->own[fit->count - 1];
     return fit->left_all < noise + fast_square(EITS_FAST_BIRTH_ERROR) * fit->score &&
@@ -125,6 +130,9 @@ static int try(eits_fast *fast, const fast_fit *fit, uint32_t from, eits_real le
 {
     eits_real inverse[4][4];
     int believed = is_believed(fast, fit, from, lead, inverse);
+    /* The first drive that waits may have been measured while the touch landed and then says less
+     * than it could; but for a touch that came between two drives it is worth as much as the
+     * others, so it is asked second. */
     if (!believed && fit->count == 1) {
         fast_fit *whole = &fast->trial;
         *whole = *fit;
@@ -142,6 +150,8 @@ static int try(eits_fast *fast, const fast_fit *fit, uint32_t from, eits_real le
 static int drop_spoiled(eits_fast *fast, const fast_fit *fit)
 {
     uint32_t worst = 1;
+    /* The newest is kept: it may be the first that a second touch has changed, and the next drives
+     * will say. */
     for (uint32_t n = 2; n < fast->held_count; ++n)
         worst = fit->share[n].left > fit->share[worst].left ? n : worst;
     const eits_real left = fit->share[worst].left;
@@ -182,6 +192,8 @@ int eits_fast_find_births(eits_fast *fast)
     uint32_t unexplained = 0;
     for (uint32_t bits = fast->unexplained; bits != 0; bits &= bits - 1)
         ++unexplained;
+    /* With most of the last drives unexplained, rows are faulty or the model is not this skin's:
+     * any place would explain something. Whole frames name the fault. */
     if (fast->held_count < 2 || room < 1 || unexplained > EITS_FAST_UNEXPLAINED)
         return 0;
     if (fast->stage == FAST_ONE || room < 2)

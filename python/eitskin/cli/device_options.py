@@ -142,7 +142,7 @@ def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def add_report(parser: argparse.ArgumentParser) -> None:
-    """When touches are told."""
+    """When touches are reported."""
     option(
         parser,
         "--report WHEN",

@@ -65,7 +65,7 @@ class LiveFrame:
 
 @dataclass(frozen=True, eq=False)
 class LiveDrive:
-    """Touches after a drive, and the instant that they are told for, by the same clocks."""
+    """Touches after a drive, and the instant they hold for, by the same clocks."""
 
     time_us: int
     board_us: int

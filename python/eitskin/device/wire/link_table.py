@@ -313,7 +313,7 @@ class FollowedHead(Payload):
         "eits_packet_followed", "frame:I time_us:I begun:I age_us:H update_us:H drive:H count:H"
     )
     frame: int  # number of the frame that is scanned
-    time_us: int  # that they are told for: the middle of the drive, were no row repeated
+    time_us: int  # the instant they hold for: the middle of the drive, were no row repeated
     begun: int  # the frame before which nothing was known
     age_us: int  # from the end of the drive until this packet was made; at most 65,535
     update_us: int  # of it for the update; likewise
