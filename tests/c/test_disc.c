@@ -4,7 +4,7 @@
 #include "small_model.h"
 
 #include "base/vec.h"
-#include "touch/touch.h"
+#include "touch/disc.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -7,7 +7,7 @@
 #include "diagnostics/diagnostics.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "touch/touch.h"
+#include "touch/disc.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -6,7 +6,7 @@
 #include "base/vec.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "touch/touch.h"
+#include "touch/disc.h"
 
 #include <math.h>
 #include <string.h>

@@ -12,8 +12,8 @@
 #include "diagnostics/diagnostics.h"
 #include "evidence/evidence.h"
 #include "frame/reference.h"
+#include "touch/disc.h"
 #include "touch/disc_fit.h"
-#include "touch/touch.h"
 
 /* Whether the image says that there may be touches. */
 static int may_have_touches(const eits_context *ctx)

@@ -182,7 +182,7 @@ typedef struct eits_evidence {
     uint32_t spent;        /* 1: more were wanted than options.test_columns allows */
 } eits_evidence;
 
-/* A touch that is followed (touch/touch.h). */
+/* A touch that is followed (touch/disc.h). */
 typedef struct eits_followed {
     eits_touch touch;       /* as reported; id 0: not yet */
     eits_real vx_mm, vy_mm; /* a frame */

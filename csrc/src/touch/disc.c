@@ -13,7 +13,7 @@
  * Costs: an atom takes rank multiply-accumulates a covered pixel and Q F on the sum, its three
  * slopes three times that; the walk over cells is small beside it. Discs of a fit move by parts of
  * a pixel, so the columns come from the cache where it has room. */
-#include "touch/touch.h"
+#include "touch/disc.h"
 
 #include "base/vec.h"
 #include "context/column_cache.h"

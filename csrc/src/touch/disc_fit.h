@@ -3,7 +3,7 @@
 #ifndef EITSKIN_FIT_H
 #define EITSKIN_FIT_H
 
-#include "touch/touch.h"
+#include "touch/disc.h"
 
 /* Enough to undo a trial: atoms and residual follow from the discs, and cost less to compute again,
  * seldom, than to keep. */

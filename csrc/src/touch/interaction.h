@@ -12,7 +12,7 @@
 #ifndef EITSKIN_INTERACTION_H
 #define EITSKIN_INTERACTION_H
 
-#include "touch/touch.h"
+#include "touch/disc.h"
 
 /* Whether this frame's touches can be corrected for interaction: the model has the fields, its data
  * are differences, the option asks for it. */

@@ -19,7 +19,7 @@
  *
  * Invariants: at most EITS_MAX_TOUCHES are followed; no id is 0; whatever
  * would be no number or off the skin starts again from what was found. */
-#include "touch/touch.h"
+#include "touch/disc.h"
 
 #include "base/vec.h"
 #include "touch/constants.h"

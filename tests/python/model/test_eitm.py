@@ -169,8 +169,9 @@ def test_rows_without_a_reciprocal_are_marked() -> None:
 
 
 REWRITE = """the core's bits are others: raise EITS_SELF_TEST_REVISION unless that was done since
-the last release, and write the prebuilt model's checksums again:  python -c "from eitskin.model
-import eitm; p='python/eitskin/model/paper.eitm'; eitm.save_model(p, eitm.load_model(p)[0])" """
+the last release, and write the prebuilt model's checksums again:
+python -c "from eitskin.model import eitm; p='python/eitskin/model/paper.eitm'
+eitm.save_model(p, eitm.load_model(p)[0])" """
 
 
 def test_the_prebuilt_model_is_written_again_bit_for_bit() -> None:

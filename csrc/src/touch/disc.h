@@ -1,8 +1,8 @@
 /* Discs of changed conductivity, placed off the grid, what the skin answers to them in reduced
  * space, and touches followed from frame to frame: when tracks start and end, ids, places smoothed
  * in time (docs/guide/tracking.md says what each is worth). */
-#ifndef EITSKIN_TOUCH_TOUCH_H
-#define EITSKIN_TOUCH_TOUCH_H
+#ifndef EITSKIN_DISC_H
+#define EITSKIN_DISC_H
 
 #include "context/context.h"
 
