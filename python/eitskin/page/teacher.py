@@ -62,6 +62,8 @@ class Teacher:
                 return
             if event.accepted and self._guide.taken is not None:
                 self._file.add(event.number, *self._guide.taken)
+            if event.withdrawn:
+                self._file.back()
             self._said = event.text
         self.on_event(self.facts())
 

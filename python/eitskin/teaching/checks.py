@@ -31,7 +31,11 @@ def check_presses(presses: Presses, skin: Skin | None) -> list[str]:
     notes: list[str] = []
     size = np.linalg.norm(presses.difference, axis=1)
     faint = np.flatnonzero(size < FAINT * np.median(size))
-    if len(faint) or not np.median(size) > 0:
+    if not np.median(size) > 0:
+        raise FrameError(
+            "teach: no press differs from its untouched frame; take that before the finger is down"
+        )
+    if len(faint):
         listed = ", ".join(map(str, faint[:8]))
         raise FrameError(
             f"teach: presses {listed} (from 0) hardly differ from their untouched frame; leave them"

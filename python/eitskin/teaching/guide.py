@@ -5,7 +5,10 @@ program guide alike.
 A press is seen by its distance from the skin at rest, in units of the noise at rest: the rms over
 rows of change over the row's noise. It counts when it was held: two halves of the hold differ by
 little, neither in strength (it went on sinking, or was let go) nor in direction over the rows (it
-moved or slipped). The untouched frame is the mean of the frames just before.
+moved or slipped). The untouched frame is the mean of the frames just before. A skin at rest is
+as it was when it was untouched last, at first as in the first frame; where it is not, somebody
+presses too early, and the guide waits: else lifting would count as the press, and each place as the
+next one's.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ FloatArray = npt.NDArray[np.float64]
 
 SAME_PLACE_MM = 0.02
 PACE_US = 25_000  # a frame: a hold of twelve is .3 s
+JUMPS = 2  # between frames at rest: so many of the greatest are not counted as noise
 
 
 class Step(Enum):
@@ -53,9 +57,10 @@ class GuideSettings:
         rest_frames: of which the untouched frame is the mean.
         settle_frames: after contact, before the hold counts.
         hold_frames: of which the pressed frame is the mean.
-        patience_frames: that a skin which never rests is waited for.
+        patience_frames: that a skin which never rests, or rests elsewhere, is waited for.
         press_above: a change of so many times the noise is a press.
         lifted_below: one of so small a part of the press is none any more.
+        held_above: one of so great a part, for all that patience, was not lifted.
         strength_change: between the halves of a hold, at most.
         turn: 1 - cosine between the changes of the two halves, at most, beside what noise makes.
     """
@@ -66,6 +71,7 @@ class GuideSettings:
     patience_frames: int = 200
     press_above: float = 8.0
     lifted_below: float = 0.2
+    held_above: float = 0.7
     strength_change: float = 0.1
     turn: float = 0.02
 
@@ -73,13 +79,15 @@ class GuideSettings:
 @dataclass(frozen=True, eq=False)
 class GuideEvent:
     """What changed with a frame: ``step`` is what to do now, at place ``number`` (from 0); ``text``
-    says it to the person; ``accepted`` and ``rejected`` what became of a press."""
+    says it to the person; ``accepted`` and ``rejected`` what became of a press, ``withdrawn`` of
+    one that was accepted."""
 
     step: Step
     number: int
     text: str
     accepted: bool = False
     rejected: str = ""
+    withdrawn: bool = False
 
 
 class PressGuide:
@@ -102,6 +110,7 @@ class PressGuide:
         self._untouched: FloatArray | None = None
         self._hold: list[FloatArray] = []
         self._strength, self._good, self._waited = 0.0, True, 0
+        self._warned, self._came_back = False, False
 
     @property
     def place_mm(self) -> tuple[float, float]:
@@ -132,23 +141,39 @@ class PressGuide:
         }[self.step](frame, time_s)
 
     def _at_rest(self, frame: FloatArray, _: float) -> GuideEvent | None:
-        """Wait until the skin rests: two halves of the last frames agree to within the noise. One
-        that creeps for ever is taken as it is after ``patience_frames``."""
+        """Wait until the skin rests: two halves of the last frames agree to within the noise, and
+        with the skin as it was untouched last. One that creeps for ever, or stays elsewhere, is
+        taken as it is after ``patience_frames``."""
         self._rest.append(frame)
+        if self._untouched is None:
+            self._untouched = frame
         self._waited += 1
         if len(self._rest) < self.settings.rest_frames:
             return None
         frames = np.array(self._rest)
-        spread = np.diff(frames, axis=0).std(axis=0) / np.sqrt(2)
+        steps = np.diff(frames, axis=0)
+        quiet = np.argsort(np.linalg.norm(steps, axis=1))[:-JUMPS]  # a finger's jump is no noise
+        spread = steps[quiet].std(axis=0) / np.sqrt(2)
         noise = np.maximum(spread, 0.2 * np.median(spread) + np.finfo(float).tiny)
-        self._noise = noise if self._noise is None else 0.8 * self._noise + 0.2 * noise
-        half = len(frames) // 2
-        moved = _rms((frames[half:].mean(axis=0) - frames[:half].mean(axis=0)) / self._noise)
-        patient = self._waited < self.settings.patience_frames
-        if moved > self.settings.press_above / 4 and patient:
-            return None
-        self._untouched = frames.mean(axis=0)
+        noise = noise if self._noise is None else 0.8 * self._noise + 0.2 * noise
+        half, mean = len(frames) // 2, frames.mean(axis=0)
+        moved = _rms((frames[half:].mean(axis=0) - frames[:half].mean(axis=0)) / noise)
+        if self._waited < self.settings.patience_frames:
+            if moved > self.settings.press_above / 4:
+                return None
+            if _rms((mean - self._untouched) / noise) > self._lifted():
+                return self._warns()
+        self._noise, self._untouched = noise, mean
         return self._asks(Step.PRESS, "press")
+
+    def _warns(self) -> GuideEvent | None:
+        """Once, that the skin rests elsewhere; the patience begins again."""
+        if self._warned:
+            return None
+        self._warned = True
+        return self._asks(
+            Step.REST, "too early, or something lies on the skin: lift, and leave it untouched"
+        )
 
     def _waiting(self, frame: FloatArray, _: float) -> GuideEvent | None:
         assert self._noise is not None
@@ -175,7 +200,7 @@ class PressGuide:
             return self._refuses(wrong)
         assert self._untouched is not None
         self.taken = (self._untouched, pressed, time_s)
-        self.step = Step.LIFT
+        self.step, self._waited = Step.LIFT, 0
         return GuideEvent(Step.LIFT, self.number, "good; lift", accepted=True)
 
     def _judged(self, frames: FloatArray) -> str:
@@ -197,14 +222,24 @@ class PressGuide:
         return ""
 
     def _lifting(self, frame: FloatArray, _: float) -> GuideEvent | None:
-        limit = max(self.settings.press_above, self.settings.lifted_below * self._strength)
-        if self._size(frame) > limit:
+        if self._size(frame) <= self._lifted():
+            self._came_back = True
+            return self._next("") if self._good else self._rests("")
+        self._waited += 1
+        held = self._size(frame) > self.settings.held_above * self._strength
+        if self._came_back or not held or self._waited < self.settings.patience_frames:
             return None
-        return self._next("") if self._good else self._rests("")
+        why = "the skin is not as it was before this press; perhaps lifting was taken for it"
+        withdrawn, event = self._good, self._rests(f"again, please: {why}")
+        return replace(event, rejected=why, withdrawn=withdrawn)
+
+    def _lifted(self) -> float:
+        """A change of the skin, over the noise, below which nothing touches it."""
+        return max(self.settings.press_above, self.settings.lifted_below * self._strength)
 
     def _refuses(self, why: str) -> GuideEvent:
         self._good = False
-        self.step = Step.LIFT
+        self.step, self._waited = Step.LIFT, 0
         self._strength = max(self._strength, self._size(self._hold[-1]))
         return GuideEvent(Step.LIFT, self.number, f"again, please: {why}; lift first", rejected=why)
 
@@ -217,13 +252,13 @@ class PressGuide:
 
     def _rests(self, text: str) -> GuideEvent:
         self._rest.clear()
-        self._good, self._waited = True, 0
+        self._good, self._warned = True, False
         return self._asks(
             Step.REST, f"{text}; leave the skin untouched" if text else Step.REST.value
         )
 
     def _asks(self, step: Step, text: str) -> GuideEvent:
-        self.step = step
+        self.step, self._waited = step, 0
         return GuideEvent(step, self.number, text)
 
     def _size(self, frame: FloatArray) -> float:
@@ -338,6 +373,8 @@ def guide_presses(
             continue
         if event.accepted and guide.taken is not None:
             file.add(event.number, *guide.taken)
+        if event.withdrawn:
+            file.back()
         say(event)
         if event.step is Step.DONE:
             return

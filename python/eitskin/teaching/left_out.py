@@ -65,6 +65,14 @@ def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
     )  # fmt: skip
 
 
+def chance_share(left_out_mm: FloatArray, place_mm: FloatArray) -> float:
+    """How far the others put each press (n, 2) from its own place, over how far from theirs: near 0
+    where places explain the voltages, about 1 where they do not."""
+    away = np.linalg.norm(left_out_mm[:, None] - place_mm, axis=2)
+    own = float(np.diag(away).mean())
+    return own * (len(away) - 1) / max(float(away.mean()) * len(away) - own, 1e-300)
+
+
 def without_own(residual: FloatArray, share: float, data: FloatArray) -> FloatArray:
     """What to add to whitened data (k, m), so that they are whitened by a covariance without the
     ``share`` that one press's whitened ``residual`` r (m,) has of it: by (I - share r r')^-1/2."""

@@ -117,6 +117,15 @@ def _refuse_numbers(presses: Presses) -> None:
         raise FrameError("presses: time_s has a number that is not finite; leave the array out")
 
 
+def shifted(presses: Presses, by: int) -> Presses:
+    """Each press with the place, depth and force of the one ``by`` later; the ends go."""
+    count = np.arange(len(presses) - abs(by))
+    frames, places = presses.take(count + max(-by, 0)), presses.take(count + max(by, 0))
+    return replace(
+        frames, place_mm=places.place_mm, depth_mm=places.depth_mm, force_n=places.force_n
+    )
+
+
 def joined(first: Presses, second: Presses) -> Presses:
     """The presses of both, one after the other; what only one of them has becomes NaN, time goes.
 

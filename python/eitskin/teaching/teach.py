@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,38 +10,38 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import EitskinError, ProtocolError, UsageError
-from eitskin.fem.grid import Grid, grid_for
+from eitskin.fem.grid import Grid
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
-from eitskin.skin.outline import disk
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.checks import MIN_PRESSES, check_presses
-from eitskin.teaching.fit import Learned, chosen_kernel, default_kernel, differences, learn
-from eitskin.teaching.fit import first_amplitudes as begin_amplitudes
-from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity, placement_text
+from eitskin.teaching.explained import (
+    Progress,
+    explained,
+    known_size,
+    quiet_progress,
+    shifted_or_refused,
+)
+from eitskin.teaching.fit import Learned, learn
+from eitskin.teaching.kernel import placement_text
 from eitskin.teaching.left_out import (
     MISFIT,
     LeftOut,
     ellipse_factor,
-    leave_one_out,
-    refined_places,
     stranger_note,
 )
 from eitskin.teaching.make import LEAST_SHARES, taught_model
 from eitskin.teaching.presses import Presses
 
 FloatArray = npt.NDArray[np.float64]
-Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 # models, each with the numbers of presses that it did not know
 Tried = list[tuple[Model, npt.NDArray[np.int64]]]
 
 FEW_PRESSES = 50
 FOLDS, COUNTED_ONCE, MAX_HELD_OUT = 5, 0.96, 250
-PIXELS_ACROSS = 32
 NOTHING = 0.1  # of a row's energy explained: it carries nothing
 OTHER_SCALE = 0.16  # of its logarithm: more is another unit or another skin
-MIRROR_GAIN = 10.0  # of log likelihood
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,20 +65,17 @@ class HeldOut:
     which: npt.NDArray[np.int64]
 
 
-def quiet_progress(items: Iterable[Any], what: str) -> Iterable[Any]:
-    """Shows nothing."""
-    return items
-
-
 def teach(
     presses: Presses,
     skin: Skin | None,
     *,
     place_sd_mm: float = 0.0,
+    refuse: bool = True,
     progress: Progress = quiet_progress,
 ) -> Taught:
     """Learn a model from ``presses`` of ``skin``; None where it is not known. ``place_sd_mm``: how
-    far places given by hand may be off, an axis.
+    far places given by hand may be off, an axis. ``refuse`` False makes a model even of places that
+    do not explain the voltages.
 
     Raises:
         FrameError: the presses cannot teach; the text says which, and what to do.
@@ -95,34 +91,15 @@ def teach(
             f"teach: the skin has {skin.electrodes.count} electrodes, the presses were scanned with"
             f" {presses.protocol.n_electrodes}; give the description of that skin"
         )
-    given = known_size(presses)
-    kernel, width_mm = starting_kernel(presses, skin)
-    if skin is None:
-        notes.append(
-            "no description of the skin: places that were not pressed are guessed from near ones"
-            " alone, and errors are about twice as large; give --skin"
-        )
-    else:
-        kernel, mirrored = mirrored_or_not(kernel, presses, given, width_mm)
-        if mirrored:
-            notes.append(
-                "the places are mirrored against the description; the model follows the places"
-            )
-    learned = learn(
-        kernel, presses.place_mm, presses.difference, given, width_mm,
-        progress=lambda items: progress(items, "angles"),
-    )  # fmt: skip
-    seen_as = seen_skin(learned, skin, presses)
-    grid = grid_for(seen_as.outline, PIXELS_ACROSS)
-    if place_sd_mm > 0:
-        learned = refined_places(
-            learned, grid, presses.place_mm, place_sd_mm, presses.difference, given, width_mm
-        )
-    left_out = leave_one_out(learned, grid)
+    found = explained(presses, skin, place_sd_mm, progress)
+    if refuse and found.is_chance:
+        found = shifted_or_refused(found, skin, place_sd_mm, progress)
+    presses, learned, left_out, grid = found.presses, found.learned, found.left_out, found.grid
+    notes, width_mm, given = notes + found.notes, found.width_mm, known_size(found.presses)
     least_share, held = held_out(learned, presses, given, grid, width_mm, progress)
     meta = {"teach": {"presses": len(presses)}}
     if skin is not None:
-        meta["skin"] = skin_to_table(seen_as)
+        meta["skin"] = skin_to_table(found.seen_as)
     model = taught_model(learned, presses.protocol, grid, presses.untouched, least_share, meta)
     law, law_note = size_law(presses, held, grid)
     notes += law_note
@@ -133,52 +110,6 @@ def teach(
     report["fit_s"] = round(time.monotonic() - begun, 2)
     model = replace(model, load=law, meta={**model.meta, "teach": report})
     return Taught(model, learned, left_out, report)
-
-
-def known_size(presses: Presses) -> FloatArray | None:
-    """What is known of how hard each press was: force, else depth; None for nothing."""
-    return presses.force_n if presses.force_n is not None else presses.depth_mm
-
-
-def starting_kernel(presses: Presses, skin: Skin | None) -> tuple[Kernel, float]:
-    """The kernel before any fit, and the skin's width in mm."""
-    if skin is None:
-        kernel = default_kernel(None, presses.place_mm)
-        return kernel, 4 * kernel.length_mm
-    x0, y0, x1, y1 = skin.outline.bounding_box_mm
-    sensitivity = field_sensitivity(skin, presses.protocol)
-    return (
-        default_kernel((sensitivity, skin.outline.centre_mm), presses.place_mm),
-        max(x1 - x0, y1 - y0),
-    )
-
-
-def seen_skin(learned: Learned, skin: Skin | None, presses: Presses) -> Skin:
-    """The skin in the presses' coordinates; without a description a disk around them."""
-    if skin is not None:
-        return learned.kernel.placement.skin_in_places(skin)
-    from eitskin.skin.electrodes import Electrodes
-
-    reach = float(np.linalg.norm(presses.place_mm, axis=1).max())
-    count = presses.protocol.n_electrodes
-    return Skin("unknown", disk(2.2 * reach), Electrodes(count=count, width_mm=3.0 * reach / count))
-
-
-def mirrored_or_not(
-    kernel: Kernel, presses: Presses, given: FloatArray | None, width_mm: float
-) -> tuple[Kernel, bool]:
-    """``kernel``, mirrored where that is far more likely."""
-    few = np.linspace(0, len(presses) - 1, min(len(presses), 60)).astype(int)
-    data, _ = differences(presses.difference[few])
-    place = presses.place_mm[few]
-    amplitude = begin_amplitudes(
-        place, data, None if given is None else given[few], 0.18 * width_mm
-    )
-    other = replace(kernel, placement=Placement(mirrored=True))
-    (_, plain), (_, turned) = (
-        chosen_kernel(one, place, amplitude, data, angles=32) for one in (kernel, other)
-    )
-    return (other, True) if turned > plain + MIRROR_GAIN else (kernel, False)
 
 
 def solve_presses(model: Model, presses: Presses) -> tuple[FloatArray, FloatArray, FloatArray]:

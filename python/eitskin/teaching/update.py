@@ -26,6 +26,14 @@ from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.teaching.checks import check_presses
+from eitskin.teaching.explained import (
+    MIRROR_GAIN,
+    PIXELS_ACROSS,
+    Progress,
+    known_size,
+    quiet_progress,
+    starting_kernel,
+)
 from eitskin.teaching.fit import (
     LOG_BOUND,
     Learned,
@@ -42,17 +50,7 @@ from eitskin.teaching.make import taught_model
 from eitskin.teaching.move import UNMOVED, Move
 from eitskin.teaching.presses import Presses
 from eitskin.teaching.process import condition
-from eitskin.teaching.teach import (
-    MIRROR_GAIN,
-    PIXELS_ACROSS,
-    Progress,
-    Tried,
-    chosen_share,
-    known_size,
-    quiet_progress,
-    solve_presses,
-    starting_kernel,
-)
+from eitskin.teaching.teach import Tried, chosen_share, solve_presses
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -141,8 +139,8 @@ def update(
     medians = {how: float(np.median(one)) for how, one in errors.items()}
     if medians[chosen] > STILL_POOR * max(before, ERROR_FLOOR * session.width_mm):
         notes.append(
-            f"presses held out are still off by {medians[chosen]:.1f} mm; look at the electrodes,"
-            " then teach again with 50 presses"
+            f"presses held out are still off by {medians[chosen]:.1f} mm; look at the electrodes"
+            " and whether each press has its own place, then teach again with 50 presses"
         )
     move = UNMOVED if chosen == KEPT else _move(found[chosen])
     report: dict[str, Any] = {

@@ -70,6 +70,11 @@ BAD: dict[str, tuple[Callable[[Arrays], Arrays], int, str]] = {
         FRAME,
         "presses 0 (from 0) hardly differ from their untouched frame",
     ),
+    "quiet frames while pressed": (
+        lambda a: {"untouched": a["pressed"]},
+        FRAME,
+        "no press differs from its untouched frame; take that before the finger is down",
+    ),
     "one corner": (
         lambda a: {"place_mm": 0.01 * a["place_mm"] + 30},
         FRAME,

@@ -86,6 +86,26 @@ def test_a_bad_press_is_asked_for_again(bad, why: str, tmp_path: Path) -> None:
     assert np.abs(presses.difference - 0.05 * finger.pattern[1]).max() < 2e-3
 
 
+@pytest.mark.parametrize(
+    ("early", "said"),
+    [
+        (lambda f: f.add(5).add(25, 1.0, 5).add(20), "too early"),
+        (lambda f: f.add(11).add(25, 1.0, 5).add(20), "too early"),
+        (lambda f: f.add(5, 1.0, 5).add(230), "too early"),
+        (lambda f: f.add(20, 1.0, 5).add(500), "lifting was taken for it"),
+    ],
+    ids=["before rest", "as rest ends", "lifted before rest", "lifted when told to press"],
+)
+def test_a_press_before_the_first_is_not_the_first(early, said: str, tmp_path: Path) -> None:
+    finger = Finger()
+    early(finger)
+    _, events = finger.good(0).good(1).add(20).guided(tmp_path / "p.npz", 2)
+    assert sum(said in event.text for event in events) == 1 and events[-1].step is Step.DONE
+    presses = load_presses(tmp_path / "p.npz")
+    assert np.array_equal(presses.place_mm, plan_of(2).place_mm)
+    assert np.abs(presses.difference - 0.05 * finger.pattern[:2]).max() < 2e-3
+
+
 def test_a_killed_session_goes_on_and_can_go_back(tmp_path: Path) -> None:
     path = tmp_path / "p.npz"
     Finger().good(0).good(1).guided(path, 3)

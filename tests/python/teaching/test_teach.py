@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from eitskin.errors import FrameError
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.left_out import (
@@ -19,7 +20,7 @@ from eitskin.teaching.left_out import (
     without_own,
 )
 from eitskin.teaching.make import taught_model
-from eitskin.teaching.presses import Presses
+from eitskin.teaching.presses import Presses, shifted
 from eitskin.teaching.teach import Taught, solve_presses, teach
 from simulated_presses import RADIUS_MM, SKIN, TRUE, presses
 
@@ -62,10 +63,13 @@ def test_a_press_left_out_has_no_part_in_the_noise() -> None:
 
 
 def test_shuffled_places_teach_nothing() -> None:
-    """Then the answer is about the middle, or anywhere."""
+    """Such a model is refused; made all the same, it answers about the middle, or anywhere."""
     some = presses(30)
     shuffled = replace(some, place_mm=some.place_mm[np.random.default_rng(3).permutation(30)])
-    error, _, _ = solve_presses(teach(shuffled, SKIN).model, presses(40, seed=2))
+    with pytest.raises(FrameError, match="do not explain the voltages"):
+        teach(shuffled, SKIN)
+    made = teach(shuffled, SKIN, refuse=False).model
+    error, _, _ = solve_presses(made, presses(40, seed=2))
     assert np.median(error) > 0.25 * 2 * RADIUS_MM
 
 
@@ -130,8 +134,10 @@ def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught: Taught) -> No
         (lambda p: replace(p, place_mm=p.place_mm * (1, -1)), "mirrored against the description"),
         (lambda p: replace(p, place_mm=0.6 * p.place_mm), "0.62 times as large as described"),
         (lambda p: p.take(p.place_mm[:, 0] > 0), "elsewhere the model is the physics' guess"),
+        (lambda p: shifted(p, 1), "as if one more came first"),
+        (lambda p: shifted(p, -1), "as if the first was missed"),
     ],
-    ids=["mirrored", "another unit", "one half"],
+    ids=["mirrored", "another unit", "one half", "one too many", "one missed"],
 )
 def test_odd_places_are_told_and_taught(change: Callable[[Presses], Presses], note: str) -> None:
     taught = teach(change(presses(30)), SKIN)
@@ -145,6 +151,8 @@ def test_a_press_that_does_not_fit_is_named(taught: Taught) -> None:
     pressed[7] += pressed[(7 + 11) % 30] - some.untouched[(7 + 11) % 30]
     report = teach(replace(some, pressed=pressed), SKIN).report
     assert 7 in report["strange_presses"] and len(report["strange_presses"]) <= 4
+    every = replace(some, pressed=some.pressed + np.roll(some.difference, 11, axis=0))
+    assert any("one finger at a time" in note for note in teach(every, SKIN).report["notes"])
 
 
 def test_without_a_description_a_stationary_kernel_says_what_is_lost() -> None:

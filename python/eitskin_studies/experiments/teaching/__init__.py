@@ -184,7 +184,7 @@ def _more(presses: Presses, splits: int) -> dict[str, Any]:
     known, judged = _parts(presses, 100, 0)
     draw = np.random.default_rng(11)
     shuffled = replace(known, place_mm=known.place_mm[draw.permutation(100)])
-    out["shuffled"] = _middle(teach(shuffled, SKIN), judged)
+    out["shuffled"] = _middle(teach(shuffled, SKIN, refuse=False), judged)
     out["no description"] = _middle(teach(known, None), judged)
     hand, electrode = [], []
     for seed in range(splits):

@@ -1,0 +1,174 @@
+"""What presses teach by the likelihood, whether their places are mirrored or shifted by one press,
+and whether they explain the voltages at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import FrameError
+from eitskin.fem.grid import Grid, grid_for
+from eitskin.skin.outline import disk
+from eitskin.skin.skin import Skin
+from eitskin.teaching.checks import MIN_PRESSES
+from eitskin.teaching.fit import Learned, chosen_kernel, default_kernel, differences, learn
+from eitskin.teaching.fit import first_amplitudes as begin_amplitudes
+from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity
+from eitskin.teaching.left_out import LeftOut, chance_share, leave_one_out, refined_places
+from eitskin.teaching.presses import Presses, shifted
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[Iterable[Any], str], Iterable[Any]]
+
+PIXELS_ACROSS = 32
+MIRROR_GAIN = 10.0  # of log likelihood
+UNEXPLAINED = 0.8  # mean of chance_share and noise; presses of a real skin, 12 or more, have < .6
+POOR = 0.3  # chance_share above which a report says so
+EXPLAINED = 0.5  # chance_share below which places shifted by one press are the right ones
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """``presses`` and what they taught, on ``grid`` of the skin ``seen_as``."""
+
+    presses: Presses
+    learned: Learned
+    left_out: LeftOut
+    grid: Grid
+    seen_as: Skin
+    width_mm: float
+    notes: list[str]
+
+    @property
+    def chance(self) -> float:
+        """Of the error by chance, how much the presses left out have."""
+        return chance_share(self.left_out.place_mm, self.learned.process.place_mm)
+
+    @property
+    def noise(self) -> float:
+        """Of a press."""
+        return float(np.sqrt(np.mean(self.learned.process.left_out() ** 2)))
+
+    @property
+    def is_chance(self) -> bool:
+        """Whether they explain each other no better than presses anywhere."""
+        return (self.chance + min(self.noise, 1)) / 2 > UNEXPLAINED
+
+
+def quiet_progress(items: Iterable[Any], what: str) -> Iterable[Any]:
+    """Shows nothing."""
+    return items
+
+
+def explained(
+    presses: Presses, skin: Skin | None, place_sd_mm: float, progress: Progress
+) -> Explained:
+    """What ``presses`` teach by the likelihood, and how well they explain each other."""
+    notes, given = [], known_size(presses)
+    kernel, width_mm = starting_kernel(presses, skin)
+    if skin is None:
+        notes.append(
+            "no description of the skin: places that were not pressed are guessed from near ones"
+            " alone, and errors are about twice as large; give --skin"
+        )
+    else:
+        kernel, mirrored = mirrored_or_not(kernel, presses, given, width_mm)
+        if mirrored:
+            notes.append(
+                "the places are mirrored against the description; the model follows the places"
+            )
+    learned = learn(
+        kernel, presses.place_mm, presses.difference, given, width_mm,
+        progress=lambda items: progress(items, "angles"),
+    )  # fmt: skip
+    seen_as = seen_skin(learned, skin, presses)
+    grid = grid_for(seen_as.outline, PIXELS_ACROSS)
+    if place_sd_mm > 0:
+        learned = refined_places(
+            learned, grid, presses.place_mm, place_sd_mm, presses.difference, given, width_mm
+        )
+    left_out = leave_one_out(learned, grid)
+    found = Explained(presses, learned, left_out, grid, seen_as, width_mm, notes)
+    if found.chance > POOR:
+        notes.append(
+            f"the places explain the voltages badly, left out {100 * found.chance:.0f} % of the"
+            " error of chance: press more, one finger at a time, the skin untouched before each"
+        )
+    return found
+
+
+def shifted_or_refused(
+    found: Explained, skin: Skin | None, place_sd_mm: float, progress: Progress
+) -> Explained:
+    """``found`` explains nothing: the same with each press at the next place, or the one before,
+    where that does.
+
+    Raises:
+        FrameError: it does not either.
+    """
+    presses, how = found.presses, {1: "the first was missed", -1: "one more came first"}
+    for by in how if len(presses) > MIN_PRESSES else ():
+        other = explained(shifted(presses, by), skin, place_sd_mm, progress)
+        if other.chance < EXPLAINED:
+            other.notes.append(
+                f"the places are shifted by one press, as if {how[by]}; the model is of each press"
+                f" at the {'next' if by > 0 else 'previous'} place, without the odd one"
+            )
+            return other
+    raise FrameError(
+        "teach: the places do not explain the voltages, not mirrored or shifted by one press"
+        f" either: presses left out are {np.median(found.left_out.error_mm):.0f} mm off,"
+        f" {100 * found.chance:.0f} % of chance, noise is {100 * found.noise:.0f} % of a press;"
+        " record them again, each where the plan says, and look at the electrodes with  eitskin"
+        " doctor"
+    )
+
+
+def known_size(presses: Presses) -> FloatArray | None:
+    """What is known of how hard each press was: force, else depth; None for nothing."""
+    return presses.force_n if presses.force_n is not None else presses.depth_mm
+
+
+def starting_kernel(presses: Presses, skin: Skin | None) -> tuple[Kernel, float]:
+    """The kernel before any fit, and the skin's width in mm."""
+    if skin is None:
+        kernel = default_kernel(None, presses.place_mm)
+        return kernel, 4 * kernel.length_mm
+    x0, y0, x1, y1 = skin.outline.bounding_box_mm
+    sensitivity = field_sensitivity(skin, presses.protocol)
+    return (
+        default_kernel((sensitivity, skin.outline.centre_mm), presses.place_mm),
+        max(x1 - x0, y1 - y0),
+    )
+
+
+def seen_skin(learned: Learned, skin: Skin | None, presses: Presses) -> Skin:
+    """The skin in the presses' coordinates; without a description a disk around them."""
+    if skin is not None:
+        return learned.kernel.placement.skin_in_places(skin)
+    from eitskin.skin.electrodes import Electrodes
+
+    reach = float(np.linalg.norm(presses.place_mm, axis=1).max())
+    count = presses.protocol.n_electrodes
+    return Skin("unknown", disk(2.2 * reach), Electrodes(count=count, width_mm=3.0 * reach / count))
+
+
+def mirrored_or_not(
+    kernel: Kernel, presses: Presses, given: FloatArray | None, width_mm: float
+) -> tuple[Kernel, bool]:
+    """``kernel``, mirrored where that is far more likely."""
+    few = np.linspace(0, len(presses) - 1, min(len(presses), 60)).astype(int)
+    data, _ = differences(presses.difference[few])
+    place = presses.place_mm[few]
+    amplitude = begin_amplitudes(
+        place, data, None if given is None else given[few], 0.18 * width_mm
+    )
+    other = replace(kernel, placement=Placement(mirrored=True))
+    (_, plain), (_, turned) = (
+        chosen_kernel(one, place, amplitude, data, angles=32) for one in (kernel, other)
+    )
+    return (other, True) if turned > plain + MIRROR_GAIN else (kernel, False)
