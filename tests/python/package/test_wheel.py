@@ -14,7 +14,7 @@ from eitskin.config import load_toml
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "python" / "eitskin"
 BUILT = {".so", ".pyd", ".dylib"}  # compiled in
-MAX_BYTES = 1_800_000
+MAX_BYTES = 1_900_000
 
 
 @pytest.fixture(scope="module")
@@ -48,4 +48,4 @@ def test_the_wheel_holds_what_a_user_needs_in_little_room(installed: dict[str, P
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as wheel:
         for name, path in installed.items():
             wheel.write(path, name)
-    assert len(packed.getvalue()) < MAX_BYTES
+    assert packed.tell() < MAX_BYTES
