@@ -119,9 +119,40 @@ static void what_explains_too_little_is_no_touch(void)
     dense_bench_close(&b);
 }
 
+/* Sought discs go from a pixel's centre by whole pixels: so they come to lie there, and rounding
+ * must not decide whether the rim's pixel is near. */
+static void a_disc_a_whole_pixel_beyond_the_rim_is_no_touch(void)
+{
+    static const struct {
+        eits_real beyond; /* of the rim's pixel, pixels */
+        uint32_t count;
+    } cases[] = {{R(0.99), 1}, {R(0.9999), 0}, {1, 0}, {R(1.0001), 0}};
+    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
+        dense_bench b = {0};
+        const eits_disc at = {0, 0, 9, R(0.05), 1};
+        eits_context *ctx = pressed(&b, &at, 1, EITS_SIGN_INCREASE);
+        const eits_model *model = ctx->model;
+        const eits_real pixel = (eits_real)model->pixel_mm;
+        eits_fit f = eits_fit_none(ctx, &ctx->scratch);
+        f.disc[0] =
+            (eits_disc){(eits_real)model->origin_x_mm + (SIDE - R(0.5) + cases[c].beyond) * pixel,
+                        (eits_real)model->origin_y_mm + R(9.5) * pixel, 2 * pixel, 0, 1};
+        (void)eits_disc_atom(ctx, &ctx->scratch, &f.disc[0], ctx->frame.y, NULL);
+        f.total = eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, RANK);
+        f.count = 1;
+        ctx->options.detection_factor = 1;
+        ctx->reference.lambda_noise = R(1e-6);
+        eits_fit_strengths(ctx, &ctx->scratch, &f);
+        eits_fit_prune(ctx, &ctx->scratch, &f);
+        CHECK_EQUAL(f.count, cases[c].count);
+        dense_bench_close(&b);
+    }
+}
+
 int main(void)
 {
     touches_that_the_image_does_not_show_are_found();
     what_explains_too_little_is_no_touch();
+    a_disc_a_whole_pixel_beyond_the_rim_is_no_touch();
     return checks_report("seek");
 }

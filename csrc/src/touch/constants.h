@@ -157,6 +157,11 @@
  * has no slope; smaller: divides by rounding */
 #define EITS_NO_DIRECTION R(1e-06)
 
+/* a disc stands out at pixels nearer than this: 1 - 1 / 1024, as discs go from a pixel's centre by
+ * whole pixels [pixels]. larger: at 1, rounding decides of discs a pixel beyond the rim; smaller:
+ * misses the peak */
+#define EITS_STANDS_OUT_NEAR R(0.9990234375)
+
 /* ---- Chosen: on tuning streams, whose seed and runs were not kept. The study says what tracking
  * is worth; it varies its options, not these. Check: eitskin study tracking */
 

@@ -81,14 +81,15 @@ static int stands_out(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     f->macs += 2u * eits_adjoint_macs(ctx);
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
         const eits_pixel at = ctx->model->pixel[j];
-        const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+        const eits_real pixel = (eits_real)ctx->model->pixel_mm,
+                        near = EITS_STANDS_OUT_NEAR * pixel;
         const eits_real dx =
             eits_fma((eits_real)at.ix + R(0.5), pixel, (eits_real)ctx->model->origin_x_mm) -
             disc->x_mm;
         const eits_real dy =
             eits_fma((eits_real)at.iy + R(0.5), pixel, (eits_real)ctx->model->origin_y_mm) -
             disc->y_mm;
-        if (eits_fabs(dx) > pixel || eits_fabs(dy) > pixel)
+        if (eits_fabs(dx) > near || eits_fabs(dy) > near)
             continue;
         const eits_real *column = eits_column(&ctx->model->sensitivity, j, scratch->row[1]),
                         scale = eits_column_scale(&ctx->model->sensitivity, j);

@@ -17,6 +17,7 @@ from eitskin.core.constants_table import (
     NO_DIRECTION,
     RADIUS_DEVIATION,
     SETTLED_PIXELS,
+    STANDS_OUT_NEAR,
     STEP_TRIALS,
     STRENGTH_PASSES,
 )
@@ -245,8 +246,8 @@ class Fit:
         """Whether disc k passes the frame's own threshold at its place."""
         if self.threshold <= 0:
             return True
-        disc, pixel = self.discs[k], self.model.grid.pixel_mm
-        near = (np.abs(self.centres - (disc.x_mm, disc.y_mm)) <= pixel).all(axis=1)
+        disc, reach = self.discs[k], STANDS_OUT_NEAR * self.model.grid.pixel_mm
+        near = (np.abs(self.centres - (disc.x_mm, disc.y_mm)) <= reach).all(axis=1)
         seen = disc.polarity * (self.seen[:, near].T @ self.residual(leave_out=k))
         return bool(seen.max(initial=0.0) >= self.threshold)
 

@@ -84,7 +84,7 @@ def test_every_engine_follows_alike(model: Model) -> None:
     frames = [*presses_in_turn, *np.linspace(1, 1.003, 6)[:, None] * pressed[5]]
     cores = [Reconstructor(model, engine=name) for name in ("c64", "numpy", "c")]
     for core in cores:
-        core.with_options(reference_frames=3, touch_min_fraction=0.05)
+        core.with_options(reference_frames=3)
         core.tare(quiet[:1])
     held_back = 0
     for frame in frames:
