@@ -418,10 +418,13 @@ static void self_test_sums(void)
     }
     memset(small_model_section(&plain, "GOLD", NULL), 0, 4 * SMALL_ROWS);
     small_model_seal(&plain);
-    small_context_open(&c, &plain, 0); /* no reference, no sums */
+    small_model made = small_model_with_section(&plain, "SUMS", words, sizeof words);
+    small_context_open(&c, &made, 0); /* no reference, no sums */
     CHECK_EQUAL(eits_self_test_sums(c.ctx, words + 1),
                 BOTH_WIDTHS(EITS_E_FRAME_ZERO, EITS_E_ARITHMETIC));
+    CHECK_EQUAL(eits_self_test(c.ctx, &difference), EITS_E_FRAME_ZERO);
     small_context_close(&c);
+    small_model_free(&made);
     small_model_free(&plain);
 }
 
