@@ -15,8 +15,14 @@ from eitskin.fem.grid import Grid, grid_for
 from eitskin.skin.outline import disk
 from eitskin.skin.skin import Skin
 from eitskin.teaching.checks import MIN_PRESSES
-from eitskin.teaching.fit import Learned, chosen_kernel, default_kernel, differences, learn
-from eitskin.teaching.fit import first_amplitudes as begin_amplitudes
+from eitskin.teaching.fit import (
+    Learned,
+    chosen_kernel,
+    default_kernel,
+    differences,
+    first_amplitudes,
+    learn,
+)
 from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity
 from eitskin.teaching.left_out import LeftOut, chance_share, leave_one_out, refined_places
 from eitskin.teaching.presses import Presses, shifted
@@ -164,7 +170,7 @@ def mirrored_or_not(
     few = np.linspace(0, len(presses) - 1, min(len(presses), 60)).astype(int)
     data, _ = differences(presses.difference[few])
     place = presses.place_mm[few]
-    amplitude = begin_amplitudes(
+    amplitude = first_amplitudes(
         place, data, None if given is None else given[few], 0.18 * width_mm
     )
     other = replace(kernel, placement=Placement(mirrored=True))
