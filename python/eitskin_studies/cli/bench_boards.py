@@ -147,15 +147,15 @@ def add_latency(what: Any) -> None:
         help="from contact to report of presses that land and lift in the middle of scans",
         description=(
             "Press a simulated skin at random times and places, fast and slowly, while each row is"
-            " measured at its own instant; say when a press is first told of, how far off, and what"
-            " is told that is not there. Solve and link are an emulated board's."
+            " measured at its own instant; say when a press is first reported, how far off, and"
+            " what is reported that is not there. Solve and link are an emulated board's."
         ),
     )
     option(parser, "--presses", "of each rise, on the simulated board", default=200)
     option(parser, "--emulated", "presses of the emulated board, about 10 s each", default=12)
     option(parser, "--seed", "of presses and noise", default=1)
     option(parser, "--order ORDER", 'again with drives in this order, such as "by 7"')
-    option(parser, "--picture FILE.png", "draw when presses were told of", Path)
+    option(parser, "--picture FILE.png", "draw when presses were reported", Path)
     add_page_option(parser, "latency")
     parser.set_defaults(run=run_latency)
 
