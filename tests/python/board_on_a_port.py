@@ -1,7 +1,5 @@
 """A simulated board behind a pseudo-terminal, as behind a serial port."""
 
-from __future__ import annotations
-
 import os
 import pty
 import threading

@@ -1,9 +1,8 @@
 """What every Python test may use."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from fnmatch import fnmatch
+from importlib.util import find_spec
 from pathlib import Path
 
 import hypothesis
@@ -21,8 +20,16 @@ from margins import (  # noqa: F401
     pytest_unconfigure,
 )
 
+NEEDED = ("dask", "matplotlib", "netgen", "pyeit", "scipy", "skfem", "sklearn", "unicorn")
 LONG = Path(__file__).with_name("long_tests.txt")
 hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
+
+
+def pytest_sessionstart() -> None:
+    """Nothing is left out for want of a package."""
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise pytest.UsageError(f"no {', '.join(missing)} here: pip install -e '.[test]'")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

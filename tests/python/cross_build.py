@@ -1,7 +1,5 @@
 """Builds for the Cortex-M7, as the preset of that name makes them."""
 
-from __future__ import annotations
-
 import fcntl
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """The bytes of an .eitm file by docs/reference/eitm-format.md alone, without the project's own
 reader: to look, to break, to seal."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A fresh Python process for what must not depend on what tests have imported before."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """What the mesher answered once, in ``build/meshes``: for every process and every run."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """What a board sends as bytes: the other way of ``payloads.parse``."""
 
-from __future__ import annotations
-
 from dataclasses import astuple
 
 from eitskin.device.wire.link_table import RawHead, TouchPacket

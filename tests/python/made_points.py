@@ -1,7 +1,5 @@
 """Made-up points of a trade-off, and wishes for them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from eitskin.tuning.configuration import Configuration

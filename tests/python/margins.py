@@ -5,8 +5,6 @@ the end of a run.
 for ``scripts/hard-cases``.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

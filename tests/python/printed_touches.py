@@ -1,7 +1,5 @@
 """Touches in the words of the program on the emulated Cortex-M7 (tests/emulated/frames_m7.c)."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from dataclasses import astuple

@@ -1,8 +1,6 @@
 """Presses of a small simulated skin, made by its fields on a mesh: magnitudes only behind a common
 mode, with a gain of its own for each row, so that the model from physics has no chance."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Small skins, their models and frames, each made once and shared by many tests. Nothing here is
 random without a seed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from math import cos, radians, sin

@@ -6,8 +6,6 @@ where that is too little.
 ``BUILD`` is a build with ``--coverage`` whose C tests have run.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

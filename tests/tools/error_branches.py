@@ -17,8 +17,6 @@ A *site* is one of these, found in the text (comments and preprocessor lines asi
   choice, guard or flag calls: it must have run, and each of its branches must have been taken.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

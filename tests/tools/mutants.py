@@ -5,8 +5,6 @@ A mutant is known by its file, its function and the text of its lines before and
 numbers, so that a judgement of it (``survivors.toml``) holds while other lines change.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import re

@@ -12,8 +12,6 @@ of that), where a mistake picked by hand is not, or where a judgement or mistake
 more.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import math

@@ -7,8 +7,6 @@ noticed where the numbers happen to stay right. A test may take so much of the p
 so much time.
 """
 
-from __future__ import annotations
-
 import functools
 import json
 import os

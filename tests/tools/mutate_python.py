@@ -7,8 +7,6 @@ package: there, the changed module is compiled from its changed source. A limit 
 processor's time, so that other work on the machine changes nothing.
 """
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import functools

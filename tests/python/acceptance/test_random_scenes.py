@@ -6,8 +6,6 @@ impedances spread by 20 %, white noise and a 12-bit converter. The threshold of 
 the model's own; nothing here is fitted to these scenes.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -7,8 +7,6 @@ given as NaN. Whole and damaged frames share a reference. The printed means are 
 out" of docs/reference/eitm-format.md.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path

@@ -4,8 +4,6 @@ docs/guide/tank.md gives.
 The data are not part of the project; without them these tests are skipped.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """Files damaged as disks, lines and text editors damage them, for hypothesis; and what a reader may
 do with them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from pathlib import Path

@@ -1,8 +1,6 @@
 """``python mutated_files.py COUNT [FORMAT...]``: reads so many mutated files of each format, each
 within 2 s of processor time, all within 500 MB more than the program itself has."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,8 +1,6 @@
 """Small files that ask for much work or memory are refused before it is done, in one line that says
 what is too much."""
 
-from __future__ import annotations
-
 import io
 import math
 import zipfile

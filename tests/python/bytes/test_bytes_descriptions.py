@@ -1,7 +1,5 @@
 """Any text as a scene's or a skin's description: a scene, or a refusal of one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Damaged SVG and DXF files: an outline, or a refusal of one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,8 +1,6 @@
 """Any bytes as a file of frames, own or somebody else's: frames, or a refusal of one line; nothing
 half written."""
 
-from __future__ import annotations
-
 import io
 import json
 from functools import cache
@@ -169,7 +167,8 @@ def test_any_protocol_table_is_one_or_refused(tmp_path: Path, content: bytes) ->
 
 @cache
 def mat_files() -> list[bytes]:
-    io_of = pytest.importorskip("scipy.io")
+    import scipy.io as io_of
+
     made = []
     for compressed in (False, True):
         stream = io.BytesIO()

@@ -1,8 +1,6 @@
 """Any bytes as an .eitm model: read by Python and C alike or refused in a line; what is read can be
 used."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Any bytes on a line or as a recording: packets or counted, never an exception; pieces do not
 matter."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """Any bytes as results of the trade-off, as a run to go on from, as a firmware image: read, passed
 over, or refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """Mutated files of every format: each read, or refused in a line, within 2 s and 500 MB, without a
 number that is not finite. ``mutated_files.py`` sets the limits, in a process of its own."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Presses whose law and gain are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,8 +1,6 @@
 """The fit finds laws and gains that are known, says how sure it is, and refuses what cannot
 tell."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lists of weights: what is read, and the line that each mistake gets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Boards for tests of the command line: a small scene, and a simulated board before it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes

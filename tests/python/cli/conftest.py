@@ -1,7 +1,5 @@
 """Running the command line in this process, and the files that it is given."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

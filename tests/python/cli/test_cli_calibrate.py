@@ -1,8 +1,6 @@
 """``eitskin calibrate`` from a simulated bench to loads of presses that it never saw, on the host
 and on a simulated board."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from math import cos, radians, sin

@@ -1,7 +1,5 @@
 """Commands for boards, before a simulated one: what they print, for readers and for programs."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -11,10 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from board_cases import board_of, write_scene
 
 from board_on_a_port import behind_a_port

@@ -1,17 +1,11 @@
 """What the commands for boards refuse: the documented exit code, one line that says what to do, no
 traceback, no file left."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from board_cases import board_of, write_scene
 
 from board_on_a_port import behind_a_port

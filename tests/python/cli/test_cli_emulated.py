@@ -1,7 +1,5 @@
 """The commands before the emulated board: the issue's acceptance, and the demo's section."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable
@@ -9,10 +7,6 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-pytest.importorskip("unicorn")
 
 from eitskin.demo import demo
 from eitskin.demo.demo_board import run_board_demo, to_json, to_text

@@ -1,7 +1,5 @@
 """``eitskin model``: from a description to a model, what is in it, and that it verifies."""
 
-from __future__ import annotations
-
 import json
 import os
 import struct

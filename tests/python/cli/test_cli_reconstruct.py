@@ -1,7 +1,5 @@
 """``eitskin reconstruct``: frames to touches, images, files and pictures."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

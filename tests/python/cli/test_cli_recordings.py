@@ -1,8 +1,6 @@
 """Recording and replaying: what was seen live, exported, and compared with this host's core bit by
 bit."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -14,10 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from board_cases import board_of, write_scene
 
 import eitskin

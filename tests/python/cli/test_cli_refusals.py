@@ -1,8 +1,6 @@
 """What the command line refuses: the documented exit code, one line that says what to do, no
 traceback, no file left."""
 
-from __future__ import annotations
-
 import struct
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What ``eitskin teach`` refuses: one line that says which press and what to do, and no file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path

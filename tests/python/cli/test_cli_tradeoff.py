@@ -1,15 +1,10 @@
 """``eitskin recommend``, ``tradeoff``, and ``--budget`` and ``--accuracy`` on frames and boards."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("netgen")
-
 from board_cases import write_scene
 
 from eitskin.cli.main import main
@@ -31,7 +26,6 @@ TINY_RUN = (
 
 
 def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     out = done(
         f"tradeoff run -o {tmp_path / 'out'}", TINY_RUN, f"--front {tmp_path / 'small.json'}"
     )

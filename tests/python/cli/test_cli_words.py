@@ -1,7 +1,5 @@
 """What the command line says beside results: how long is left, lists that end, completion."""
 
-from __future__ import annotations
-
 import subprocess
 
 import pytest

@@ -1,7 +1,5 @@
 """Zones files: read, and refused in a line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,8 +1,6 @@
 """A ring of resistors in place of the skin: its voltages, the doctor before it, and which current
 and gain suit."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

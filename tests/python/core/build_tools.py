@@ -1,7 +1,5 @@
 """The compiler and its kin, for tests that build the C core themselves."""
 
-from __future__ import annotations
-
 import fcntl
 import shutil
 import subprocess

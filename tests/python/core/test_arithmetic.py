@@ -1,7 +1,5 @@
 """A core whose compiler changes bits refuses to be built, or to start."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

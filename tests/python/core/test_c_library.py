@@ -1,8 +1,6 @@
 """The C core as a library: what it asks of the world, what it keeps, what it shows; and its
 sources."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from dataclasses import dataclass

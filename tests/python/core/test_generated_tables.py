@@ -1,8 +1,6 @@
 """The tables say the same everywhere: what is written from them is up to date, the core's table of
 options is Python's, and all that the headers declare reaches Python."""
 
-from __future__ import annotations
-
 import importlib
 import re
 import shlex

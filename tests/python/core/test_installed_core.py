@@ -1,8 +1,6 @@
 """The C core as somebody else uses it: installed, found by CMake and pkg-config, or as a
 subproject."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

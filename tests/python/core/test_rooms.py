@@ -1,8 +1,6 @@
 """The rooms of csrc/src and firmware: which may include which, and which part of a context each
 writes."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Small scenes, boards before them, and transports that damage what goes through."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """A model bank's bytes, against the layout written out by hand."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 

@@ -1,7 +1,5 @@
 """Commands over a line that loses, changes and repeats; silence, other versions, other boards."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 """The codec through cffi: what is sent arrives, what is damaged does not, and every byte is
 accounted for."""
 
-from __future__ import annotations
-
 import zlib
 
 import pytest

@@ -1,8 +1,6 @@
 """What is found wrong with frames is named in their heads, as faults, and once in lines; on a
 simulated board, recorded too."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """Touches after each drive of a simulated board: where and when they are told, what a recording
 gives again to the bit, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """Flashing: the exact command lines of each tool, what goes where, and what is refused. No board is
 touched."""
 
-from __future__ import annotations
-
 import os
 import struct
 from pathlib import Path

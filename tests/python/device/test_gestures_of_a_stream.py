@@ -1,7 +1,5 @@
 """Gestures of library scenes: on the simulated board, on this host, replayed, in the examples."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 from types import ModuleType

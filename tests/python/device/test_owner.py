@@ -1,7 +1,5 @@
 """The owner's settings and lock on the simulated board; a host that goes stops the current."""
 
-from __future__ import annotations
-
 import hashlib
 from typing import Any
 

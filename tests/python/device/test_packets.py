@@ -1,8 +1,6 @@
 """Payloads: their layouts are the C structs', their enums the header's, and what is built is read
 back."""
 
-from __future__ import annotations
-
 import math
 import re
 import struct

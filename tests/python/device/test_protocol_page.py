@@ -1,8 +1,6 @@
 """docs/reference/link-protocol.md says what the code does, beside the tables written into it:
 sizes, the worked example, version and limits."""
 
-from __future__ import annotations
-
 import re
 import zlib
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Recordings: what was received is read back, after a kill too; damage is counted; frames come out
 for the other tools."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,8 +1,6 @@
 """Sequence numbers: gaps are counted, what is no news is refused, a board that begins again is
 recognised."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

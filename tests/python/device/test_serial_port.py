@@ -1,8 +1,6 @@
 """Serial ports on pseudo-terminals: a board behind one, ports that are not there, busy, forbidden,
 slow to be read, unplugged."""
 
-from __future__ import annotations
-
 import os
 import threading
 import time

@@ -1,8 +1,6 @@
 """A simulated board: the scene's frames through the host core, with the firmware's commands, checks
 and replies."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """Instruments that send lines: from a file, a pipe, a connection and a pseudo-terminal; lines that
 are no frames; a port that goes away; sources of packages."""
 
-from __future__ import annotations
-
 import os
 import pty
 import socket

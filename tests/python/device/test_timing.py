@@ -1,8 +1,6 @@
 """Frames on time: speed and loop after a device's URL, by a clock that is counted, not waited
 for."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 

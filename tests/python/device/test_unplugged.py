@@ -1,8 +1,6 @@
 """A board that is pulled out for seconds or a minute is waited for and goes on, on a port and a
 clock of the test's own."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator

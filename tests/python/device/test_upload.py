@@ -1,8 +1,6 @@
 """Models over the wire: whole, cut anywhere, resumed, damaged, refused. The old model stays until
 the new one is proven."""
 
-from __future__ import annotations
-
 import random
 import zlib
 from pathlib import Path

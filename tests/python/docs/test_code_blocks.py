@@ -1,8 +1,6 @@
 """Every shell and Python block of the README and of pages that promise it runs, in order, in one
 folder a page."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """docs/reference/error-codes.md: every code in it is provoked at the command line."""
 
-from __future__ import annotations
-
 import re
 import socket
 import sys

@@ -3,8 +3,6 @@
 ``PYTHONPATH=tests/python python tests/python/docs/test_mistakes.py`` writes the answers anew.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -1,7 +1,5 @@
 """``eitskin bench board``: its numbers are those of the runs, its page says what they are."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The fast path on the emulated Cortex-M7: the host's bits, and what a drive costs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """AArch64, 32-bit ARM and RISC-V give the bits that the host gives; a big-endian one is refused by
 the compiler."""
 
-from __future__ import annotations
-
 import subprocess
 import zlib
 from dataclasses import replace

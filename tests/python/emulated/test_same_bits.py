@@ -5,8 +5,6 @@ The same program prints exact instruction counts (-icount), and they are held to
 -s shows them.
 """
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import replace
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Instructions of a configuration, counted: what is not in a model's defaults reaches the emulated
 core too."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The real firmware image on the emulated board, before scenes without noise or with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ The session is short, and bounded in the board's own time: a broken image must f
 hang the test.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field

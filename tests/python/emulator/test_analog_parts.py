@@ -1,7 +1,5 @@
 """The simulated analog parts: generator, multiplexers, skin, settling, converter."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from thumb import flat_skin

@@ -1,8 +1,6 @@
 """What stops the current behind the program's back: loss of the clock or of the supply, a processor
 that hangs, a current that is not the source's; and that the monitor sees what must never be."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

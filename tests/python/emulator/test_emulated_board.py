@@ -1,8 +1,6 @@
 """The unmodified firmware image of the NUCLEO-F767ZI on the emulated board: what it drives,
 measures, computes and sends."""
 
-from __future__ import annotations
-
 import zlib
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The firmware on the emulated board names what is wrong with a frame within that frame, by fault
 and head, as the host would."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

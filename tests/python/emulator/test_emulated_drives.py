@@ -1,8 +1,6 @@
 """Touches after each drive on the emulated board: told while whole frames are solved, at the frame
 rate, and the bits of this host."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

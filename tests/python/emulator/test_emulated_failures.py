@@ -1,8 +1,6 @@
 """What the firmware does when things go wrong: uploads cut at any byte, a program that crashes or
 hangs, noise on the line."""
 
-from __future__ import annotations
-
 import zlib
 
 import numpy as np

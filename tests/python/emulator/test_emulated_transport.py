@@ -1,7 +1,5 @@
 """``emu:SCENE``: opening it, its time, its refusals."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

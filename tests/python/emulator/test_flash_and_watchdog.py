@@ -1,7 +1,5 @@
 """Programming and erasing flash, what it forbids, how long it takes; the watchdog."""
 
-from __future__ import annotations
-
 import pytest
 from thumb import CLOCK, compile_program, flat_skin, out, run_program
 

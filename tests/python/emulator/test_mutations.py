@@ -1,8 +1,6 @@
 """Firmware with one bug each, built and run: the check that is meant for it fails. The sources as
 they are pass them all."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

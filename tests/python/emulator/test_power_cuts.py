@@ -1,8 +1,6 @@
 """Power that goes at any write to the flash during an upload: the firmware image itself starts on
 what the flash then holds. It has the old model, and the new one only once its last word is in."""
 
-from __future__ import annotations
-
 import zlib
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The emulated processor alone: slices, exceptions, priorities, sleep, faults."""
 
-from __future__ import annotations
-
 import pytest
 from thumb import CLOCK, OUT, STACK_TOP, compile_program, flat_skin, out, run_program, unexpected
 

@@ -1,8 +1,6 @@
 """USART3 with DMA on the line to the host, SPI3 to the generator: bytes, words, their times, and
 what goes wrong."""
 
-from __future__ import annotations
-
 import pytest
 from thumb import CLOCK, compile_program, flat_skin, out, run_program
 

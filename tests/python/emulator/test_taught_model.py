@@ -1,8 +1,6 @@
 """A taught model uploaded to the emulated board: what it streams is this host's, to the bit; what
 numpy makes of it is in teaching/test_teach.py."""
 
-from __future__ import annotations
-
 import zlib
 from pathlib import Path
 

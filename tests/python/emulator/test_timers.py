@@ -1,7 +1,5 @@
 """Clocks, timers and their triggers, the converter and its DMA: what they do when."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Small programs for the emulated processor, compiled in the test against the board's own register
 header."""
 
-from __future__ import annotations
-
 import shutil
 import struct
 import subprocess

@@ -1,7 +1,5 @@
 """Skins and meshes that several model tests share."""
 
-from __future__ import annotations
-
 from math import cos, pi, sin
 
 import pytest

@@ -6,8 +6,6 @@ current density is uniform under each electrode, and the boundary value problem 
 series.
 """
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

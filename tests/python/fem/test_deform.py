@@ -1,7 +1,5 @@
 """Moved meshes: electrodes and rim go where they are wanted, elements stay whole."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The fields of the electrodes' currents."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from eitskin.fem.cem import ForwardModel

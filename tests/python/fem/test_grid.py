@@ -1,7 +1,5 @@
 """The image grid: which pixels are kept, in what order, and images there and back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Meshes: what they fill, where electrodes end, and a mesher that hangs or fails."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import subprocess
@@ -18,8 +16,6 @@ from eitskin.fem.mesh import Mesh, build_mesh, mesh_for_elements, run_mesher
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.skin import Skin, paper_skin
-
-pytest.importorskip("netgen")
 
 
 @pytest.fixture(scope="module", autouse=True)

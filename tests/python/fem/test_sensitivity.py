@@ -1,8 +1,6 @@
 """The Jacobian against finite differences, exact laws, and its element-to-pixel areas against
 clipping by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

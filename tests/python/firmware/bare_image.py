@@ -6,8 +6,6 @@ registers are the exception: a write to LIFCR clears LISR, as on the processor. 
 emulated peripherals are tests/python/emulator's matter.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 import subprocess

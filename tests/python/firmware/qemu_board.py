@@ -1,7 +1,5 @@
 """The firmware on QEMU's mps2-an500: its skin, its link and its flash are files."""
 
-from __future__ import annotations
-
 import struct
 import subprocess
 from dataclasses import dataclass, field

@@ -1,8 +1,6 @@
 """Registers and fields from CMSIS-SVD files, as far as the tests of the register header need
 them."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from dataclasses import dataclass

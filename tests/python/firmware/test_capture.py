@@ -1,8 +1,6 @@
 """The board's capture where the emulated board seldom takes it: late interrupts, failed transfers,
 overruns, refused settings."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """What a processor fault leaves in memory that survives the reset, and what the next start makes of
 it."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

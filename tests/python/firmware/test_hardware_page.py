@@ -1,11 +1,7 @@
 """The pins of docs/guide/hardware.md, of its drawing and of the firmware are the same."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
-
-import pytest
 
 from eitskin_studies.pictures.wiring import MULTIPLEXERS, WIRES
 
@@ -88,7 +84,6 @@ def test_the_flash_map_is_the_linkers_and_the_stores() -> None:
 
 
 def test_the_drawing_repeats_byte_for_byte(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     from eitskin_studies.pictures.wiring_picture import draw_wiring
 
     files = [tmp_path / "a.png", tmp_path / "b.png"]

@@ -1,8 +1,6 @@
 """What the built images hold: vectors, places in memory, sizes, and nothing of a heap, of stdio or
 of double arithmetic."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import struct

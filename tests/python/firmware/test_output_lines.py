@@ -1,7 +1,5 @@
 """The multiplexers' lines on their ports: one store a port, nothing but what was asked for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

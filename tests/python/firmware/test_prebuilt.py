@@ -1,8 +1,6 @@
 """The image that ships is what the source builds: byte for byte with the compiler that made it, by
 its sources with any."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

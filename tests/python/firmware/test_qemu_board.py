@@ -1,8 +1,6 @@
 """The same application on another board: it scans, tares and streams under QEMU, and its images are
 the host's to the bit."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable
 from dataclasses import replace

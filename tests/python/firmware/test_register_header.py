@@ -6,8 +6,6 @@ those that came between (USART, SPI with a FIFO) and the core's. What neither ha
 each with its section of RM0410 or PM0253.
 """
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path

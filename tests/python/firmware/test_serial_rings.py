@@ -1,8 +1,6 @@
 """The board's serial link: every byte out once and in order, all of a write or nothing, and what a
 full receiver does."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Healthy frames from the closed form, seeded, and the faults that tests inject into them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """The commands: what the doctor advises, import takes, and then the doctor is content."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Callable
@@ -170,7 +168,6 @@ def test_sources_with_all_pairs_are_recognised_by_their_number(
 
 
 def test_the_picture_is_drawn(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     path = tmp_path / "f.npz"
     save_frames(path, dead(quiet_only(healthy_frames(17)), 3))
     assert run("doctor", path, "--picture", tmp_path / "p.png") == 11

@@ -1,8 +1,6 @@
 """The doctor on frames from the closed form: healthy ones give no finding, each injected fault is
 named."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -95,7 +93,6 @@ def test_noiseless_and_digitised_frames_raise_no_alarm() -> None:
 
 
 def test_finite_element_frames_with_uneven_contacts_raise_no_alarm() -> None:
-    pytest.importorskip("scipy")
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.mesh import mesh_for_elements
 
@@ -187,7 +184,6 @@ def test_one_touch_leaves_its_mirror_image_and_says_so() -> None:
 
 
 def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame() -> None:
-    pytest.importorskip("scipy")
     corners = [(-60.0, -40.0), (70.0, -40.0), (70.0, 30.0), (10.0, 60.0), (-60.0, 40.0)]
     skin = Skin("odd", polygon(corners), Electrodes(count=8))
     transfer = homogeneous(skin, 8).transfer_ohm

@@ -1,7 +1,5 @@
 """Models, frames and images to EIDORS and back; Octave reads, solves and writes them."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Callable

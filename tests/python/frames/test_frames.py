@@ -1,7 +1,5 @@
 """The frames file: what is saved comes back, and everything else is refused in one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,8 +1,6 @@
 """The predicted homogeneous frame: its symmetries, the finite-element model, and the touch
 response."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -45,7 +43,6 @@ def test_symmetric_rows_are_equal_and_reciprocal() -> None:
 
 
 def test_closed_form_agrees_with_finite_elements() -> None:
-    pytest.importorskip("scipy")
     from eitskin.frames.homogeneous_fem import FemPrediction
 
     skin = paper_skin()
@@ -84,7 +81,6 @@ def test_joined_electrodes_have_one_potential() -> None:
 
 
 def test_other_outlines_use_finite_elements_and_scale_with_the_sheet() -> None:
-    pytest.importorskip("scipy")
     corners = [(-60.0, -40.0), (70.0, -40.0), (70.0, 30.0), (10.0, 60.0), (-60.0, 40.0)]
     skin = Skin("odd", polygon(corners), Electrodes(count=8))
     rows = adjacent(8).drive_measure.astype(np.int64)

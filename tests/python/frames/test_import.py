@@ -1,8 +1,6 @@
 """Import: every option that says how a source differs gives back the frames that the source was
 made from."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -247,7 +245,8 @@ def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> 
 
 
 def test_mat_files_with_structs(tmp_path: Path) -> None:
-    savemat = pytest.importorskip("scipy.io").savemat
+    from scipy.io import savemat
+
     frames = healthy_frames(12)
     path = tmp_path / "m.mat"
     savemat(

@@ -1,8 +1,6 @@
 """Logs of instruments as their own sources write them, to frames: labels, no delimiter at all,
 frames over several lines, broken lines; and .npy arrays."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Channel orders: counts, permutations, and matching rows up to direction and reciprocity."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """Pairs of columns: what the header says is believed, what nothing says is asked for, and no phase
 is ever taken for a voltage."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

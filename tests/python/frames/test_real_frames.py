@@ -1,8 +1,6 @@
 """Measured tank frames: their order, sign and numbering are recognised, import repairs them, and
 truth comes along."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The results file: every field, its shape and unit, read without pickle."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Text tables: delimiters, headers, decimal commas, column choices, and bad cells named by line and
 column."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All hard cases, as ``cases.toml`` has them."""
 
-from __future__ import annotations
-
 import ast
 from dataclasses import dataclass
 from pathlib import Path

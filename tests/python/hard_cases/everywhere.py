@@ -1,8 +1,6 @@
 """The same steps on the host's own kernels, on plain C, and on the emulated Cortex-M7: every bit
 must be the same."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass, fields

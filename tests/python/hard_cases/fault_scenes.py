@@ -1,8 +1,6 @@
 """Random scenes of one to three touches on the paper's skin, and the same with something wrong;
 simulated once a session."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache

@@ -1,8 +1,6 @@
 """Skins whose electrodes see little, or much of the same; each model is built once, on a coarse
 mesh."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

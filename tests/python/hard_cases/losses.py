@@ -1,8 +1,6 @@
 """How the image changes as frames get worse: with noise, with rows left out, with coarser
 numbers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,8 +1,6 @@
 """Models whose stored matrix is whatever a case asks for, on a protocol of 8 electrodes: 40 rows,
 20 after the fold."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -3,8 +3,6 @@
 ``scripts/hard-cases`` makes it.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

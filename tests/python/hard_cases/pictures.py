@@ -1,7 +1,5 @@
 """Pictures of hard cases: one function a file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,8 +1,6 @@
 """What float32 costs, as curves: over the condition number of S, and over how small the change is
 beside the voltages that it is a difference of."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Matrices and data by seed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The catalogue, its tests and its page belong together."""
 
-from __future__ import annotations
-
 import pictures
 from catalogue import CASES, exists, hard_tests
 

@@ -1,8 +1,6 @@
 """Matrices whose columns do not tell coefficients apart: duplicates, opposites, zeros, low ranks;
 and whitened ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from everywhere import SameEverywhere

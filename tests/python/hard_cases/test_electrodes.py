@@ -1,7 +1,5 @@
 """Electrodes, wires and channels that fail between two frames: named in the very frame."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

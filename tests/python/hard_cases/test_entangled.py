@@ -1,8 +1,6 @@
 """The search for touches where they bend each other's field: joined, parted and coupled discs, and
 refined images."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The image gets worse no faster than the frames do."""
 
-from __future__ import annotations
-
 from everywhere import SameEverywhere
 from losses import BITS, LEVELS, NOISE, ROWS_OUT, all_steps, errors_of
 

@@ -5,8 +5,6 @@ A place may be off by half of a touch's radius, so that the found centre lies we
 unless a test says otherwise.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

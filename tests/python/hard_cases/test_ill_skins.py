@@ -1,7 +1,5 @@
 """Skins whose Jacobian is ill-conditioned, from mesh to touches."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From iteration to iteration, and float32 beside float64: bounds that follow from convexity."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lambda at its ends: 0, a hair below lambda_max, at it, a hair above it, and far beyond."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from everywhere import SameEverywhere

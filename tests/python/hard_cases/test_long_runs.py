@@ -1,7 +1,5 @@
 """Many iterations, and many frames that each start where the last one ended."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

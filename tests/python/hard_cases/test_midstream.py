@@ -1,8 +1,6 @@
 """Model, options or reference replaced while frames come: what follows is as if it had always been
 so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of float32 over the condition number, and over the size of the change."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

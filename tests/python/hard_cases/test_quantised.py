@@ -1,8 +1,6 @@
 """Stored matrices at the limits of their types: what is lost follows from the step of the
 quantiser."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from everywhere import SameEverywhere, on_host

@@ -1,8 +1,6 @@
 """Property-based: any matrix, data, lambda, sign, solver and storage give a sound result, and the
 same bits everywhere."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

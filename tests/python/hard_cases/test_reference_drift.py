@@ -1,8 +1,6 @@
 """What moves between the reference and the frame: gain, skin, common mode; and a reference that was
 none."""
 
-from __future__ import annotations
-
 import numpy as np
 from everywhere import SameEverywhere
 from fault_scenes import COUNT, frames_of, miou, noisy, played, rms_v, simulated, touched

@@ -1,7 +1,5 @@
 """Single rows that cannot be used, or must not be believed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,8 +1,6 @@
 """A model that states too small a Lipschitz constant makes FISTA's step too long: the guard halves
 it, or gives zero and says so."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from everywhere import SameEverywhere

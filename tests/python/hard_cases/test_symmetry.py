@@ -1,8 +1,6 @@
 """Metamorphic: what only renames, turns or scales gives the same image renamed, turned or
 scaled."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

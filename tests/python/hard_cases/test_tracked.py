@@ -1,8 +1,6 @@
 """Touches followed in time where frames are bad: noise that flickers, fingers that lift, frames
 that are missing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Units of model, data and frames from 1e-30 to 1e30: the same image in other units, zero, or a
 clean refusal; never rubbish."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Touches that are hard to see, on the paper's skin, solved on another mesh than the model's;
 simulated once a session."""
 
-from __future__ import annotations
-
 from functools import cache
 from math import cos, pi, sin
 

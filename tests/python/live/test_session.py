@@ -1,7 +1,5 @@
 """Sessions: one generator for all, bounded for ever, told by one message."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

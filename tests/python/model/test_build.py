@@ -1,8 +1,6 @@
 """Models built from skins of every kind: what is inside, and that their golden frames give the same
 bits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

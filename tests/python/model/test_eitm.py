@@ -1,8 +1,6 @@
 """The .eitm file: what is written is read again, the bytes lie where docs/reference/eitm-format.md
 says, and damage is refused."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zlib

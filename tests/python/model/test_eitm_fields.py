@@ -1,7 +1,5 @@
 """Section FLDS: as documented, read by both readers alike, and models without it."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 """Two readers of one format, Python's and the C core's: what one refuses the other refuses,
 whatever the bytes."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 

@@ -1,8 +1,6 @@
 """The section LOAD: written, read by both readers, skipped where it is not there, refused where it
 is out of range."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import replace
 

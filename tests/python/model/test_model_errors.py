@@ -1,7 +1,5 @@
 """The section UNCE: drawn from random skins, by any number of processes the same, stored, read."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import replace
 from functools import cache

@@ -1,8 +1,6 @@
 """The reduction against its own definition: what folds, what whitens, and what the greatest
 eigenvalue is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

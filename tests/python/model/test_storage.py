@@ -1,7 +1,5 @@
 """Storage: how far from the truth each type may be, and what pads it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """Reconstruction needs neither scipy nor netgen nor matplotlib: they are made unimportable, or
 looked for afterwards."""
 
-from __future__ import annotations
-
 import json
 
 from fresh_python import MAIN, run_python, without

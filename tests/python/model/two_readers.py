@@ -1,7 +1,5 @@
 """The two readers of .eitm files side by side."""
 
-from __future__ import annotations
-
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import ModelError
 from eitskin.model.eitm import decode_model

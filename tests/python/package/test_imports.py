@@ -1,8 +1,6 @@
 """Who imports whom: no circle of modules, each package only those that its data come from, and
 nothing of the studies in what is installed."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The list of long tests fits the tests that there are."""
 
-from __future__ import annotations
-
 import re
 from fnmatch import fnmatch
 from pathlib import Path

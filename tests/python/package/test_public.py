@@ -1,7 +1,5 @@
 """What ``import eitskin`` gives: listed, light, typed, and enough for a program."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What pip installs: the product, and nothing of the studies. The list is that of the wheel."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from importlib.metadata import PackageNotFoundError, distribution

@@ -1,8 +1,6 @@
 """Files that commands write: whole or not at all, links followed, modes kept, devices left in
 place."""
 
-from __future__ import annotations
-
 import os
 import stat
 import threading

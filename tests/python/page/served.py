@@ -1,7 +1,5 @@
 """A page that is served in a thread, and a browser that looks at it."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterator

@@ -1,8 +1,6 @@
 """The page in Chromium: what it shows is what is there, and its buttons do what they say. One
 browser for all tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Who may look on and who may command, what a slow page costs the others, and what is refused."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import re

@@ -1,7 +1,5 @@
 """What touches do to each other: the formula against fields that are solved."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The fast path on rows in time: touches land, move and lift within a scan; C against numpy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -1,8 +1,6 @@
 """The numpy reference against the formulas that it writes out: brute force, finite differences,
 another order of doing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

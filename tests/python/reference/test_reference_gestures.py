@@ -1,7 +1,5 @@
 """The numpy reference makes the core's events, bit for bit, of any stream of touches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the tests of scenes share: a cache of meshes once a module."""
 
-from __future__ import annotations
-
 import pytest
 
 from eitskin.scene.session import MeshCache

@@ -1,8 +1,6 @@
 """What the tests of scenes share: small scenes, effects made on the spot, and the command line of
 scenes alone."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Frames of a scene made by and by: the same values, little work before the first, little kept."""
 
-from __future__ import annotations
-
 import tracemalloc
 from dataclasses import replace
 

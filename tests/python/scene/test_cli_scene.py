@@ -1,15 +1,9 @@
 """``eitskin scene``: what its commands print and write."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from scene_helpers import ELEMENTS, scene_command
 
 from eitskin.errors import ConfigError, FileError, UsageError
@@ -63,7 +57,6 @@ def test_plan_lists_the_steps(scene: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 def test_picture_is_a_picture(scene: Path, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     scene_command("picture", str(scene), "-o", str(tmp_path / "s.png"))
     assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
 

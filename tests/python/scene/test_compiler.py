@@ -1,7 +1,5 @@
 """The plan, the choice of the solve, and what unnamed effects must not do."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from dataclasses import replace
@@ -9,10 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from scene_helpers import ELEMENTS, effect_module, moving_scene, still_scene
 
 from eitskin.errors import ConfigError

@@ -1,7 +1,5 @@
 """Datasets: the same bytes however made, resumed where left, ranges kept."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -9,10 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from scene_helpers import ELEMENTS, scene_command, still_scene
 
 from eitskin.errors import ConfigError, FileError, MissingExtraError, UsageError
@@ -198,7 +192,8 @@ def test_without_dask_a_scheduler_asks_for_the_extra(
 
 
 def test_a_dask_cluster_gives_the_same_bytes(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("dask.distributed")
+    from dask import distributed
+
     job = small_job()
     write_dataset(job, tmp_path / "here")
     with distributed.LocalCluster(

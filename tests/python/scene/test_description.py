@@ -1,7 +1,5 @@
 """Scenes read from TOML: what they hold, and what is refused, naming file, table and key."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,13 +1,8 @@
 """An effect that is not named is not imported: seen from outside, in a process of its own."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
 
 from fresh_python import run_python
 

@@ -1,15 +1,9 @@
 """The scenes that come with the package: each is found by name, described, and runs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from scene_helpers import ELEMENTS
 
 from eitskin.errors import FileError

@@ -1,7 +1,5 @@
 """Touches that come, move and go while a frame is scanned."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

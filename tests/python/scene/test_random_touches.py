@@ -1,7 +1,5 @@
 """Random scenes: seeds, independence, and the rules they keep."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Finding effects by name, a user's own by entry point, and the check of their parameters."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import sys
 from dataclasses import dataclass

@@ -1,16 +1,10 @@
 """Frames of scenes: truth, streams, counters, real arithmetic."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from scene_helpers import effect_module, moving_scene, still_scene
 
 from eitskin.errors import ConfigError

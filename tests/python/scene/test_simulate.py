@@ -1,15 +1,10 @@
 """Simulated sessions: areas, noise, converter, and the independence of their sources."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
 
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import Mesh, mesh_for_elements

@@ -1,17 +1,11 @@
 """Shapes and laws of touches, and changes after the tare: what they make of a sheet, and cost."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from scene_helpers import still_scene
 
 from eitskin.errors import ConfigError

@@ -1,7 +1,5 @@
 """Touches out of images: components, centroids, their threshold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Optimal matching with a gate: crossed pairs, lexicographic optimum, counts."""
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np

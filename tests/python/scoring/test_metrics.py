@@ -1,7 +1,5 @@
 """MIoU by hand, by masks and by counts; the curve over the threshold and its best value."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Scores of one frame: perfect, empty and wrong results get what the metrics' definition gives
 them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

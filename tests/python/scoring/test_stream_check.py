@@ -1,14 +1,10 @@
 """What frames show in words: lines, JSON, and the error to the scene's truth."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.device.known_model import KnownModel

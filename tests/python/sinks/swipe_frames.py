@@ -1,7 +1,5 @@
 """Frames of a swipe on a simulated skin, for every sink."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from pathlib import Path

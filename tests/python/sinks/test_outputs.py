@@ -1,7 +1,5 @@
 """Sinks that are slow, stuck or dying hold up nobody; what cannot be opened is refused."""
 
-from __future__ import annotations
-
 import socket
 import sys
 import threading

@@ -1,7 +1,5 @@
 """The node's conversion, with classes that are as strict about their fields as rclpy's."""
 
-from __future__ import annotations
-
 import re
 import sys
 from array import array

@@ -1,7 +1,5 @@
 """Every sink, heard by a receiver that is not ours."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import json

@@ -1,8 +1,6 @@
 """Outlines and electrodes out of SVG and DXF files: sizes, sides, transforms, and a refusal of one
 line for the rest."""
 
-from __future__ import annotations
-
 import io
 import math
 import sys

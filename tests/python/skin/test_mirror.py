@@ -1,7 +1,5 @@
 """The rim's mirror of a dipole."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

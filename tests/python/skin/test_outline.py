@@ -1,7 +1,5 @@
 """Outlines: exact disks, polygons either way round, and those that cannot be."""
 
-from __future__ import annotations
-
 from math import cos, hypot, pi, radians, sin
 
 import numpy as np

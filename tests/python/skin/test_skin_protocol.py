@@ -1,7 +1,5 @@
 """Protocols: their rows, reciprocity found from any table, and a hash that must never change."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Skins: where electrodes lie, which cannot be, and TOML there and back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

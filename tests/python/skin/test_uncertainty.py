@@ -1,7 +1,5 @@
 """The table [uncertainty] of a skin's file: defaults, none, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any

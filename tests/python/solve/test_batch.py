@@ -1,7 +1,5 @@
 """Batches over threads: the results of one frame after another, to the bit and to the id."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 

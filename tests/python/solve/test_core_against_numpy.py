@@ -1,8 +1,6 @@
 """The C core in both widths against the numpy reference: the same options, the same lambda, after
 exactly 60 iterations."""
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np

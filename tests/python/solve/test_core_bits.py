@@ -1,8 +1,6 @@
 """The same bits from every build of the kernels: prepared or not, portable or the processor's
 own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The test of touches, row gains and the floor of noise: C against numpy on skins that differ from
 the model, and what switches them off."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,8 +1,6 @@
 """Both solvers run to a small gap against scikit-learn's coordinate descent: one optimum, and the
 gap bounds the error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +27,8 @@ def objective(s: np.ndarray, y: np.ndarray, x: np.ndarray, lam: float) -> float:
 
 def lasso(s: np.ndarray, y: np.ndarray, lam: float, sign: str) -> np.ndarray:
     """The optimum by another solver; it divides the misfit by the number of rows, so lambda too."""
-    linear_model = pytest.importorskip("sklearn.linear_model")
+    from sklearn import linear_model
+
     turn = -1.0 if sign == "decrease" else 1.0
     solver = linear_model.Lasso(
         alpha=lam / len(y), fit_intercept=False, positive=sign != "both", tol=1e-13, max_iter=10**6

@@ -1,8 +1,6 @@
 """Active set and coordinate descent against another implementation, in both widths; the limit of
 multiply-accumulates."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np
@@ -37,7 +35,8 @@ def solved(problems: Problems, width: str, **options: object) -> list[tuple[np.n
 
 def test_the_optimum_is_scikit_learns(problems: Problems) -> None:
     """Objectives agree to what scikit-learn's own gap leaves open."""
-    linear_model = pytest.importorskip("sklearn.linear_model")
+    from sklearn import linear_model
+
     s = np.asfortranarray(problems.s)
     for k in range(0, len(problems), 4):
         lasso = linear_model.Lasso(

@@ -1,7 +1,5 @@
 """The reconstructor as users see it: what it refuses, what it survives, and what it says of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

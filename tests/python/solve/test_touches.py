@@ -1,7 +1,5 @@
 """Touches: C against numpy, and both against the truth of simulated frames."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """Touches followed in time: the C core's against the numpy reference's, in streams of moving
 fingers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

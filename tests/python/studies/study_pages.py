@@ -1,7 +1,5 @@
 """What all experiments' tests ask of their runs and pages."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

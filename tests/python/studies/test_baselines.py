@@ -1,7 +1,5 @@
 """Baselines against closed forms solved densely, and FISTA against another solver's optimum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -84,7 +82,8 @@ def test_conjugate_gradient_ends_at_the_solution_and_stays() -> None:
 
 @pytest.mark.parametrize("signed", [False, True])
 def test_fista_reaches_the_optimum_of_another_solver(signed: bool) -> None:
-    linear_model = pytest.importorskip("sklearn.linear_model")
+    from sklearn import linear_model
+
     method = baselines.PlainFista(J, 6000, 0.1, signed)
     images, lambdas = method.reconstruct(DV), method.lambdas(DV)
     for dv, x, lam in zip(DV, images, lambdas, strict=True):

@@ -1,17 +1,12 @@
 """``eitskin bench diagnostics``: what is counted agrees with the frames, and the page says what the
 command wrote."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
 
 from eitskin.cli.main import main
 from eitskin.model.prebuilt import load_prebuilt

@@ -1,7 +1,5 @@
 """Energy a frame: what is summed, and that the page says so."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

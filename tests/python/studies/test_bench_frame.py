@@ -1,8 +1,6 @@
 """The benchmark of a frame: every engine and peer is run, on the same frames, and what it says of
 them adds up."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from eitskin.model.prebuilt import load_prebuilt

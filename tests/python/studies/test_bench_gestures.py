@@ -1,7 +1,5 @@
 """Gestures drawn, simulated, told and judged."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``eitskin bench growth`` and ``batches``: exact counts, series, the page and the picture."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

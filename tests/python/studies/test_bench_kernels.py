@@ -1,7 +1,5 @@
 """``eitskin bench kernels``: limits from what the programs print; what its page shows."""
 
-from __future__ import annotations
-
 import pytest
 
 from eitskin_studies.benchmarks import kernels as bench_kernels

@@ -1,7 +1,5 @@
 """``eitskin bench latency``: what counts as told, as false, as late; the page; a run."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``eitskin bench outputs``: parts add up, every contact and frame is counted."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,13 +1,6 @@
 """The benchmarks of scenes: what they count and print; times are not judged."""
 
-from __future__ import annotations
-
 import json
-
-import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
 
 from eitskin.scene.registry import BUILT_IN
 from eitskin_studies.benchmarks import scenes as bench_scenes

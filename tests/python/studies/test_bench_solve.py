@@ -1,7 +1,5 @@
 """``eitskin bench solve``: each solver really gets to the level that its time is given for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

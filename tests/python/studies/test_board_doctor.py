@@ -1,15 +1,11 @@
 """The doctor before a board: its own faults become findings, its missing rows are looked at,
 import's remedies are left out."""
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
 
 from eitskin.device.bandwidth import least_every
 from eitskin.device.diagnose_board import MeasuredBoard, board_findings

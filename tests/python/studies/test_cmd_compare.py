@@ -1,15 +1,10 @@
 """``eitskin compare`` from its arguments to its files."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
 
 from eitskin.errors import ConfigError, EitskinError, FileError, UsageError
 from eitskin_studies.cli import cmd_compare
@@ -25,7 +20,6 @@ def run(*arguments: str) -> int:
 
 
 def test_table_files_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("matplotlib")
     files = [tmp_path / name for name in ("scenes.png", "curves.png", "numbers.csv")]
     drawn = ["--picture", str(files[0]), "--curves", str(files[1]), "--csv", str(files[2])]
     status = run(*FEW, *drawn, "--snr-db", "50", "--lookup", "nearest")

@@ -1,8 +1,6 @@
 """The comparison: fixed on training scenes, judged on test scenes, the same for every method, the
 same every time."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Sequence
@@ -10,9 +8,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
 
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for

@@ -1,13 +1,9 @@
 """Configurations: what a set may say, and what the built-in one holds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("scipy")
 
 from eitskin.core.options_table import SOLVERS
 from eitskin.errors import ConfigError

@@ -1,13 +1,7 @@
 """The project's own reconstruction as a method of the comparison."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-pytest.importorskip("eitskin.core._core_f32", reason="the C core is not built")
 
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import mesh_for_elements

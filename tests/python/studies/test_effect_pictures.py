@@ -1,7 +1,5 @@
 """A picture for every effect, and what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,16 +1,10 @@
 """The experiment ``algorithms``: what it finds on a few scenes, that it goes on where it was cut,
 and its page's marks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin.errors import UsageError

@@ -1,7 +1,5 @@
 """The study of belief: confidence, places and counts of every set, and numbers by hand."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import Any

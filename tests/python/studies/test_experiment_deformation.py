@@ -1,7 +1,5 @@
 """The study of stretched and bent skins: a fresh tare helps, and its page is filled."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

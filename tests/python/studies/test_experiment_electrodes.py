@@ -1,8 +1,6 @@
 """The experiment on electrodes and patterns: every pattern out of one solve, what time allows,
 settings chosen elsewhere."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

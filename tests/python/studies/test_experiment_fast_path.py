@@ -1,7 +1,5 @@
 """The study of the fast path: it fills its page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

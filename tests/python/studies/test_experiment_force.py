@@ -1,8 +1,6 @@
 """The force study, small: what it keeps it does not compute again, seeds tell it, and its physics
 holds."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,16 +1,10 @@
 """The experiment ``homogeneous``: the fold, the measures, what each effect does to them, and what
 the doctor says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
-
 from study_pages import fills_its_page, goes_on
 
 from eitskin.errors import FileError, FrameError

@@ -1,8 +1,6 @@
 """The levers: what each search and each image is worth, on few scenes; and that a run goes on where
 it was."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,8 +1,6 @@
 """The experiment on many touches: its scenes, its numbers, its doubt, and that a run goes on where
 it was."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """The study of other worlds: every set is scored, the worst first, and a run goes on where it
 was."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The study of the paper's weights: where they are put, and its page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The experiment on shapes: what is drawn, what is measured once, and what a finger with one
 electrode cannot show."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """The study on measured tank frames: what it refuses, simulates and judges, and what comes out
 where the frames are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

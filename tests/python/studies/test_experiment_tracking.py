@@ -1,8 +1,6 @@
 """The experiment on touches in time: its streams, its counting, and that it goes on where it was
 stopped."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

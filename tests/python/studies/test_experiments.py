@@ -1,8 +1,6 @@
 """What all experiments have in common: their names and pages, the command, the files that they
 leave."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,8 +1,6 @@
 """The GREIT-like matrix: what it is trained for, what it minimises, and that it sees a small target
 where it is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """Sets of other worlds: what is drawn is what the names say, families share nothing, and the score
 counts."""
 
-from __future__ import annotations
-
 import json
 import math
 from types import SimpleNamespace

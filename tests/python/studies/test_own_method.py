@@ -1,7 +1,5 @@
 """A method of another package joins the comparison by its entry point."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -12,9 +10,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-
-pytest.importorskip("netgen")
-pytest.importorskip("scipy")
 
 from eitskin.config import load_toml
 from eitskin.errors import UsageError

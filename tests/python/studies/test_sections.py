@@ -1,7 +1,5 @@
 """Pages that commands fill between marks, with the part of each table that ``pages.toml`` names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Summaries against numbers worked out by hand, and the bootstrap against the normal interval."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

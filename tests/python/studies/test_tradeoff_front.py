@@ -1,14 +1,10 @@
 """What nothing beats, on made-up points; what the recorded results must show, and what ships of
 them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("scipy")
 
 from eitskin.errors import ConfigError
 from eitskin.tuning.configuration import Configuration

@@ -1,8 +1,6 @@
 """The measurement on tiny sets: what it measures, that it goes on after a kill, and that frames are
 what they are said to be."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -16,9 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("scipy")
-pytest.importorskip("netgen")
 
 from eitskin.errors import EitskinError, UsageError
 from eitskin.fem.mesh import mesh_for_elements

@@ -1,8 +1,6 @@
 """A reference that follows the untouched skin: drift between presses does no harm, a resting hand
 does not fade, a slow touch is not taken for drift, and every engine does the same."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The library's hydrogel scene: its front end misleads the model from physics, not a taught one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """A file of presses gives back what was written, and what cannot be presses is refused in a line
 that says which press and what to do."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

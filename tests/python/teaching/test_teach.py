@@ -1,7 +1,5 @@
 """A model taught from a few presses finds others without any sign; odd places are told."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 """A taught model after remounting or drying: a few presses adapt it, or it stays as it is; from the
 untouched skin alone it is told whether it fits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

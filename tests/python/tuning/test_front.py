@@ -1,7 +1,5 @@
 """Which point is chosen for a budget or an accuracy, on made-up points."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

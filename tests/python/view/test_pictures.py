@@ -1,7 +1,5 @@
 """Pictures: that they are drawn, repeat byte for byte, and show what they are given."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
@@ -14,9 +12,6 @@ from eitskin.fem.grid import Grid, grid_for
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import polygon
 from eitskin.skin.skin import Skin, paper_skin
-
-pytest.importorskip("matplotlib")
-
 from eitskin.view import pictures
 from eitskin.view.pictures import Mark, Panel, found_mark
 from eitskin.view.sheets import draw_frame, draw_panels, save_picture

@@ -1,16 +1,12 @@
 """Pictures whose titles, labels and legends are whole: one, two or twelve frames of a disk, a long
 rectangle and a hand, with long names."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("matplotlib")
 
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for

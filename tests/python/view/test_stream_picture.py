@@ -1,14 +1,9 @@
 """Pictures of a stream: one frame, many, and more than are kept."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("matplotlib")
-pytest.importorskip("scipy")
 
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.packets import Solved, SolvedImage

@@ -1,7 +1,5 @@
 """A session that effects are made in, without a compiler: its own mesh, exact frame and streams."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from effect_types import FloatArray, MakeSession

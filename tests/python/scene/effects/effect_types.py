@@ -1,7 +1,5 @@
 """Names for what the effects' tests hand to each other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,8 +1,6 @@
 """What every effect must keep: reciprocity where physics does, its own stream, its arguments, its
 documented ranges."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import inspect

@@ -1,8 +1,6 @@
 """Contact impedance within its spread, what is off or bridged, the interface's phase against an RC
 circuit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 from typing import Any

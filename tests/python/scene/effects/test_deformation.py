@@ -1,7 +1,5 @@
 """Stretch, bend and creep: what they do to lengths, thickness and voltages."""
 
-from __future__ import annotations
-
 from math import exp, sqrt
 from pathlib import Path
 from typing import Any

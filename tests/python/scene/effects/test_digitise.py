@@ -1,7 +1,5 @@
 """Noise, saturation, converter and jitter against their definitions."""
 
-from __future__ import annotations
-
 from math import exp, pi, sqrt
 from typing import Any
 

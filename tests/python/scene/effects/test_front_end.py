@@ -1,7 +1,5 @@
 """Gains, multiplexers, charge, cross-talk, mains and common mode against closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import exp, pi, sin
 from typing import Any

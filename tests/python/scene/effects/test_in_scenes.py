@@ -1,7 +1,5 @@
 """Effects in whole scenes, against closed forms and against the forward model called directly."""
 
-from __future__ import annotations
-
 from math import pi
 from typing import Any
 

@@ -1,8 +1,6 @@
 """A scene against a measurement that nobody here made: phantom 1_3, a metal rod in a tank of
 saline."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Drying, temperature, background and misplaced electrodes against their laws."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import exp
 
