@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from eitskin.device.open import open_device
     from eitskin.frames.frames import Frames, load_frames
     from eitskin.model.model import Model
-    from eitskin.public import load_model, stream
+    from eitskin.public import load_model, preset, stream
     from eitskin.scene.description import Scene
     from eitskin.skin.protocol import Protocol
     from eitskin.skin.skin import Skin
@@ -32,6 +32,7 @@ __all__ = [
     "load_frames",
     "load_model",
     "open_device",
+    "preset",
     "stream",
 ]
 
@@ -45,6 +46,7 @@ _WHERE = {
     "load_frames": "frames.frames",
     "load_model": "public",
     "open_device": "device.open",
+    "preset": "public",
     "stream": "public",
 }
 

@@ -13,9 +13,15 @@ from eitskin.live.frame import Frame, Notice
 from eitskin.live.session import Session, SessionSettings, kinds_of
 from eitskin.live.zones import load_zones
 from eitskin.model.model import Model
+from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import Source
+from eitskin.tuning.for_model import chosen_point
+from eitskin.tuning.front import Target
+from eitskin.tuning.front import preset as named_preset
+
+PRESET_CHOOSES = {"solver", "iterations", "gap_rel", "mac_limit"}
 
 
 def load_model(path: str | Path | None = None) -> Model:
@@ -28,6 +34,18 @@ def load_model(path: str | Path | None = None) -> Model:
     return load_or_prebuilt(None if path is None else Path(path))[0]
 
 
+def preset(name: str, model: Model | None = None) -> dict[str, Any]:
+    """The options of a ``Reconstructor`` by name: "fast", "balanced" or "accurate", of what was
+    measured on a host with ``model`` (None: the prebuilt one).
+
+    Raises:
+        UsageError: there is none of that name, or no measured point of such a model.
+    """
+    used = load_model() if model is None else model
+    point = chosen_point(named_preset(name, "host"), used, default_options(used))
+    return point.configuration.solver_settings
+
+
 def stream(
     url: str = "auto",
     *,
@@ -36,6 +54,7 @@ def stream(
     frames: int = 0,
     every: int = 0,
     tare: int | None = None,
+    preset: str | None = None,
     to: Sequence[str] = (),
     record: str | Path | None = None,
     zones: str | Path | None = None,
@@ -53,6 +72,7 @@ def stream(
         frames: stop after so many; 0: go on until the scene or the recording ends.
         every: every n-th frame; 0: as many as the line carries.
         tare: take the reference from so many frames of the untouched skin.
+        preset: "fast", "balanced" or "accurate": scan and solver by name, as ``--preset``.
         to: sinks, such as "udp://127.0.0.1:9000" (docs/guide/touches-out.md).
         record: a new recording of every packet.
         zones: a file of named places, whose presses are told (docs/guide/gestures.md).
@@ -69,6 +89,7 @@ def stream(
         model=None if model is None else Path(model),
         model_for="an image" if "image" in mode else "",
         solver=_solver(solver),
+        target=None if preset is None else _preset(preset, solver),
         tare=tare,
         record=None if record is None else Path(record),
         zones=() if zones is None else load_zones(zones),
@@ -97,6 +118,14 @@ def _frames(session: Session, outputs: Outputs) -> Iterator[Frame]:
             notices.clear()
     finally:
         items.close()
+
+
+def _preset(name: str, solver: dict[str, Any]) -> Target:
+    for other in PRESET_CHOOSES & solver.keys():
+        raise UsageError(
+            f"stream(preset={name!r}, {other}=...): the preset chooses {other}; leave one out"
+        )
+    return named_preset(name, "f767")
 
 
 def _solver(named: dict[str, Any]) -> SolverSettings:

@@ -346,7 +346,7 @@ class Session:
         if self.device.board.settings & Setting.KEEP_DRIVE:
             self._say(KEPT_ON)
         self._look_on()
-        self.solver = set_up(self.device, *self._scan_and_solver(), self.known)
+        self.solver = set_up(self.device, *self.scan_and_solver(), self.known)
         if how.record is not None:
             from eitskin.device.recordings.recording import Recorder
 
@@ -394,8 +394,12 @@ class Session:
         if not simulated:
             self._say("touch it")
 
-    def _scan_and_solver(self) -> tuple[ScanSettings, SolverSettings]:
-        """As named; with a target those of the measured point that it chooses."""
+    def scan_and_solver(self) -> tuple[ScanSettings, SolverSettings]:
+        """As named; with a target those of the measured point that it chooses.
+
+        Raises:
+            UsageError: no measured point of the board's model does what the target asks for.
+        """
         scan, named, target = self.settings.scan, self.settings.solver, self.settings.target
         if target is None:
             return scan, named

@@ -72,6 +72,7 @@ def setup_text(session: Session, reference_v: list[float] | None, may_command: b
         "reference_v": reference_v,
         "sign": None if solver is None else solver.sign,
         "iterations": None if solver is None else solver.iterations,
+        "preset": "" if how.target is None else how.target.name,
         "recording": None if session.recorder is None else session.recorder.path.name,
         "model_crc": f"{board.model_crc:08x}",
         "zones": [asdict(zone) for zone in how.zones],

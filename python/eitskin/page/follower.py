@@ -26,6 +26,7 @@ from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.errors import DeviceError, EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.session import KINDS, TARE_FRAMES, Session, SessionSettings
+from eitskin.tuning.front import preset
 
 if TYPE_CHECKING:
     from eitskin.page.teacher import Teacher
@@ -248,10 +249,32 @@ class Follower:
 
         def action(device: Device) -> str:
             session.solver = set_up(device, ScanSettings(), named, session.known)
-            session.settings = replace(session.settings, solver=named)
+            session.settings = replace(session.settings, solver=named, target=None)
             if session.truth is not None and named.sign is not None:
                 session.truth.look_for(named.sign)
             return "solver: " + ", ".join(f"{k} {v}" for k, v in changes.items())
+
+        return self._changed(session, action)
+
+    def preset(self, name: str) -> Future[str]:
+        """Scan and solver by name, and the reference for them.
+
+        Raises:
+            UsageError: there is none of that name.
+        """
+        session, target = self._board("a preset"), preset(name, "f767")
+
+        def action(device: Device) -> str:
+            before = session.settings
+            session.settings = replace(before, target=target)
+            try:
+                scan, solver = session.scan_and_solver()
+            except EitskinError:
+                session.settings = before
+                raise
+            session.solver = set_up(device, scan, solver, session.known)
+            take_reference(device, TARE_FRAMES, streamed=True)
+            return f"preset {name} is in use, and the reference is taken"
 
         return self._changed(session, action)
 

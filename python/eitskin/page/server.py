@@ -376,6 +376,8 @@ class PageServer:
             return follower.mode([str(kind) for kind in value])
         if what == "sign" and value in ("increase", "decrease", "both"):
             return follower.solver(sign=value)
+        if what == "preset":
+            return follower.preset(str(value))
         if what == "teach" and value in ("back", "skip", "fit"):
             return follower.teach(value)
         if what == "iterations" and isinstance(value, int) and 1 <= value <= 1_000_000:

@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from eitskin.config import nearest
 from eitskin.device.bank import BANK_BYTES, RECORD_BYTES
 from eitskin.device.settings import SolverSettings
 from eitskin.errors import ConfigError, FileError, UsageError
@@ -248,7 +249,7 @@ def load_front(path: Path | None = None) -> Front:
 class Target:
     """What is asked for: at most ``budget``, for the mean frame or the ``worst``, at least
     ``accuracy``, on ``board``; a frame measured within ``period_us``. ``compared_in``:
-    in which unit cost is compared where there is no budget."""
+    in which unit cost is compared where there is no budget; ``name``: of a preset."""
 
     budget: Budget | None
     accuracy: float | None
@@ -257,6 +258,7 @@ class Target:
     period_us: float | None = None
     worst: bool = False
     compared_in: str = "us"
+    name: str = ""
 
     @property
     def unit(self) -> str:
@@ -281,11 +283,18 @@ PRESETS = (*PRESET_ACCURACY, *PRESET_REPORT_MS)
 
 
 def preset(name: str, board: str, where: Conditions | None = None) -> Target:
-    """What the preset ``name`` asks for on ``board``."""
+    """What the preset ``name`` asks for on ``board``.
+
+    Raises:
+        UsageError: there is none of that name.
+    """
+    if name not in PRESETS:
+        raise UsageError(f"preset {name}: {nearest(name, PRESETS)}")
     ms = PRESET_REPORT_MS.get(name)
     budget = None if ms is None else Budget(1000 * ms, REPORT_US)
     accuracy = PRESET_ACCURACY.get(name)
-    return Target(budget, accuracy, board, where or Conditions(), compared_in=REPORT_US)
+    place = where or Conditions()
+    return Target(budget, accuracy, board, place, compared_in=REPORT_US, name=name)
 
 
 def check_wish(target: Target) -> Target:

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from board_cases import write_scene
 
+import eitskin
 from eitskin.cli.main import main
+from eitskin.errors import UsageError
 from eitskin.model.eitm import load_model
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -187,6 +189,19 @@ def test_a_preset_sets_the_boards_scan_too(
     assert main(["info", "--device", f"file:{run}", "--json"]) == 0
     board = json.loads(capsys.readouterr().out)["board"]
     assert (board["samples"], board["check_every"]) == (20, 0)
+
+
+def test_python_takes_a_preset(tmp_path: Path) -> None:
+    scene, run = write_scene(tmp_path / "one.toml", frames=1, elements=900), tmp_path / "run.eits"
+    assert len(list(eitskin.stream(f"sim:{scene}", preset="fast", record=run))) == 1
+    with eitskin.open_device(f"file:{run}") as device:
+        assert (device.board.samples, device.board.check_every) == (20, 0)
+    skin = eitskin.Reconstructor(eitskin.load_model())
+    skin.with_options(**eitskin.preset("accurate"))
+    assert skin.options.iterations > eitskin.load_model().defaults.iterations
+    for wrong in ({"preset": "quick"}, {"preset": "fast", "iterations": 5}):
+        with pytest.raises(UsageError, match="preset"):
+            next(eitskin.stream(f"sim:{scene}", **wrong))
 
 
 def test_boards_refuse(refused: Refused, tmp_path: Path) -> None:

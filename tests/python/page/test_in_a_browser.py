@@ -211,6 +211,9 @@ def test_tare_solver_and_mode(live: Page, server: PageServer) -> None:
     assert session.solver.iterations == 30
     live.choose("iterations", "0")
     assert "cannot be" in live.answer()
+    live.choose("preset", "fast")
+    until(lambda: live.answer().startswith("preset fast is in use"))
+    assert session.device.board.samples == 20
     live.run("document.querySelector('#mode input[value=raw]').click()")
     assert live.answer() == "streaming touches, image"
     until(lambda: "No raw" in live.run("return document.getElementById('volts').ariaLabel"))

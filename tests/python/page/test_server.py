@@ -159,7 +159,7 @@ def test_a_page_that_talks_nonsense_is_let_go(server: PageServer, said: str) -> 
                 line.recv(10)
 
 
-@pytest.mark.parametrize("what", ["fly", "sign", "iterations", "mode", "speed"])
+@pytest.mark.parametrize("what", ["fly", "preset", "sign", "iterations", "mode", "speed"])
 def test_an_order_that_cannot_be_is_answered(server: PageServer, what: str) -> None:
     with opened(server, TOKEN) as line:
         line.send(json.dumps({"type": "do", "do": what, "value": ["x"]}))

@@ -114,7 +114,7 @@ function takeSetup(setup) {
   const same = before && before.model_crc === setup.model_crc && before.url === setup.url && Boolean(before.skin) === Boolean(setup.skin);
   if (!same) skin.setSkin(setup.skin);
   const may = setup.may_command, board = may && !setup.replays;
-  for (const id of ["tare", "record", "sign", "iterations", "model"]) $(id).disabled = !board;
+  for (const id of ["tare", "record", "preset", "sign", "iterations", "model"]) $(id).disabled = !board;
   for (const box of $("mode").querySelectorAll("input")) {
     box.disabled = !board;
     box.checked = setup.mode.includes(box.value);
@@ -124,6 +124,7 @@ function takeSetup(setup) {
   const speed = setup.speed === 0 ? "max" : String(setup.speed);
   if (![...$("speed").options].some((one) => one.value === speed)) $("speed").add(new Option(`${speed} ×`, speed));
   $("speed").value = speed;
+  $("preset").value = setup.preset;
   if (setup.sign) $("sign").value = setup.sign;
   if (setup.iterations && document.activeElement !== $("iterations")) $("iterations").value = setup.iterations;
   $("record").setAttribute("aria-pressed", String(Boolean(setup.recording)));
@@ -287,6 +288,7 @@ $("play").addEventListener("click", playOrPause);
 $("step").addEventListener("click", () => ask("step"));
 for (const what of ["back", "skip", "fit"]) $(`teach-${what}`).addEventListener("click", () => ask("teach", what));
 $("speed").addEventListener("change", () => ask("speed", $("speed").value));
+$("preset").addEventListener("change", () => ask("preset", $("preset").value));
 $("sign").addEventListener("change", () => ask("sign", $("sign").value));
 $("iterations").addEventListener("change", () => ask("iterations", Number($("iterations").value)));
 $("mode").addEventListener("change", () => ask("mode", [...$("mode").querySelectorAll("input:checked")].map((box) => box.value)));
