@@ -48,10 +48,11 @@ def _c_value(value: Any) -> str:
     return f"R({value!r})" if isinstance(value, float) else str(value)
 
 
-def python_constants(tables: Tables) -> Lines:
-    """Names and values, those of float64 where there are two; the page says the rest."""
+def python_constants(tables: Tables, twin: str) -> Lines:
+    """Names and values of the rooms whose numpy twin is in this package, those of float64 where
+    there are two; the table says the rest."""
     for room in tables["constants"]["room"]:
-        if "header" in room:  # not the core's
+        if "header" in room or room.get("twin", "eitskin") != twin:  # firmware has no twin
             continue
         yield from ("", f"# {room['name']}")
         for name, value, *_ in (row for group in room["group"] for row in group["rows"]):

@@ -1,20 +1,15 @@
 """Touches out of an image, by one plain rule that is the same for every method.
 
 Pixels with x > t max(x) are grouped into connected components (pixels that share an edge or a
-corner); each component is one touch, at the centroid of its pixels weighted by their values. The
-fraction t is chosen on training scenes, per method, for the highest share of exactly counted
-scenes; it is not the one that MIoU uses.
+corner); each component is one touch, at the centroid of its pixels weighted by their values.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import missing_extra
-from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.scoring.metrics import touch_mask
 
 FloatArray = npt.NDArray[np.float64]
@@ -59,31 +54,3 @@ def touches_in_image(
     return np.asarray(
         (xy / weight[:, None])[np.argsort(-weight, kind="stable")], dtype=np.float64
     ).reshape(-1, 2)
-
-
-def match_all(
-    truths_mm: Sequence[FloatArray], founds_mm: Sequence[FloatArray], gate_mm: float = GATE_MM
-) -> list[Matching]:
-    """:func:`eitskin.scoring.matching.match` for each scene."""
-    return [match(true, found, gate_mm) for true, found in zip(truths_mm, founds_mm, strict=True)]
-
-
-def best_touch_threshold(
-    images: FloatArray,
-    truths_mm: Sequence[FloatArray],
-    index: npt.NDArray[np.int64],
-    centres_mm: FloatArray,
-    thresholds: Sequence[float],
-    sign: int = 1,
-    gate_mm: float = GATE_MM,
-) -> float:
-    """The threshold that counts most training scenes exactly; of equals, more hits less false ones,
-    then the lowest."""
-    best, best_score = thresholds[0], (-1, 0)
-    for threshold in thresholds:
-        founds = [touches_in_image(image, index, centres_mm, threshold, sign) for image in images]
-        matchings = match_all(truths_mm, founds, gate_mm)
-        score = (sum(m.exact for m in matchings), sum(m.hits - m.false_touches for m in matchings))
-        if score > best_score:
-            best, best_score = threshold, score
-    return best

@@ -284,22 +284,3 @@ def judge_for(
     """
     raster = raster_inside(region, spacing_mm)
     return ImageScorer(raster, lookup_for(raster.points_mm, grid, lookup), grid.n_pixels)
-
-
-def pixel_cover(
-    grid: Grid, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike, samples: int = 16
-) -> FloatArray:
-    """The part of each pixel that discs cover, from ``samples`` squared points a pixel: (n,). A
-    perfect pixel image."""
-    steps = ((np.arange(samples) + 0.5) / samples - 0.5) * grid.pixel_mm
-    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    points = (grid.centres_mm()[:, None, :] + offsets[None]).reshape(-1, 2)
-    return np.asarray(
-        disc_mask(points, centres_mm, radii_mm).reshape(grid.n_pixels, -1).mean(axis=1)
-    )
-
-
-def best_threshold(curves: FloatArray, thresholds: npt.ArrayLike = THRESHOLDS) -> float:
-    """The threshold with the highest mean of training ``curves`` (k, T); the lowest of equals."""
-    steps = np.asarray(thresholds, dtype=np.float64).reshape(-1)
-    return float(steps[int(np.argmax(curves.mean(axis=0).round(12)))])

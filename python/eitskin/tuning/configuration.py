@@ -14,7 +14,6 @@ from eitskin.errors import ConfigError
 from eitskin.model.model import Defaults
 from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_REGULARISATION
 from eitskin.model.storage import STORAGES
-from eitskin.scoring.snr import BASE_SAMPLES
 
 if TYPE_CHECKING:
     from eitskin.model.build import BuildSettings
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
 
 SCANS = ("full", "reciprocal")
 PERIOD_SAMPLES = 20
+BASE_SAMPLES = 80  # of a measurement, those of which an SNR is said
 HELD_FRAMES = 4
 ELEMENTS = 3000  # of the mesh that a configuration's model is made on
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import FrameError
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.scene.random_touches import TouchScene, spaced_touches
+from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
 from eitskin.scoring.score import scorer_for
 from eitskin.skin.skin import paper_skin
@@ -38,6 +38,7 @@ from eitskin_studies.benchmarks.diagnostics_scenes import (
     SceneCase,
     drawn,
 )
+from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import copied
 
 FloatArray = npt.NDArray[np.float64]

@@ -21,13 +21,15 @@ from eitskin.fem.mesh import mesh_for_elements
 from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
 from eitskin.scene.simulate import ELEMENTS, Measurement, Simulated, simulate
 from eitskin.scoring import metrics
-from eitskin.scoring.image_touches import best_touch_threshold, match_all, touches_in_image
+from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import GATE_MM, Matching
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin_studies.compare.families import Family, FindsTouches, Learns, Method, Setup, setup_for
 from eitskin_studies.compare.methods import methods
+from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.summary import Summary, summarise
+from eitskin_studies.harness.thresholds import best_threshold, best_touch_threshold, match_all
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any], str], Iterable[Any]]
@@ -211,7 +213,7 @@ def compare(
     )
     perfect = np.array(
         [
-            metrics.pixel_cover(setup.grid, scene.centres_mm(), scene.radii_mm())
+            pixel_cover(setup.grid, scene.centres_mm(), scene.radii_mm())
             for scene in test.simulated.touches.scenes
         ]
     )
@@ -253,7 +255,7 @@ def _run(
     if best is None:
         raise UsageError("a family of methods has no value to try")
     train_miou, value, method, train_images, train_curves = best
-    threshold = metrics.best_threshold(train_curves)
+    threshold = best_threshold(train_curves)
 
     index, centres = setup.grid.index, setup.grid.centres_mm()
     touch_threshold = None

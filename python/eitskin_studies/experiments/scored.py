@@ -19,6 +19,7 @@ from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.harness.sessions import FrameSession, Progress, SceneSolver
 from eitskin_studies.harness.summary import Summary
+from eitskin_studies.harness.thresholds import best_threshold
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -86,7 +87,7 @@ class Evaluator:
         tuning seed."""
         results = reconstruct_many(self.model, frames_v, quiet_v, threads=1, touches=False)
         images = np.array([one.image for one in results], dtype=np.float64)
-        return metrics.best_threshold(self.image_scorer.curves(images, self.truths(scenes)))
+        return best_threshold(self.image_scorer.curves(images, self.truths(scenes)))
 
     def scores(
         self, scenes: Sequence[TouchScene], quiet_v: FloatArray, frames_v: FloatArray, t: float

@@ -25,9 +25,9 @@ from eitskin.scene.forward_steps import Change, Update, Work
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.scene.streams import stream
 from eitskin.scene.touch_path import sample, touches_at
-from eitskin.scoring.snr import noise_deviation_v
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.gestures.drawn import DrawnSession
+from eitskin_studies.harness.snr import noise_deviation_v
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -26,9 +26,10 @@ from eitskin.scene.random_touches import TouchSet, TrueTouch
 from eitskin.scene.simulate import Measurement, conductivity_with, measure
 from eitskin.scene.streams import stream
 from eitskin.scoring.metrics import Raster
-from eitskin.scoring.snr import BASE_SAMPLES, FINE_BITS, FINE_CONVERTER_DB, noise_deviation_v
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
+from eitskin.tuning.configuration import BASE_SAMPLES
+from eitskin_studies.harness.snr import FINE_BITS, FINE_CONVERTER_DB, noise_deviation_v
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

@@ -20,6 +20,7 @@ from eitskin_studies.harness.sessions import (
     apparent_change_s_per_m_mm2,
 )
 from eitskin_studies.harness.summary import Summary, summarise
+from eitskin_studies.harness.thresholds import best_threshold
 from eitskin_studies.tradeoff.engines import Built
 
 FloatArray = npt.NDArray[np.float64]
@@ -82,7 +83,7 @@ def train(built: Built, session: FrameSession, solved: SolvedSet) -> TrainedPoin
     found, true = _forces(session, solved)
     usable = found > 0
     scale = float(np.median(true[usable] / found[usable])) if usable.any() else 1.0
-    return TrainedPoint(metrics.best_threshold(curves), round(scale, DIGITS))
+    return TrainedPoint(best_threshold(curves), round(scale, DIGITS))
 
 
 def score(

@@ -22,12 +22,12 @@ from eitskin.scene.random_touches import (
     TrueTouch,
     random_touches,
     rim_distance_mm,
-    spaced_touches,
 )
 from eitskin.scene.streams import stream
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
+from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import Drift, FrameSession, Progress, SceneSolver
 
 TRAIN, HEADLINE = "train", "random"

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.core import constants_table as c
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import GestureEvent
 from eitskin.core.gestures_table import EventKind, EventPhase
+from eitskin_studies.twins import constants_table as c
 
 MAX_CONTACTS, TRAIL = 32, 8
 R = np.float32

@@ -13,7 +13,7 @@ from eitskin.reference.disc_fit import Disc, Fit, Reduced, damped_step
 from eitskin.reference.engine import ReferenceEngine
 from eitskin.reference.fista import fista
 from eitskin.reference.problem import greatest, project, shrink
-from eitskin.scoring.metrics import pixel_cover
+from eitskin_studies.harness.discs import pixel_cover
 from small_models import DATA_KINDS, SIGNS, prebuilt, small, small_model
 
 GENERATOR = np.random.default_rng(41)

@@ -6,15 +6,10 @@ import numpy as np
 import pytest
 
 from eitskin.errors import GeometryError, UsageError
-from eitskin.scene.random_touches import (
-    TouchRules,
-    TouchScene,
-    random_touches,
-    rim_distance_mm,
-    spaced_touches,
-)
+from eitskin.scene.random_touches import TouchRules, TouchScene, random_touches, rim_distance_mm
 from eitskin.scene.streams import stream
 from eitskin.skin.outline import disk, polygon
+from eitskin_studies.harness.discs import spaced_touches
 
 PAPER = disk(194.0)
 ELL = polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)])

@@ -9,6 +9,8 @@ from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.scoring import metrics
 from eitskin.skin.outline import disk, polygon
+from eitskin_studies.harness.discs import pixel_cover
+from eitskin_studies.harness.thresholds import best_threshold
 
 SQUARE = polygon([(0, 0), (30, 0), (30, 30), (0, 30)])
 
@@ -149,7 +151,7 @@ def test_nearest_curve_is_the_pixel_mask_spread_over_cells() -> None:
 
 def test_pixel_cover_is_exact_in_area() -> None:
     grid = grid_for(disk(194.0))
-    part = metrics.pixel_cover(grid, [[-40, 11], [20, 30]], [9, 7])
+    part = pixel_cover(grid, [[-40, 11], [20, 30]], [9, 7])
     assert part.sum() * grid.pixel_area_mm2 == pytest.approx(math.pi * (81 + 49), rel=5e-3)
     assert part.min() == 0 and part.max() == 1
 
@@ -161,7 +163,7 @@ def test_a_perfect_image_is_limited_by_its_pixels_only() -> None:
     raster = metrics.raster_inside(outline)
     discs = [([[x, y]], [9.0]) for x in (-40.0, 3.0, 33.0) for y in (-21.0, 11.0)]
     truths = np.stack([metrics.disc_mask(raster.points_mm, *d) for d in discs])
-    perfect = np.stack([metrics.pixel_cover(grid, *d) for d in discs])
+    perfect = np.stack([pixel_cover(grid, *d) for d in discs])
     score = {}
     for kind in metrics.LOOKUPS:
         curves = metrics.judge_for(outline, grid, lookup=kind).curves(perfect, truths)
@@ -189,7 +191,7 @@ def test_curves_refuse_what_they_cannot_judge() -> None:
 
 def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals() -> None:
     curves = np.array([[0.2, 0.9, 0.5, 0.5], [0.2, 0.1, 0.6, 0.6]])
-    assert metrics.best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
+    assert best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
     assert metrics.THRESHOLDS[0] == 0.02
     assert metrics.THRESHOLDS[-1] == 0.98
     assert len(metrics.THRESHOLDS) == 49

@@ -11,9 +11,9 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
-from eitskin.scoring import metrics
 from eitskin.scoring.score import FrameScore, Scorer, scorer_for
 from eitskin.skin.protocol import adjacent
+from eitskin_studies.harness.discs import pixel_cover
 from small_models import prebuilt, small_model
 
 INFO = Info(60, "iterations", 0, 0, 0, 0, 0, 0, *[0.0] * 7)
@@ -39,7 +39,7 @@ def result(
     """An image of how much the discs numbered ``discs`` cover of each pixel, and ``touches`` (x, y,
     radius)."""
     grid = prebuilt()[0].grid
-    cover = metrics.pixel_cover(grid, PLACES[discs], RADII[discs])
+    cover = pixel_cover(grid, PLACES[discs], RADII[discs])
     found = tuple(Touch(k, x, y, r, polarity, 1.0) for k, (x, y, r) in enumerate(touches))
     return Reconstruction(polarity * cover, cover, found, INFO)
 

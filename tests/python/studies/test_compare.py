@@ -20,6 +20,7 @@ from eitskin_studies.compare.families import Family, FindsTouches, Learns, Setup
 from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.compare.run import CompareSettings, Comparison, compare, truth_masks
 from eitskin_studies.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text
+from eitskin_studies.harness.discs import pixel_cover
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
 SMALL = CompareSettings(
@@ -126,9 +127,7 @@ class Oracle:
     def reconstruct(self, dv: np.ndarray) -> np.ndarray:
         sets = {6: "train", 8: "test"}
         scenes = random_touches(SKIN.outline, 3, len(dv), sets[len(dv)]).scenes
-        return np.array(
-            [metrics.pixel_cover(self.grid, s.centres_mm(), s.radii_mm()) for s in scenes]
-        )  # type: ignore[arg-type]
+        return np.array([pixel_cover(self.grid, s.centres_mm(), s.radii_mm()) for s in scenes])  # type: ignore[arg-type]
 
     def touches(self, dv: np.ndarray) -> Sequence[np.ndarray]:
         return [

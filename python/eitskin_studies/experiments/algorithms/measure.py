@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.scoring import metrics
-from eitskin.scoring.image_touches import match_all, touches_in_image
+from eitskin.scoring.image_touches import touches_in_image
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin_studies.compare.families import FindsTouches, Learns, Method, Setup, setup_for
@@ -20,6 +20,7 @@ from eitskin_studies.experiments.algorithms.candidates import Candidate, macs_of
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, SHOWN, shown_set, touch_set
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Workspace
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
+from eitskin_studies.harness.thresholds import best_threshold, match_all
 
 FloatArray = npt.NDArray[np.float64]
 Arrays = dict[str, npt.NDArray[Any]]
@@ -116,9 +117,7 @@ def choose(field: Field, candidate: Candidate) -> ChosenParameter:
     as ``eitskin compare`` does."""
     curves = {value: tuning_curves(field, candidate, value) for value in candidate.values}
     value = max(curves, key=lambda v: curves[v][metrics.LOOKUP].max())
-    thresholds = {
-        lookup: metrics.best_threshold(curve[None]) for lookup, curve in curves[value].items()
-    }
+    thresholds = {lookup: best_threshold(curve[None]) for lookup, curve in curves[value].items()}
     scores = np.array([_counting(field, candidate, value, number) for number in NUMBERS]).sum(
         axis=0
     )

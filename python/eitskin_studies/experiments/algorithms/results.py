@@ -22,6 +22,7 @@ from eitskin_studies.experiments.algorithms.measure import (
 )
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS
 from eitskin_studies.harness.summary import Summary, summarise
+from eitskin_studies.harness.thresholds import best_threshold
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -108,7 +109,7 @@ def result_of(field: Field, candidate: Candidate) -> AlgorithmResult:
             number: judged(field, candidate, chosen.value, number, chosen.touch_threshold)
             for number in NUMBERS
         },
-        fixed_t=metrics.best_threshold(tuned[candidate.fixed][None]),
+        fixed_t=best_threshold(tuned[candidate.fixed][None]),
         low_t_range=(min(low_t), max(low_t)),
         shown=shown(field, candidate, chosen.value, chosen.touch_threshold),
         shown_fixed=shown(field, candidate, candidate.fixed, chosen.touch_threshold),

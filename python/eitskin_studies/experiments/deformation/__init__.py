@@ -18,7 +18,6 @@ from eitskin.scene.random_touches import TouchSet, random_touches
 from eitskin.scene.simulate import Measurement, conductivity_with, measure
 from eitskin.scene.streams import stream
 from eitskin.scoring.matching import match
-from eitskin.scoring.snr import noise_deviation_v
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import (
     SIMULATED_ELEMENTS,
@@ -28,6 +27,7 @@ from eitskin_studies.experiments.experiment import (
 )
 from eitskin_studies.experiments.multitouch.counts import share
 from eitskin_studies.harness.sessions import converter_for
+from eitskin_studies.harness.snr import noise_deviation_v
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -19,14 +19,14 @@ from eitskin.fem.sensitivity import sensitivity
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.eitm import encode_model
 from eitskin.model.reduction import DEFAULT_COLUMN_POWER
-from eitskin.scene.random_touches import TouchSet, random_touches, spaced_touches
+from eitskin.scene.random_touches import TouchSet, random_touches
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.scoring import metrics
-from eitskin.scoring.snr import BASE_SAMPLES, noise_deviation_v
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import PAPER_DIAMETER_MM, Skin
+from eitskin.tuning.configuration import BASE_SAMPLES
 from eitskin_studies.experiments.electrodes.patterns import (
     FRAME_US,
     PATTERNS,
@@ -38,7 +38,9 @@ from eitskin_studies.experiments.electrodes.patterns import (
 from eitskin_studies.experiments.electrodes.tuning import tuned
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.scored import session_in_parts
+from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import FrameSession
+from eitskin_studies.harness.snr import noise_deviation_v
 from eitskin_studies.tradeoff.scene_sets import ring_touches
 
 FloatArray = npt.NDArray[np.float64]

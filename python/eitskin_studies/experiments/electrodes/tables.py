@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.scoring.snr import BASE_SAMPLES
+from eitskin.tuning.configuration import BASE_SAMPLES
 from eitskin_studies.experiments.electrodes.measuring import (
     COUNTS,
     PAIR_MM,

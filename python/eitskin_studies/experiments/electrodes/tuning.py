@@ -20,6 +20,7 @@ from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.experiments.scored import Evaluator
+from eitskin_studies.harness.thresholds import best_threshold
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def tuned(
             curves = image_scorer.curves(
                 np.array([one.image for one in results], dtype=np.float64), truths
             )
-            t = metrics.best_threshold(curves)
+            t = best_threshold(curves)
             discs = [
                 metrics.miou(evaluator.discs(one), truth)
                 for one, truth in zip(results, truths, strict=True)

@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from eitskin.core.results import Reconstruction
 from eitskin.scene.simulate import measure
-from eitskin.scoring.snr import noise_deviation_v
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.force.readouts import Instruments
 from eitskin_studies.experiments.force.scenes import RADIUS_SHARES, PressSet
 from eitskin_studies.harness.sessions import converter_for
+from eitskin_studies.harness.snr import noise_deviation_v
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from eitskin.core.results import Reconstruction
 from eitskin.model.build import linearise, make_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
-from eitskin.scene.random_touches import TouchScene, TouchSet, random_touches, spaced_touches
+from eitskin.scene.random_touches import TouchScene, TouchSet, random_touches
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import match
 from eitskin.skin.protocol import adjacent
@@ -23,8 +23,10 @@ from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.levers.configurations import Ablation
 from eitskin_studies.experiments.scored import session_in_parts
+from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import FrameSession, apparent_change_s_per_m_mm2
 from eitskin_studies.harness.summary import summarise
+from eitskin_studies.harness.thresholds import best_threshold
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -140,9 +142,7 @@ class AblationRuns:
 
     def _threshold(self, ablation: Ablation) -> float:
         session = self.session(RANDOM, tuning=True)
-        return metrics.best_threshold(
-            self._curves(ablation, session, self._solve(ablation, session, 60.0))
-        )
+        return best_threshold(self._curves(ablation, session, self._solve(ablation, session, 60.0)))
 
     def _image(self, ablation: Ablation, snr_db: float, threshold: float) -> dict[str, Any]:
         session = self.session(RANDOM)

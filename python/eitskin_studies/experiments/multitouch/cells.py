@@ -7,16 +7,10 @@ import math
 from dataclasses import dataclass
 
 from eitskin.errors import GeometryError
-from eitskin.scene.random_touches import (
-    TouchRules,
-    TouchScene,
-    TouchSet,
-    TrueTouch,
-    random_touches,
-    spaced_touches,
-)
+from eitskin.scene.random_touches import TouchRules, TouchScene, TouchSet, TrueTouch, random_touches
 from eitskin.scene.streams import stream
 from eitskin.skin.outline import Outline
+from eitskin_studies.harness.discs import spaced_touches
 
 RING, WIDE, NARROW, SINGLE, UNEVEN, MIXED = (
     "ring",

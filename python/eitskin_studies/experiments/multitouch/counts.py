@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.scoring.image_touches import match_all
+from eitskin_studies.harness.thresholds import match_all
 
 FloatArray = npt.NDArray[np.float64]
 

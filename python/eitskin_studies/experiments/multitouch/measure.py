@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from eitskin.errors import GeometryError
 from eitskin.scoring.matching import match
-from eitskin.scoring.snr import noise_deviation_v
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.multitouch import ceiling
 from eitskin_studies.experiments.multitouch.ambiguity import (
@@ -42,6 +41,7 @@ from eitskin_studies.experiments.multitouch.test_data import (
 )
 from eitskin_studies.experiments.multitouch.variants import VARIANTS, SeenFrame, TouchVariant
 from eitskin_studies.harness.sessions import MeasuredFrames
+from eitskin_studies.harness.snr import noise_deviation_v
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -17,6 +17,7 @@ from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.scored import Evaluator, session_in_parts
 from eitskin_studies.experiments.shapes.variants import ShapeVariant
+from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 
 SNR_DB = 60.0
@@ -140,10 +141,7 @@ class Maker:
         )
         norm = np.linalg.norm(self.linear.jacobian, axis=0)
         perfect = np.array(
-            [
-                metrics.pixel_cover(model.grid, scene.centres_mm(), scene.radii_mm())
-                for scene in scenes
-            ]
+            [pixel_cover(model.grid, scene.centres_mm(), scene.radii_mm()) for scene in scenes]
         )
         session = self.session(self.test)
         chosen = max(range(len(scenes)), key=lambda k: self._variety(scenes[k]))

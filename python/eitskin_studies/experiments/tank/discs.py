@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from eitskin.model.build import linearise
-from eitskin.scoring.image_touches import match_all
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.tank.evaluation import (
     EvaluationSets,
@@ -21,6 +20,7 @@ from eitskin_studies.experiments.tank.evaluation import (
 )
 from eitskin_studies.experiments.tank.imagers import CoreImager, Levers, SimulatedTank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
+from eitskin_studies.harness.thresholds import match_all
 
 KIND = "log-ratio"
 # name, changes of options, of electrodes, whether decreases are looked for too

@@ -14,7 +14,7 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.fem.grid import Grid
 from eitskin.frames.frames import Frames
 from eitskin.scoring import metrics
-from eitskin.scoring.image_touches import match_all, touches_in_image
+from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import Matching
 from eitskin_studies.experiments.tank.imagers import Entry, Imager, Shown
 from eitskin_studies.experiments.tank.scenes import Set
@@ -25,6 +25,7 @@ from eitskin_studies.experiments.tank.signed_scores import (
     signed_miou,
 )
 from eitskin_studies.experiments.tank.tanks import Rods, objects_of, touch_like, truth_of
+from eitskin_studies.harness.thresholds import best_threshold, match_all
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -66,7 +67,7 @@ def evaluate(entry: Entry, evaluation_sets: EvaluationSets) -> dict[str, Any]:
             best = score, value, imager, curves, shown
     assert best is not None
     trained, value, imager, curves, metal = best
-    threshold = metrics.best_threshold(curves)
+    threshold = best_threshold(curves)
     at = metrics.THRESHOLDS.index(threshold)
     test = imager.show(evaluation_sets.test.quiet_v, evaluation_sets.test.frames_v, False)
     test_curves = curves_of(test, evaluation_sets.test.conductive, evaluation_sets.image_scorer)
@@ -165,7 +166,7 @@ def _both_signs(
     curves = signed_curves_of(
         tuned, mixed.conductive, mixed.resistive, evaluation_sets.image_scorer
     )
-    threshold = metrics.best_threshold(curves)
+    threshold = best_threshold(curves)
     shown = imager.show(frames.reference_voltage_v, frames.voltage_v, True)
     truths = truth_of(frames, evaluation_sets.image_scorer.raster)
     scores = signed_curves_of(shown, *truths, evaluation_sets.image_scorer)[

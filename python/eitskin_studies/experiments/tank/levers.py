@@ -16,6 +16,7 @@ from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.imagers import KINDS, CoreImager, Entry, Levers, SimulatedTank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
+from eitskin_studies.harness.thresholds import best_threshold
 
 REGULARISATIONS = (0.01, 0.03, 0.1, 0.3)
 ITERATIONS = (15, 30, 60, 120)
@@ -97,7 +98,7 @@ def _measured(
     imager = CoreImager(tank, levers)
     tuned = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, False)
     curves = evaluation_sets.image_scorer.curves(tuned.images, evaluation_sets.metal.conductive)
-    threshold = metrics.best_threshold(curves)
+    threshold = best_threshold(curves)
     at = metrics.THRESHOLDS.index(threshold)
     places = touch_like(evaluation_sets.phantoms)
     real = imager.show(

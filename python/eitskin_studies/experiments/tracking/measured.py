@@ -19,12 +19,12 @@ from eitskin.scene.compiler import compile_scene
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import Measurement, measure
-from eitskin.scoring.snr import noise_deviation_v
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tracking.counted import TrackCount, count_stream
 from eitskin_studies.experiments.tracking.streams import ELEMENTS, TouchStream
 from eitskin_studies.harness.sessions import converter_for
+from eitskin_studies.harness.snr import noise_deviation_v
 
 FloatArray = npt.NDArray[np.float64]
 

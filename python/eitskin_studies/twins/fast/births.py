@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin_studies.twins.constants_table import (
     FAST_ANSWERS,
     FAST_APART_MM,
     FAST_DAMPING,

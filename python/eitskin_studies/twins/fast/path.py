@@ -14,7 +14,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.fast import AlignedFrame, FastTouch
+from eitskin.model.model import Model
+from eitskin_studies.twins.constants_table import (
     FAST_AMBIGUOUS,
     FAST_BIRTH,
     FAST_BIRTH_ERROR,
@@ -56,9 +59,6 @@ from eitskin.core.constants_table import (
     FAST_UNEXPLAINED,
     FAST_WILD,
 )
-from eitskin.core.diagnostics_table import Touch
-from eitskin.core.fast import AlignedFrame, FastTouch
-from eitskin.model.model import Model
 from eitskin_studies.twins.fast.births import Births, Fit, Held, apart, inverted
 from eitskin_studies.twins.fast.rows import Drive, RowModel, drives_of
 from eitskin_studies.twins.fast.tracks import (

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import FAST_SOFT_RADIUS
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
+from eitskin_studies.twins.constants_table import FAST_SOFT_RADIUS
 from eitskin_studies.twins.fast.tracks import summed
 
 FloatArray = npt.NDArray[np.float64]

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-BASE_SAMPLES = 80
+from eitskin.tuning.configuration import BASE_SAMPLES
+
 FINE_CONVERTER_DB, FINE_BITS = 70.0, 16  # from there on the steps of 12 bits would be the noise
 
 

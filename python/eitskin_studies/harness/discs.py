@@ -1,0 +1,60 @@
+"""Equal discs at least so far apart, and the perfect image of discs on pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import UsageError
+from eitskin.fem.grid import Grid
+from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
+from eitskin.scoring.metrics import disc_mask
+from eitskin.skin.outline import Outline
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def spaced_touches(
+    outline: Outline,
+    seed: int,
+    count: int,
+    touches: int,
+    spacing_radii: float = 4.0,
+    radius_mm: float = 9.0,
+    contrast: float = 5.0,
+    rim_margin_mm: float = 4.0,
+) -> TouchSet:
+    """``count`` scenes of ``touches`` equal touches whose centres are at least ``spacing_radii``
+    radii apart.
+
+    The harder cousin of a ring, for counting: places are random, and the nearest neighbour is at
+    the stated distance.
+
+    Raises:
+        UsageError: a count below 1, a seed below 0, or a spacing below 2 radii (touches would
+            overlap).
+        GeometryError: that many do not fit on this skin.
+    """
+    if spacing_radii < 2:
+        raise UsageError(f"touches {spacing_radii:g} radii apart would overlap; use 2 or more")
+    rules = TouchRules(
+        (touches, touches),
+        (radius_mm, radius_mm),
+        (contrast, contrast),
+        (spacing_radii - 2) * radius_mm,
+        rim_margin_mm,
+    )
+    return random_touches(outline, seed, count, f"{touches} at {spacing_radii:g} radii", rules)
+
+
+def pixel_cover(
+    grid: Grid, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike, samples: int = 16
+) -> FloatArray:
+    """The part of each pixel that discs cover, from ``samples`` squared points a pixel: (n,). A
+    perfect pixel image."""
+    steps = ((np.arange(samples) + 0.5) / samples - 0.5) * grid.pixel_mm
+    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    points = (grid.centres_mm()[:, None, :] + offsets[None]).reshape(-1, 2)
+    return np.asarray(
+        disc_mask(points, centres_mm, radii_mm).reshape(grid.n_pixels, -1).mean(axis=1)
+    )
