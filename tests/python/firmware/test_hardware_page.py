@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from eitskin_studies.pictures.wiring import MULTIPLEXERS, WIRES
+from eitskin_studies.pictures.wiring import MULTIPLEXERS, WIRES, Wire
 
 ROOT = Path(__file__).resolve().parents[3]
 BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"
@@ -40,12 +40,21 @@ def firmware_pins() -> dict[str, tuple[str, int]]:
     return pins
 
 
-def test_the_page_has_the_table() -> None:
-    lines = ["| pin | Zio | morpho | firmware | wire to |", "|---|---|---|---|---|"]
-    lines += [
-        f"| {one.pin} | {one.zio} | {one.morpho} | {one.function} | {one.to} |" for one in WIRES
-    ]
-    assert "\n".join(lines) + "\n" in PAGE
+def place(wire: Wire) -> str:
+    return ", ".join(filter(None, (wire.pin, wire.zio, wire.morpho)))
+
+
+def test_the_page_has_both_tables() -> None:
+    at = {wire.to: place(wire) for wire in WIRES}
+    table = ["| ADG1206 | A0 | A1 | A2 | A3 | EN |", f"|{6 * '---|'}"]
+    for name in MULTIPLEXERS:
+        cells = [at[f"ADG1206 {name} {line}"] for line in ("A0", "A1", "A2", "A3", "EN")]
+        table.append(f"| {' | '.join([name, *cells])} |")
+    assert "\n".join(table) + "\n\n" in PAGE
+    table = ["| pin | firmware | wire to |", "|---|---|---|"]
+    others = [wire for wire in WIRES if not wire.to.startswith("ADG1206")]
+    table += [f"| {place(wire)} | {wire.function} | {wire.to} |" for wire in others]
+    assert "\n".join(table) + "\n\n" in PAGE
 
 
 def test_the_firmware_uses_these_pins_and_no_others() -> None:
