@@ -1,5 +1,6 @@
-"""``csv:FILE``: a line a touch, and one with empty cells for a frame without touches. Each line is
-written whole as it comes, so that a killed program leaves a readable file."""
+"""``csv:FILE``: a line a touch, and one with empty cells for a frame, or of ``--report drive`` a
+drive, without touches. Each line is written whole as it comes, so that a killed program leaves a
+readable file."""
 
 from __future__ import annotations
 
@@ -17,7 +18,9 @@ TOUCH = (
     "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence",
     "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2", "long_x_mm", "long_y_mm",
 )  # fmt: skip
-COLUMNS = ("frame", "time_s", "time_unix_s", *TOUCH, "found", "refused", "events")
+HEAD = ("frame", "time_s", "time_unix_s")
+DRIVE = ("drive", "vx_mm_per_s", "vy_mm_per_s", "confirmed")  # of a drive; empty in frames' lines
+COLUMNS = (*HEAD, *TOUCH, "found", "refused", "events", *DRIVE)
 
 
 class CsvSink:
@@ -29,13 +32,14 @@ class CsvSink:
 
     def write(self, told: Told) -> None:
         message = told.message
-        if message["type"] != "frame":
+        if message["type"] not in ("frame", "report"):
             return
-        head = [message["frame"], message["time_s"], message["time_unix_s"]]
-        events = " ".join(event["kind"] for event in message["events"])
-        tail = ["; ".join(message["found"]), message["refused"], events]
-        touches = message["touches"] or [dict.fromkeys(TOUCH)]
-        self._put([[*head, *(touch[name] for name in TOUCH), *tail] for touch in touches])
+        shared = {name: message.get(name) for name in (*HEAD, "drive", "refused")}
+        if message["type"] == "frame":
+            shared["found"] = "; ".join(message["found"])
+            shared["events"] = " ".join(event["kind"] for event in message["events"])
+        lines = [shared | touch for touch in message["touches"] or [{}]]
+        self._put([[line.get(name) for name in COLUMNS] for line in lines])
 
     def close(self) -> None:
         self._stream.close()

@@ -1,7 +1,8 @@
 """``foxglove:[//HOST[:8765]]``: a live server that the Foxglove application connects to.
 
 /touches carries the message of docs/reference/message.md with its schema, /notices the notices,
-/image a foxglove.RawImage where images are streamed.
+/reports touches after drives where those are reported, /image a foxglove.RawImage where images are
+streamed.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
 USAGE = "foxglove: or foxglove://HOST:PORT"
 PORT = 8765
 BACKLOG = 128  # messages a client that does not read is kept; the oldest go
+TOPICS = {"frame": "/touches", "report": "/reports", "notice": "/notices"}
 
 
 class FoxgloveSink:
@@ -42,12 +44,12 @@ class FoxgloveSink:
         defined = {"$defs": described["$defs"]}
         channels = {
             name: foxglove.Channel(
-                f"/{name}s" if name == "notice" else "/touches",
+                topic,
                 schema={"title": f"eitskin.{name}", **described["$defs"][name], **defined},
                 message_encoding="json",
                 context=context,
             )
-            for name in ("frame", "notice")
+            for name, topic in TOPICS.items()
         }
         self._channels: dict[str, Any] = channels
         self._pictures = RawImageChannel("/image", context=context)

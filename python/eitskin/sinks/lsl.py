@@ -1,12 +1,15 @@
 """``lsl:[NAME][?touches=N]``: a stream of the Lab Streaming Layer, one sample a frame.
 
 Float32 channels: the number of touches, then id, x_mm, y_mm, radius_mm, strength and force_n of the
-N strongest (8 where none is named), NaN where there is none.
+N strongest (8 where none is named), NaN where there is none. With ``--report drive`` a second
+stream, NAME-drives, from the first report on: double64 channels time_s and the number of touches,
+then id, confirmed, x_mm, y_mm, vx_mm_per_s, vy_mm_per_s and strength of each. Both are irregular.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Any
 from urllib.parse import quote
 
@@ -15,27 +18,62 @@ from eitskin.sinks.sink import Sink, Source, Told, or_nan, setting
 
 QUIET = "[log]\nlevel = -2\n"  # no lines of its own but of what goes wrong
 FIELDS = ("id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n")
-UNITS = {"x_mm": "mm", "y_mm": "mm", "radius_mm": "mm", "force_n": "N"}
+MOVING = ("id", "confirmed", "x_mm", "y_mm", "vx_mm_per_s", "vy_mm_per_s", "strength_s_per_m_mm2")
+UNITS = {
+    "time_s": "s", "x_mm": "mm", "y_mm": "mm", "radius_mm": "mm", "force_n": "N",
+    "vx_mm_per_s": "mm/s", "vy_mm_per_s": "mm/s",
+}  # fmt: skip
 
 
 class LslSink:
-    """An outlet; samples carry LSL's own clock at the time they are sent."""
+    """An outlet of frames, and one of drives where they are reported; samples carry LSL's own clock
+    at the time they are sent.
 
-    def __init__(self, outlet: Any, touches: int) -> None:
-        self._outlet, self._touches = outlet, touches
+    Raises:
+        RuntimeError: liblsl opens none.
+    """
+
+    def __init__(self, name: str, source: Source, touches: int) -> None:
+        self._name, self._touches = name, touches
+        self._unique = quote(source.url, safe="")
+        self._frames = self._outlet(name, ["touches"], FIELDS, "float32")
+        self._drives: Any = None
 
     def write(self, told: Told) -> None:
-        if told.frame is None:
-            return
-        touches = told.message["touches"] or []
-        sample = [float(len(touches))]
-        for number in range(self._touches):
-            one = touches[number] if number < len(touches) else {}
-            sample += [or_nan(one.get(name)) for name in FIELDS]
-        self._outlet.push_sample(sample)
+        if told.frame is not None:
+            self._push(self._frames, [], told.message["touches"] or [], FIELDS)
+        elif told.report is not None:
+            if self._drives is None:
+                name, first = f"{self._name}-drives", ["time_s", "touches"]
+                self._drives = self._outlet(name, first, MOVING, "double64")
+            message = told.message
+            self._push(self._drives, [message["time_s"]], message["touches"], MOVING)
 
     def close(self) -> None:
-        self._outlet = None  # its destructor says goodbye
+        self._frames = self._drives = None  # their destructors say goodbye
+
+    def _outlet(self, name: str, first: list[str], fields: Sequence[str], kind: str) -> Any:
+        from pylsl import StreamInfo, StreamOutlet
+
+        labels = [*first, *(f"{field}_{k}" for k in range(self._touches) for field in fields)]
+        unique = self._unique + name.removeprefix(self._name)
+        info = StreamInfo(name, "Touches", len(labels), 0.0, kind, unique)
+        channels = info.desc().append_child("channels")
+        for label in labels:
+            channel = channels.append_child("channel")
+            channel.append_child_value("label", label)
+            unit = UNITS.get(label) or UNITS.get(label.rpartition("_")[0], "")
+            channel.append_child_value("unit", unit)
+        return StreamOutlet(info, max_buffered=10)
+
+    def _push(
+        self, outlet: Any, first: list[float], touches: list[Any], fields: Sequence[str]
+    ) -> None:
+        sample = [*first, float(len(touches))]
+        for number in range(self._touches):
+            one = touches[number] if number < len(touches) else {}
+            sample += [or_nan(one.get(name)) for name in fields]
+        outlet.push_sample(sample)
 
 
 def open_sink(url: str, source: Source) -> Sink:
@@ -51,21 +89,12 @@ def open_sink(url: str, source: Source) -> Sink:
     if "/" in name:
         raise UsageError(f"--to {url}: write  lsl:NAME , the stream's name without slashes")
     try:
-        from pylsl import StreamInfo, StreamOutlet, set_config_content
+        from pylsl import set_config_content
     except (ImportError, RuntimeError, OSError):
         raise missing_extra("lsl", "pylsl with liblsl") from None
     if "LSLAPICFG" not in os.environ:
         set_config_content(QUIET)
-    labels = ["touches", *(f"{field}_{k}" for k in range(touches) for field in FIELDS)]
     try:
-        info = StreamInfo(
-            name or "eitskin", "Touches", len(labels), 0.0, "float32", quote(source.url, safe="")
-        )
-        channels = info.desc().append_child("channels")
-        for label in labels:
-            channel = channels.append_child("channel")
-            channel.append_child_value("label", label)
-            channel.append_child_value("unit", UNITS.get(label.rpartition("_")[0], ""))
-        return LslSink(StreamOutlet(info, max_buffered=10), touches)
+        return LslSink(name or "eitskin", source, touches)
     except Exception as error:
         raise SinkError(f"--to {url}: liblsl opens no outlet ({error}); try another name") from None

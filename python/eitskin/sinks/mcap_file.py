@@ -1,8 +1,9 @@
 """``mcap:FILE``: a recording of ROS 2 messages (CDR), for ROS, Foxglove and the like.
 
-/touches eitskin_msgs/msg/TouchArray, /image sensor_msgs/msg/Image where images are streamed,
-/diagnostics diagnostic_msgs/msg/DiagnosticArray when they change. The file is written in chunks of
-about a second: a killed program loses the last. The list of chunks stays in memory until the end.
+/touches eitskin_msgs/msg/TouchArray, /reports eitskin_msgs/msg/Report with ``--report drive``,
+/image sensor_msgs/msg/Image where images are streamed, /diagnostics
+diagnostic_msgs/msg/DiagnosticArray when they change. The file is written in chunks of about a
+second: a killed program loses the last. The list of chunks stays in memory until the end.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from eitskin.sinks import ros2
 from eitskin.sinks.csv_file import new_file
 from eitskin.sinks.sink import Sink, Source, Told
 
-CHUNK_BYTES, IMAGES_BYTES = 1 << 14, 1 << 18  # of touches alone, and with images
+CHUNK_BYTES, REPORTS_BYTES, IMAGES_BYTES = 1 << 14, 1 << 16, 1 << 18  # touches alone, with these
 FRAME_ID = "skin"
 
 
@@ -29,12 +30,17 @@ class McapSink:
 
     def write(self, told: Told) -> None:
         message = told.message
-        if message["type"] in ("summary", "report"):
+        if message["type"] == "summary":
             return
         if self._writer is None:
-            self._begin(told.frame is not None and told.frame.image is not None)
+            images = told.frame is not None and told.frame.image is not None
+            self._begin(IMAGES_BYTES if images else REPORTS_BYTES if told.report else CHUNK_BYTES)
         time_s = message["time_unix_s"] if message["time_unix_s"] is not None else message["time_s"]
         now = round(1e9 * (time_s or 0.0))
+        if told.report is not None:
+            table = ros2.report(message, now, FRAME_ID)
+            self._put("/reports", "eitskin_msgs/msg/Report", table, now)
+            return
         if told.frame is not None:
             table = ros2.touch_array(message, now, FRAME_ID)
             self._put("/touches", "eitskin_msgs/msg/TouchArray", table, now)
@@ -49,14 +55,14 @@ class McapSink:
 
     def close(self) -> None:
         if self._writer is None:
-            self._begin(False)
+            self._begin(CHUNK_BYTES)
         self._writer.finish()
         self._stream.close()
 
-    def _begin(self, images: bool) -> None:
+    def _begin(self, chunk_bytes: int) -> None:
         from mcap_ros2.writer import Writer
 
-        self._writer = Writer(self._stream, chunk_size=IMAGES_BYTES if images else CHUNK_BYTES)
+        self._writer = Writer(self._stream, chunk_size=chunk_bytes)
         self._types = {
             name: self._writer.register_msgdef(name, text)
             for name, text in ros2.definitions().items()

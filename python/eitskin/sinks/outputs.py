@@ -19,6 +19,7 @@ from eitskin.sinks.sink import Dropped, Sink, Source, Told, without_password
 
 ENTRY_POINT_GROUP = "eitskin.sinks"
 ROOM = 64  # frames: more than a second
+DRIVES = 16  # reports of as many drives wait beside each frame
 PATIENCE_S = 2.0
 ENDING_S = 3.0  # for all sinks together
 
@@ -125,6 +126,7 @@ class Queue:
         self._url, self._sink = without_password(url), sink
         self._say, self._room = say, room
         self._waiting: deque[Told] = deque()
+        self._reports = 0  # of those
         self._changed = threading.Condition()
         self._ending = self._slow = False
         self._sent = self._dropped = self._failed = 0
@@ -135,15 +137,21 @@ class Queue:
     def put(self, told: Told, patience_s: float) -> None:
         """Queue it, or where there is no room, not within the patience either, drop and count it; a
         sink that took nothing through all of that is not waited for again until it does."""
+        is_report = told.report is not None
+
+        def room() -> bool:
+            if is_report:
+                return self._reports < DRIVES * self._room
+            return len(self._waiting) - self._reports < self._room
+
         with self._changed:
-            if len(self._waiting) >= self._room and patience_s and not self._slow:
-                self._slow = not self._changed.wait_for(
-                    lambda: len(self._waiting) < self._room, patience_s
-                )
-            if self._ending or len(self._waiting) >= self._room:
+            if patience_s and not self._slow and not room():
+                self._slow = not self._changed.wait_for(room, patience_s)
+            if self._ending or not room():
                 self._dropped += 1
                 return
             self._waiting.append(told)
+            self._reports += is_report
             self._changed.notify_all()
 
     def begin_end(self) -> None:
@@ -158,6 +166,7 @@ class Queue:
         with self._changed:
             self._dropped += len(self._waiting)
             self._waiting.clear()
+            self._reports = 0
 
     @property
     def counts(self) -> dict[str, Any]:
@@ -177,6 +186,7 @@ class Queue:
                 if not self._waiting:
                     break
                 told = self._waiting.popleft()
+                self._reports -= told.report is not None
                 self._slow = False
                 self._changed.notify_all()
             try:

@@ -1,5 +1,5 @@
-"""Messages of ROS 2 as plain tables: a touch array (``msg/``), sensor_msgs/Image and
-diagnostic_msgs/DiagnosticArray.
+"""Messages of ROS 2 as plain tables: a touch array and a report after a drive (``msg/``),
+sensor_msgs/Image and diagnostic_msgs/DiagnosticArray.
 
 ``mcap:`` writes them, and the node in examples/python/ros2 publishes them. They know nothing of
 ROS.
@@ -56,9 +56,12 @@ def definitions() -> dict[str, str]:
     folder = files("eitskin.sinks").joinpath("msg")
     touch = folder.joinpath("Touch.msg").read_text("utf-8")
     array = folder.joinpath("TouchArray.msg").read_text("utf-8")
+    moving = folder.joinpath("MovingTouch.msg").read_text("utf-8")
+    report = folder.joinpath("Report.msg").read_text("utf-8")
     diagnostic = {"diagnostic_msgs/DiagnosticStatus": STATUS, "diagnostic_msgs/KeyValue": KEY_VALUE}
     return {
         "eitskin_msgs/msg/TouchArray": _whole(array, {"eitskin_msgs/Touch": touch}),
+        "eitskin_msgs/msg/Report": _whole(report, {"eitskin_msgs/MovingTouch": moving}),
         "sensor_msgs/msg/Image": _whole(IMAGE, {}),
         "diagnostic_msgs/msg/DiagnosticArray": _whole(DIAGNOSTICS, diagnostic),
     }
@@ -91,6 +94,12 @@ def touch_array(message: Table, time_ns: int, frame_id: str) -> Table:
         "refused": message["refused"] is not None,
         "touches": touches,
     }
+
+
+def report(message: Table, time_ns: int, frame_id: str) -> Table:
+    """eitskin_msgs/Report of a message of touches after a drive."""
+    head = {name: message[name] for name in ("frame", "drive", "time_s", "touches")}
+    return {"header": header(time_ns, frame_id)} | head
 
 
 def image(grid: Grid, values: npt.ArrayLike, time_ns: int, frame_id: str) -> Table:

@@ -2,7 +2,8 @@
 
 A bundle a frame: source, alive with all ids, a set for each touch (x and y of the skin's bounding
 box, 0 to 1, y downwards as TUIO has it; speed in boxes a second, acceleration in boxes a second
-squared), fseq. After the last frame one with no touch.
+squared), fseq. Of ``--report drive`` a bundle a drive, with its ids and speeds; of a frame without
+reports, and after the last, one with no touch.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ class Cursors:
         self._before: dict[int, State] = {}
 
     def messages(self, touches: list[dict[str, Any]], time_s: float) -> list[tuple[str, list[Any]]]:
-        """Of the frame at ``time_s``."""
+        """Of the touches at ``time_s``, of a frame or after a drive."""
         self._frame += 1
         elapsed_s, self._time_s = time_s - self._time_s, time_s
         now = {t["id"]: self._state(t, elapsed_s) for t in touches}
@@ -48,7 +49,7 @@ class Cursors:
 
     @property
     def some(self) -> bool:
-        """Whether the last frame had touches."""
+        """Whether there were touches last."""
         return bool(self._before)
 
     def _state(self, touch: dict[str, Any], elapsed_s: float) -> State:
@@ -56,24 +57,38 @@ class Cursors:
         x = min(max((touch["x_mm"] - x0) / (x1 - x0), 0.0), 1.0)
         y = min(max((y1 - touch["y_mm"]) / (y1 - y0), 0.0), 1.0)
         before = self._before.get(touch["id"])
-        if before is None or elapsed_s <= 0:
+        if "vx_mm_per_s" in touch:
+            speed_x = touch["vx_mm_per_s"] / (x1 - x0)
+            speed_y = -touch["vy_mm_per_s"] / (y1 - y0)
+        elif before is None or elapsed_s <= 0:
             return x, y, 0.0, 0.0, 0.0
-        speed_x, speed_y = (x - before[0]) / elapsed_s, (y - before[1]) / elapsed_s
+        else:
+            speed_x, speed_y = (x - before[0]) / elapsed_s, (y - before[1]) / elapsed_s
+        if before is None or elapsed_s <= 0:
+            return x, y, speed_x, speed_y, 0.0
         change = math.hypot(speed_x, speed_y) - math.hypot(before[2], before[3])
         return x, y, speed_x, speed_y, change / elapsed_s
 
 
 class TuioSink:
-    """A datagram a frame."""
+    """A datagram a frame, or a drive where those are reported."""
 
     def __init__(self, target: socket.socket, cursors: Cursors) -> None:
         self._socket, self._cursors, self._time_s = target, cursors, 0.0
+        self._reported: int | None = None  # the frame of the last report
 
     def write(self, told: Told) -> None:
         message = told.message
-        if message["type"] in ("notice", "report"):
+        if message["type"] == "notice":
             return
         touches = message.get("touches") or []
+        if message["type"] == "report":
+            self._reported = message["frame"]
+        elif message["type"] == "frame" and self._reported is not None:
+            # While there are touches, every drive reports: now there is none, lost packets or not.
+            if message["frame"] <= self._reported:
+                return
+            touches = []
         self._time_s = message.get("time_s", self._time_s)
         data = bundle(self._cursors.messages(touches, self._time_s))
         try:

@@ -1,5 +1,5 @@
-"""The fixture that every test here takes."""
+"""The fixtures that tests here take."""
 
-from swipe_frames import swipe
+from swipe_frames import drives, swipe
 
-__all__ = ["swipe"]
+__all__ = ["drives", "swipe"]

@@ -1,6 +1,7 @@
-"""Frames of a swipe on a simulated skin, for every sink."""
+"""Frames of a swipe on a simulated skin, and reports after its drives, for every sink."""
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,29 +9,59 @@ from typing import Any
 import pytest
 
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.frame import Frame
+from eitskin.live.frame import Frame, Report
 from eitskin.live.session import Session, SessionSettings
 from eitskin.sinks.sink import Source
 
 os.environ.setdefault("LSLAPICFG", str(Path(__file__).with_name("lsl_local.cfg")))
 
 
+FRAMES_OF_DRIVES = 8
+
+
 @dataclass(frozen=True)
 class Swipe:
     """What was seen, and on which skin."""
 
-    frames: list[Frame]
+    items: list[Frame | Report]
     source: Source
+
+    @property
+    def frames(self) -> list[Frame]:
+        return [item for item in self.items if isinstance(item, Frame)]
+
+    @property
+    def reports(self) -> list[Report]:
+        return [item for item in self.items if isinstance(item, Report)]
 
     @property
     def touches(self) -> list[list[Any]]:
         return [list(frame.touches) for frame in self.frames]
 
 
+def seen(session: Session, frames: int) -> Iterator[Frame | Report]:
+    """The first ``frames`` of a session, and its reports."""
+    for item in session.frames():
+        if isinstance(item, Frame | Report):
+            yield item
+        frames -= isinstance(item, Frame)
+        if frames == 0:
+            return
+
+
 @pytest.fixture(scope="session")
 def swipe() -> Swipe:
     settings = SessionSettings(mode=Stream.TOUCHES | Stream.IMAGE)
     with Session("sim:swipe", settings) as session:
-        frames = [item for item in session.frames() if isinstance(item, Frame)]
+        items = list(seen(session, 40))
         assert session.known is not None
-        return Swipe(frames, Source(session.url, "simulated", session.known.model))
+        return Swipe(items, Source(session.url, "simulated", session.known.model))
+
+
+@pytest.fixture(scope="session")
+def drives(swipe: Swipe) -> Swipe:
+    """The swipe's first frames, and reports, of ``--report drive``."""
+    with Session("sim:swipe", SessionSettings(mode=Stream.TOUCHES, report="drive")) as session:
+        found = Swipe(list(seen(session, FRAMES_OF_DRIVES)), swipe.source)
+    assert sum(bool(report.touches) for report in found.reports) > 40
+    return found

@@ -55,7 +55,7 @@ def classes(definition: str) -> tuple[type, dict[str, type]]:
     return message_class(first, made), made
 
 
-def test_messages_take_what_the_conversion_sets(swipe: Swipe) -> None:
+def test_messages_take_what_the_conversion_sets(swipe: Swipe, drives: Swipe) -> None:
     sys.path.insert(0, str(NODE / "eitskin_ros"))
     try:
         from eitskin_ros.conversion import fill
@@ -74,6 +74,13 @@ def test_messages_take_what_the_conversion_sets(swipe: Swipe) -> None:
     assert message.touches[0].x_mm == touch.x_mm and np.isnan(message.touches[0].force_n)
     assert message.touches[0].covariance_mm2[0] == touch.x_variance_mm2
 
+    report_class, parts = classes(defined["eitskin_msgs/msg/Report"])
+    report = drives.reports[-1]
+    table = ros2.report(report.message(), now, "skin")
+    message = fill(report_class(), table, {"touches": parts["eitskin_msgs/MovingTouch"]})
+    assert (message.time_s, message.drive) == (report.time_s, report.live.followed.head.drive)
+    assert message.touches[0].vx_mm_per_s == report.touches[0].vx_mm_per_s
+
     image_class, _ = classes(defined["sensor_msgs/msg/Image"])
     assert swipe.source.model is not None and frame.image is not None
     table = ros2.image(swipe.source.model.grid, frame.image, now, "skin")
@@ -91,4 +98,4 @@ def test_messages_take_what_the_conversion_sets(swipe: Swipe) -> None:
 def test_the_workspace_has_the_messages_that_ship() -> None:
     shipped = {path.name: path.read_text() for path in ROOT.glob("python/eitskin/sinks/msg/*.msg")}
     built = {path.name: path.read_text() for path in NODE.glob("eitskin_msgs/msg/*.msg")}
-    assert shipped == built and len(built) == 2
+    assert shipped == built and len(built) == 4

@@ -12,15 +12,18 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 from swipe_frames import Swipe
 
 import eitskin
+from eitskin.device.wire.link_table import FollowedTouch
+from eitskin.live.frame import Frame
 from eitskin.live.message import schema
 from eitskin.sinks.outputs import Outputs
 
@@ -29,7 +32,7 @@ SUMMARY = {
     "solve_us_p99": None, "link": {}, "board": None, "truth": None,
 }  # fmt: skip
 WAIT_S = 20.0
-VALID = jsonschema.Draft202012Validator(schema())
+VALID = Draft202012Validator(schema())
 
 
 def free_port(kind: int = socket.SOCK_STREAM) -> int:
@@ -41,11 +44,16 @@ def free_port(kind: int = socket.SOCK_STREAM) -> int:
 def send(swipe: Swipe, url: str) -> None:
     """The whole swipe, and that all of it was sent."""
     with Outputs([url], swipe.source) as outputs:
-        for frame in swipe.frames:
-            outputs.put(frame)
+        for item in swipe.items:
+            outputs.put(item)
         (counts,) = outputs.end(SUMMARY)
-    expected = {"url": url, "sent": len(swipe.frames) + 1, "dropped": 0, "failed": 0, "error": None}
+    expected = {"url": url, "sent": len(swipe.items) + 1, "dropped": 0, "failed": 0, "error": None}
     assert counts == expected
+
+
+def with_reports(swipe: Swipe, drives: Swipe) -> Swipe:
+    """The whole swipe, and after it the reports of its beginning."""
+    return Swipe([*swipe.items, *drives.reports], swipe.source)
 
 
 def check(messages: list[dict[str, Any]], swipe: Swipe) -> None:
@@ -151,6 +159,33 @@ def test_tuio(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
                 moved = (x - last[touch.id][0]) * 20  # frames a second
                 assert speed_x == pytest.approx(moved, abs=1e-4)
         last = {one[0]: (one[1], one[2]) for one in bundle["set"]}
+
+
+def test_tuio_of_drives(drives: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
+    """A bundle a report, with its speeds; of frames only of those without, and with no touch."""
+    port, heard = osc
+    send(drives, f"tuio://127.0.0.1:{port}")
+    x0, y0, x1, y1 = drives.source.model.skin.outline.bounding_box_mm  # type: ignore[union-attr]
+    expected, reported = list[list[Any]](), 0
+    for item in drives.items:
+        if isinstance(item, Frame):
+            expected += [[]] if item.number > reported else []
+            continue
+        reported = item.live.followed.head.frame
+        expected.append([
+            pytest.approx((
+                one.id, (one.x_mm - x0) / (x1 - x0), (y1 - one.y_mm) / (y1 - y0),
+                one.vx_mm_per_s / (x1 - x0), -one.vy_mm_per_s / (y1 - y0),
+            ), rel=1e-5)
+            for one in item.touches
+        ])  # fmt: skip
+    assert len(expected) > len(drives.reports)
+    told = list[list[Any]]()
+    while len(told) < len(expected) + 1:
+        _, kind, *values = heard.get(timeout=WAIT_S)
+        told += [[]] if kind == "source" else []
+        told[-1] += [tuple(values[:5])] if kind == "set" else []
+    assert told == [*expected, []]
 
 
 def test_tuio_lifts_its_fingers_where_the_stream_is_cut(
@@ -290,11 +325,41 @@ def test_lsl(swipe: Swipe) -> None:
         inlet.close_stream()
 
 
-def test_csv(swipe: Swipe, tmp_path: Path) -> None:
+def test_lsl_of_drives(drives: Swipe) -> None:
+    """A stream of their own, from the first report on."""
+    import pylsl
+
+    with Outputs(["lsl:table?touches=2"], drives.source) as outputs:
+        outputs.put(drives.reports[0])
+        (info,) = pylsl.resolve_byprop("name", "table-drives", timeout=WAIT_S)
+        assert (info.nominal_srate(), info.channel_count()) == (0, 2 + 2 * 7)
+        inlet = pylsl.StreamInlet(info)
+        inlet.open_stream(timeout=WAIT_S)
+        for report in drives.reports[1:]:
+            outputs.put(report)
+        for report in drives.reports[1:]:
+            (touch,) = report.touches
+            sample, _ = inlet.pull_sample(timeout=WAIT_S)
+            speed = [touch.vx_mm_per_s, touch.vy_mm_per_s, touch.strength_s_per_m_mm2]
+            place = [touch.id, touch.confirmed, touch.x_mm, touch.y_mm]
+            assert sample[:9] == [report.time_s, 1, *place, *speed] and np.isnan(sample[9:]).all()
+        inlet.close_stream()
+
+
+def test_csv(swipe: Swipe, drives: Swipe, tmp_path: Path) -> None:
     path = tmp_path / "touches.csv"
-    send(swipe, f"csv:{path}")
+    send(with_reports(swipe, drives), f"csv:{path}")
     with path.open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
+        lines = list(csv.DictReader(stream))
+    rows = [line for line in lines if not line["drive"]]
+    names = ("time_s", "drive", "id", "x_mm", "vx_mm_per_s", "vy_mm_per_s", "confirmed")
+    told_of_drives = [[line[name] for name in names] for line in lines[len(rows) :]]
+    assert told_of_drives == [
+        [str(one.time_s), str(one.live.followed.head.drive)]
+        + [str(getattr(touch, name)) if touch else "" for name in names[2:]]
+        for one in drives.reports
+        for touch in one.touches or [None]
+    ]
     found = [row for row in rows if row["id"]]
     assert len({row["frame"] for row in rows}) == len(swipe.frames)
     told = [(int(row["id"]), float(row["x_mm"])) for row in found]
@@ -302,12 +367,12 @@ def test_csv(swipe: Swipe, tmp_path: Path) -> None:
     assert {row["force_n"] for row in rows} == {""}
 
 
-def test_mcap(swipe: Swipe, tmp_path: Path) -> None:
+def test_mcap(swipe: Swipe, drives: Swipe, tmp_path: Path) -> None:
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
 
     path = tmp_path / "touches.mcap"
-    send(swipe, f"mcap:{path}")
+    send(with_reports(swipe, drives), f"mcap:{path}")
     came: dict[str, list[Any]] = {}
     stamps = []
     with path.open("rb") as stream:
@@ -325,6 +390,14 @@ def test_mcap(swipe: Swipe, tmp_path: Path) -> None:
     assert image.encoding == "32FC1" and image.step == 4 * image.width
     np.testing.assert_array_equal(grid.values(picture), swipe.frames[20].image)
     assert [one.level for one in came["/diagnostics"][0].status] == [0]
+    assert [(one.frame, one.drive, one.time_s) for one in came["/reports"]] == [
+        (one.live.followed.head.frame, one.live.followed.head.drive, one.time_s)
+        for one in drives.reports
+    ]
+    for message, report in zip(came["/reports"], drives.reports, strict=True):
+        names = [field.name for field in fields(FollowedTouch)]
+        told = [tuple(getattr(touch, name) for name in names) for touch in message.touches]
+        assert told == [astuple(touch) for touch in report.touches]
 
 
 KILLED = """
@@ -360,7 +433,7 @@ def test_files_of_a_killed_program_can_be_read(swipe: Swipe, tmp_path: Path) -> 
     assert frames == [frame.number for frame in swipe.frames[: len(frames)]]
 
 
-def test_foxglove(swipe: Swipe) -> None:
+def test_foxglove(swipe: Swipe, drives: Swipe) -> None:
     """By the protocol that Foxglove publishes: text for what there is, binary for messages."""
     from websockets.sync.client import connect
 
@@ -374,17 +447,17 @@ def test_foxglove(swipe: Swipe) -> None:
         ) as client,
     ):
         channels: dict[str, Any] = {}
-        while not {"/touches", "/image"} <= set(channels):
+        topics = ("/touches", "/image", "/reports")
+        while not set(topics) <= set(channels):
             text = json.loads(client.recv(timeout=WAIT_S))
             if text["op"] == "advertise":
                 channels |= {one["topic"]: one for one in text["channels"]}
         assert channels["/touches"]["encoding"] == "json"
-        wanted = [
-            {"id": k, "channelId": channels[topic]["id"]}
-            for k, topic in enumerate(("/touches", "/image"))
-        ]
+        described = json.loads(channels["/reports"]["schema"])
+        Draft202012Validator.check_schema(described)
+        wanted = [{"id": k, "channelId": channels[topic]["id"]} for k, topic in enumerate(topics)]
         client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
-        came: dict[int, list[bytes]] = {0: [], 1: []}
+        came: dict[int, list[bytes]] = {0: [], 1: [], 2: []}
 
         def take(timeout_s: float) -> None:
             data = client.recv(timeout=timeout_s)
@@ -395,12 +468,15 @@ def test_foxglove(swipe: Swipe) -> None:
             outputs.put(swipe.frames[0])
             with contextlib.suppress(TimeoutError):
                 take(0.05)
-        for frame in swipe.frames[1:]:
-            outputs.put(frame)
-        while json.loads(came[0][-1])["frame"] != swipe.frames[-1].number:
+        for item in (*swipe.frames[1:], *drives.reports):
+            outputs.put(item)
+        while len(came[2]) < len(drives.reports):
             take(WAIT_S)
         assert came[1]
     told = [json.loads(payload) for payload in came[0][-len(swipe.frames) + 1 :]]
     for message in told:
         VALID.validate(message)
     assert [m["frame"] for m in told] == [frame.number for frame in swipe.frames[1:]]
+    reports = [json.loads(payload) for payload in came[2]]
+    assert reports == [report.message() for report in drives.reports]
+    assert all(Draft202012Validator(described).is_valid(report) for report in reports)
