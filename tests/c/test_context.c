@@ -219,10 +219,11 @@ static void default_options(void)
     o.detection_factor = usual.detection_factor; /* and nothing else */
     o.track_confirm = o.track_hold = 0;
     o.track_smooth = 0;
-    const size_t padded = offsetof(eits_options, touch_sweeps) + sizeof o.touch_sweeps,
-                 on = offsetof(eits_options, follow_mm);
-    CHECK(memcmp(&o, &usual, padded) == 0 &&
-          memcmp((char *)&o + on, (const char *)&usual + on, sizeof o - on) == 0);
+    uint32_t count = 0;
+    const eits_option *option = eits_option_table(&count);
+    for (uint32_t k = 0; k < count; ++k)
+        CHECK(memcmp((const char *)&o + option[k].offset, (const char *)&usual + option[k].offset,
+                     option[k].size) == 0);
     small_model_free(&made);
 }
 
