@@ -75,7 +75,8 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Reconstruct all frames; those that cannot be used are named, and the others are still done
     and written."""
-    from eitskin.reconstruct import ReconstructSettings, reconstruct_frames, to_json, to_text
+    from eitskin.reconstruct.report import to_json, to_text
+    from eitskin.reconstruct.steps import ReconstructSettings, reconstruct_frames
 
     changes: dict[str, Any] = {"sign": options.sign, "warm_start": options.warm}
     if options.second_pass:

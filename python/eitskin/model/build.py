@@ -14,7 +14,8 @@ from eitskin import __version__
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid, grid_for
-from eitskin.model.eitm import MAX_PIXELS, MAX_RANK, encode_model
+from eitskin.model.eitm import encode_model
+from eitskin.model.eitm_sections import MAX_PIXELS, MAX_RANK
 from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
 from eitskin.model.reduction import (
     DEFAULT_COLUMN_POWER,

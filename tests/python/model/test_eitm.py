@@ -13,7 +13,7 @@ import pytest
 from eitm_bytes import HEADER_SIZE, entry_place, sealed, sections_of
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import EitskinError, FileError, FrameError, ModelError
-from eitskin.model import eitm
+from eitskin.model import eitm_sections
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.eitm import decode_model, encode_model, encode_tested, load_model, save_model
 from eitskin.skin.protocol import in_order, table
@@ -241,7 +241,7 @@ def without(name: str, storage: str = "f32") -> bytes:
     return sealed(blob)
 
 
-@pytest.mark.parametrize("name", eitm.REQUIRED)
+@pytest.mark.parametrize("name", eitm_sections.REQUIRED)
 def test_a_missing_section_is_named(name: str) -> None:
     assert f"section {name!r} is missing" in refusal(without(name))
 

@@ -92,7 +92,7 @@ def test_both_readers_refuse_what_is_out_of_range(
         ModelError, match=r"calibration \(section 'LOAD'\) that is out of range; calibrate again"
     ):
         decode_load(content, "made")
-    monkeypatch.setattr("eitskin.model.eitm.encode_load", lambda _: content)
+    monkeypatch.setattr("eitskin.model.eitm_sections.encode_load", lambda _: content)
     blob = encode_model(replace(prebuilt()[0], load=law()))
     with pytest.raises(ModelError):
         decode_model(blob, "made")

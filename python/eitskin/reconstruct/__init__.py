@@ -1,0 +1,1 @@
+"""``eitskin reconstruct``: its steps, and what it says of them."""

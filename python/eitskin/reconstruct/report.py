@@ -1,0 +1,126 @@
+"""What came of recorded frames, as a table for people and as a message for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from eitskin.core.results import NEWTONS_PER_GRAM, Reconstruction, solve_text
+from eitskin.live.message import frame_table, head, known
+from eitskin.reconstruct.steps import ReconstructOutcome
+
+if TYPE_CHECKING:
+    from eitskin.scoring.score import FrameScore
+
+
+def to_text(outcome: ReconstructOutcome) -> str:
+    """A table of the touches, then what they cost and how true they are."""
+    results, scores = outcome.results, outcome.scores
+    weighed = any(touch.force_n for result in results.values() for touch in result.touches)
+    lines = [
+        f"frame       touch    x mm     y mm  radius mm  strength S/m mm2{'    load g' * weighed}  "
+        " error mm  solve"
+    ]
+    for number, result in results.items():
+        lines += _lines(outcome.frames.frame_name[number][:11], result, scores.get(number), weighed)
+    macs = [result.info.macs + result.info.touch_macs for result in results.values()]
+    cost = f"; median {np.median(macs) / 1e6:.2f} million MACs a frame" if any(macs) else ""
+    lines.append(f"{len(results)} frames, {len(outcome.refused)} refused{cost}")
+    if scores:
+        facts = summary(scores)
+        lines.append(
+            f"against the truth of {facts['frames']} frames: {facts['found']} of {facts['true']}"
+            f" touches found, {facts['false']} false; position error median"
+            f" {facts['position_median_mm']:.2f} mm, worst {facts['position_worst_mm']:.2f} mm;"
+            f" MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
+        )
+    return "\n".join(lines)
+
+
+def _lines(
+    label: str, result: Reconstruction, score: FrameScore | None, weighed: bool
+) -> Iterator[str]:
+    """A line a touch of one frame; a line where there is none, and one for what was found wrong."""
+    info = result.info
+    cost = solve_text(
+        info.iterations,
+        info.stop,
+        info.gap_rel,
+        info.macs + info.touch_macs,
+        info.solve_us + info.touch_us,
+    )
+    if not result.touches:
+        why = "no change above the noise" if info.stop == "below-threshold" else info.stop
+        yield f"{label:11} none ({why}); {cost}"
+    errors = {} if score is None else score.errors_mm
+    for k, touch in enumerate(result.touches):
+        error = 10 * " " if score is None else f"{errors[k]:10.2f}" if k in errors else "     false"
+        grams = f"{touch.force_n / NEWTONS_PER_GRAM:10.1f}" if weighed else ""
+        yield (
+            f"{'' if k else label:11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f}"
+            f" {touch.radius_mm:9.2f} {touch.strength_s_per_m_mm2:16.3f}{grams}  {error}"
+            f"{'' if k else f'  {cost}'}".rstrip()
+        )
+    if info.diagnostics:
+        yield f"{'':11} found: {'; '.join(info.found)}"
+
+
+def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
+    """The scores of all frames in a few numbers; positions are NaN where nothing was found."""
+    matchings = [score.matching for score in scores.values()]
+    distances = [d for matching in matchings for d in matching.distances_mm]
+    hits = sum(matching.hits for matching in matchings)
+    return {
+        "frames": len(scores),
+        "found": hits,
+        "true": hits + sum(matching.misses for matching in matchings),
+        "false": sum(matching.false_touches for matching in matchings),
+        "position_median_mm": float(np.median(distances)) if distances else float("nan"),
+        "position_worst_mm": float(np.max(distances)) if distances else float("nan"),
+        "miou_image": float(np.mean([score.miou_image for score in scores.values()])),
+        "miou_touches": float(np.mean([score.miou_touches for score in scores.values()])),
+    }
+
+
+def to_json(outcome: ReconstructOutcome) -> dict[str, Any]:
+    """Everything that the text says, and more, for programs: a message of type "reconstruction"
+    (docs/reference/message.md)."""
+    listed = [_entry(outcome, k) for k in sorted({*outcome.results, *outcome.refused})]
+    whole = head("reconstruction") | {
+        "model": outcome.model_name,
+        "engine": outcome.engine,
+        "frames": listed,
+    }
+    if outcome.point is not None:
+        settings = outcome.point.configuration.as_dict()
+        whole["settings"] = settings | {"mask_threshold": outcome.point.threshold}
+    if outcome.scores:
+        facts = summary(outcome.scores)
+        whole["summary"] = {key: known(value) for key, value in facts.items()}
+    return whole
+
+
+def _entry(outcome: ReconstructOutcome, number: int) -> dict[str, Any]:
+    """A frame's message."""
+    frames, result = outcome.frames, outcome.results.get(number)
+    time_s = None if frames.time_s is None else float(frames.time_s[number])
+    if result is None:
+        entry = frame_table(number, time_s=time_s, refused=outcome.refused[number])
+    else:
+        info = result.info
+        entry = frame_table(
+            number,
+            time_s=time_s,
+            touches=result.touches,
+            diagnostics=info.diagnostics_by_name,
+            found=info.found,
+            info=info.as_dict(),
+        )
+    entry["name"] = frames.frame_name[number]
+    if number in outcome.scores:
+        score = outcome.scores[number]
+        entry["miou_image"], entry["miou_touches"] = score.miou_image, score.miou_touches
+        entry["position_errors_mm"] = list(score.matching.distances_mm)
+    return entry
