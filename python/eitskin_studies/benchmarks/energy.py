@@ -19,19 +19,20 @@ KEPT_MIOU = 0.84
 RATES_HZ = (10.0, 1.0)
 SETTLE_MS = 5.0  # after the analog supply or the generator is switched on
 BIPOLAR_EFFICIENCY = 0.75  # of the isolated +-15 V supply
-UNCERTAIN = 0.3
+RAILS = {3.3: "3.3 V", 15.0: "+15 V", 30.0: "±15 V"}
 
 
 @dataclass(frozen=True)
 class Part:
     """``number`` of a part at ``volts``: typical ``active_ma`` each, and ``asleep_ma`` where it can
-    be told to sleep. ``bipolar``: from +-15 V, 30 V in all."""
+    be told to sleep, by the data sheet ``source``. ``bipolar``: from the +-15 V supply."""
 
     name: str
     number: int
     volts: float
     active_ma: float
     asleep_ma: float | None = None
+    source: str = ""
 
     @property
     def bipolar(self) -> bool:
@@ -44,16 +45,18 @@ class Part:
         return power / BIPOLAR_EFFICIENCY if self.bipolar else power
 
 
-RUNNING = Part("STM32F767, running from flash at 216 MHz", 1, 3.3, 110.0, 25.0)
+RUNNING = Part(
+    "STM32F767, running from flash at 216 MHz", 1, 3.3, 110.0, 25.0, "ST DS11532, supply current"
+)
 STOPPED_MW = 3.3 * 0.5
 ALWAYS = (
-    Part("STM32F767's ADC", 1, 3.3, 1.6, 0.0),
-    Part("AD9833", 1, 3.3, 4.5, 0.5),
-    Part("OPA320 (reference)", 1, 3.3, 1.45),
-    Part("OPA828 (filter, gain, source)", 3, 30.0, 5.5),
-    Part("AD8421 (receiver)", 1, 30.0, 2.0),
-    Part("ADG1206, logic at 3.3 V", 4, 15.0, 0.26),
-    Part("current into the skin, 0.5 mA amplitude", 1, 15.0, 0.32, 0.0),
+    Part("STM32F767's ADC", 1, 3.3, 1.6, 0.0, "ST DS11532, ADC"),
+    Part("AD9833", 1, 3.3, 4.5, 0.5, "Analog Devices AD9833; a draft of it: 20 mW at 3 V"),
+    Part("OPA320 (reference)", 1, 3.3, 1.45, None, "TI SBOS513"),
+    Part("OPA828 (filter, gain, source)", 3, 30.0, 5.5, None, "TI SBOS671"),
+    Part("AD8421 (receiver)", 1, 30.0, 2.0, None, "Analog Devices AD8421"),
+    Part("ADG1206, logic at 3.3 V", 4, 15.0, 0.26, None, "Analog Devices ADG1206"),
+    Part("current into the skin, 0.5 mA amplitude", 1, 15.0, 0.32, 0.0, "mean of a half-wave"),
 )
 
 
@@ -155,17 +158,17 @@ def on_the_front(result: EnergyResult) -> list[PointEnergy]:
 def parts_table() -> Tabular:
     """Each part's power."""
     rows = [
-        (RUNNING.name, f"{RUNNING.mw():.0f}", f"{RUNNING.mw(asleep=True):.0f} (WFI), 2 (stop)"),
-        *(
-            (
-                f"{one.number} {one.name}" if one.number > 1 else one.name,
-                f"{one.mw():.0f}",
-                "-" if one.asleep_ma is None else f"{one.mw(asleep=True):.0f}",
-            )
-            for one in ALWAYS
-        ),
+        (
+            f"{one.number} {one.name}" if one.number > 1 else one.name,
+            f"{one.active_ma:g} at {RAILS[one.volts]}",
+            one.source,
+            f"{one.mw():.0f}",
+            "-" if one.asleep_ma is None else f"{one.mw(asleep=True):.0f}",
+        )
+        for one in (RUNNING, *ALWAYS)
     ]
-    return ("part", "active, mW", "asleep, mW"), rows
+    rows[0] = (*rows[0][:-1], f"{rows[0][-1]} (WFI), {STOPPED_MW:.0f} (stop)")
+    return ("part", "each, mA", "data sheet", "active, mW", "asleep, mW"), rows
 
 
 def points_table(result: EnergyResult) -> Tabular:

@@ -21,13 +21,15 @@ WIDTH = 100
 Tabular: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]
 Filling: TypeAlias = tuple[dict[str, str], dict[str, Tabular]]
 
+NOT_MEASURED = "(not measured)"
 PARTS = Path(__file__).parent / "pages.toml"
+_CELL = re.compile(r"\{([^{}|]+)\|([^{}|]+)\|([^{}|]+)\}")
 _INTERVAL = re.compile(r" (?:\(-?[\d.]+ to [\d.]+\)|\[-?[\d.]+, [\d.]+\])")
 
 
 def fill_marks(page: Path, name: str, filling: Filling) -> None:
     """Write texts and tables between their marks in ``page``, so that none is ever copied by hand;
-    of the tables what ``pages.toml`` says of the page ``name``.
+    of the tables what ``pages.toml`` says of the page ``name``, and its sentences about them.
 
     Raises:
         FileError: the page cannot be read or written.
@@ -37,6 +39,10 @@ def fill_marks(page: Path, name: str, filling: Filling) -> None:
     texts, tables = filling
     parts = load_toml(PARTS, "list of what pages show").get(name, {})
     contents = {mark: _wrapped(content) for mark, content in texts.items()}
+    for mark, part in parts.items():
+        cells = _CELL.findall(part.get("text", ""))
+        if cells and all(table in tables for table, _, _ in cells):
+            contents[mark] = _wrapped(_said(part["text"], tables, f"{PARTS.name}: {name}.{mark}"))
     for mark, table in tables.items():
         part = parts.get(mark, {})
         if part.get("page", True):
@@ -56,6 +62,22 @@ def fill_marks(page: Path, name: str, filling: Filling) -> None:
 
         text = marked.sub(filled, text)
     write_bytes(page, text.encode("utf-8"))
+
+
+def _said(sentence: str, tables: Mapping[str, Tabular], where: str) -> str:
+    """``sentence`` with cells of ``tables``, without intervals, where it has {table|row|column}; a
+    row is named by its first cell, or by as many as tell it from others: "40, 200, off"."""
+
+    def cell(match: re.Match[str]) -> str:
+        (head, rows), row, column = tables[match[1]], match[2], match[3]
+        if column not in head:
+            raise ConfigError(f"{where}: no column {column!r}; {nearest(column, head)}")
+        found = [one for one in rows if row in (", ".join(one[:k]) for k in range(1, len(one) + 1))]
+        if len(found) > 1:
+            raise ConfigError(f"{where}: {len(found)} rows begin with {row!r}; name more cells")
+        return _INTERVAL.sub("", found[0][list(head).index(column)]) if found else NOT_MEASURED
+
+    return _CELL.sub(cell, sentence)
 
 
 def _wrapped(text: str) -> str:

@@ -58,8 +58,11 @@ def fills_its_page(
     write_page(outcome, folder, page, name, settings)
     text = page.read_text(encoding="utf-8")
     tables = {table.name for table in outcome.tables}
-    assert set(load_toml(PARTS, "list").get(name, {})) <= tables
-    assert set(re.findall("<!-- end (.*) -->", text)) <= {"command", *outcome.words, *tables}
+    parts = load_toml(PARTS, "list").get(name, {})
+    said = {mark for mark, part in parts.items() if "text" in part}
+    assert parts.keys() - said <= tables
+    marks = set(re.findall("<!-- end (.*) -->", text))
+    assert said <= marks <= {"command", *outcome.words, *tables, *said}
     assert (
         f"`eitskin study {name} -o out/{name} --share 0.01 --page docs/results/{name}.md`" in text
     )

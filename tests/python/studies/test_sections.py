@@ -23,6 +23,12 @@ intervals = false
 [some.left]
 page = false
 
+[said.words]
+text = "{t|a|value (95 %)} of {t|b, one|value (95 %)}, {t|d|what}"
+
+[unclear.words]
+text = "{t|a|value (95 %)}"
+
 [bad.t]
 columns = ["valve (95 %)"]
 """
@@ -44,6 +50,14 @@ def test_a_page_shows_its_part_of_a_table(page: Path) -> None:
     fill_marks(page, "other", ({}, {"t": TABLE}))
     assert page.read_text().count("| one |") == 2
     assert "| a | one | .5 (.4 to .6) |" in page.read_text()
+
+
+def test_a_sentence_takes_cells(page: Path) -> None:
+    fill_marks(page, "said", ({}, {"t": TABLE}))
+    assert "<!-- words -->\n.5 of 2, (not measured)\n" in page.read_text()
+    fill_marks(page, "said", ({}, {}))  # a part of the page's tables: the sentence stays
+    with pytest.raises(ConfigError, match="2 rows begin with 'a'"):
+        fill_marks(page, "unclear", ({}, {"t": (TABLE[0], TABLE[1] * 2)}))
 
 
 def test_what_is_not_there_is_named_and_nothing_is_written(page: Path) -> None:

@@ -20,7 +20,7 @@ from eitskin_studies.experiments.multitouch.measure import (
     prepare_mixed,
 )
 from eitskin_studies.experiments.multitouch.test_data import TouchData
-from eitskin_studies.experiments.multitouch.text import closing, conditions
+from eitskin_studies.experiments.multitouch.text import closing, conditions, doubtful
 
 TITLE = "Many touches at once: how many, where, and when to say that it cannot be told"
 
@@ -66,6 +66,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         {
             "conditions": conditions(touch_data, workspace),
             "closing": closing(counted, limited, ambiguous),
+            "doubtful": doubtful(ambiguous),
         },
     )
 

@@ -65,6 +65,19 @@ def closing(counted: CountedScenes, limited: Sequence[Limit], ambiguous: Ambigui
     )
 
 
+def doubtful(ambiguous: Ambiguities) -> str:
+    """What ``crowded`` says of the core's counts, by SNR."""
+    told = []
+    for snr_db in (HEADLINE_DB, 40.0):
+        one = calibration([f for f in ambiguous.mixed[NAMES[0]] if f.snr_db == snr_db])
+        told.append(
+            f"At {snr_db:g} dB {_pc(one.not_said)} of the mixed scenes are not reported as"
+            f" `crowded`, and {_pc(one.right_not_said)} of these are counted right, of the reported"
+            f" ones {_pc(one.right_said)}; {_pc(one.wrong_said)} of the wrong counts are reported."
+        )
+    return " ".join(told)
+
+
 def _sure(frames: Sequence[ScoredFrame]) -> str:
     one = calibration([frame for frame in frames if frame.snr_db >= HEADLINE_DB])
     return f"{_pc(one.not_said)}, {_pc(one.right_not_said)}"
