@@ -31,6 +31,23 @@ uint8_t fuzz_u8(fuzz_bytes *b);
 uint32_t fuzz_u32(fuzz_bytes *b);
 float fuzz_f32(fuzz_bytes *b);
 
+/* What comes out: replay.c sums it up by name and compares that with sums.txt, for a wrong number
+ * may break nothing that must hold. A fuzzer does nothing here. Every NaN is the same one. */
+void fuzz_note(const char *name, const void *bytes, size_t size);
+void fuzz_note_reals(const char *name, const eits_real *numbers, size_t count);
+void fuzz_note_floats(const char *name, const uint8_t *bytes, size_t count);
+
+/* The sums, if they are wanted: of each name one over what the inputs gave, in any order. What is
+ * made before the first input counts as one. */
+enum { FUZZ_SUMS = 16 };
+typedef struct fuzz_sum {
+    const char *name;
+    uint32_t input, all;
+} fuzz_sum;
+extern fuzz_sum fuzz_sums[FUZZ_SUMS + 1]; /* the last without a name */
+extern int fuzz_sums_wanted;
+void fuzz_end_input(void);
+
 /* What must hold after eits_reconstruct on `ctx` returned `status`: all numbers finite, the image
  * zero on an error, certificates not negative, the residual no worse than that of zero, limits
  * kept. `frame_macs`: what the frame stage alone may have cost. */

@@ -10,6 +10,7 @@
  * self-test, and it answers. */
 #include "fuzz.h"
 
+#include "app/follow.h"
 #include "app/main_loop.h"
 #include "fake_board.h"
 #include "skin_model.h"
@@ -72,6 +73,53 @@ static void check_solved(const eits_link_packet *packet)
         check_touches(rest, head.count);
 }
 
+static void check_followed(const eits_link_packet *packet)
+{
+    eits_packet_followed head;
+    MUST(packet->size >= sizeof head);
+    memcpy(&head, packet->payload, sizeof head);
+    const size_t one = sizeof(eits_packet_followed_touch);
+    MUST(head.count <= EITS_FAST_TOUCHES && packet->size == sizeof head + head.count * one);
+    for (uint32_t k = 0; k < head.count; ++k)
+        check_finite(packet->payload + sizeof head + k * one + 4, one / 4 - 1);
+}
+
+static const char *name_of(uint8_t type)
+{
+    static const struct {
+        uint8_t type;
+        const char *name;
+    } known[] = {{EITS_PACKET_INFO, "info"},     {EITS_PACKET_STATS, "stats"},
+                 {EITS_PACKET_HASHES, "hashes"}, {EITS_PACKET_RAW, "raw"},
+                 {EITS_PACKET_IMAGE, "image"},   {EITS_PACKET_TOUCHES, "touches"},
+                 {EITS_PACKET_EVENTS, "events"}, {EITS_PACKET_REPLY, "replies"},
+                 {EITS_PACKET_FAULT, "faults"},  {EITS_PACKET_FOLLOWED, "followed"}};
+    for (size_t k = 0; k < sizeof known / sizeof known[0]; ++k) {
+        if (known[k].type == type)
+            return known[k].name;
+    }
+    return "other";
+}
+
+/* Rows without a number have NaN; the program's version is no business of a sum. */
+static void note_packet(const eits_link_packet *packet)
+{
+    const char *name = name_of(packet->type);
+    const uint8_t *payload = packet->payload;
+    size_t from = 0;
+    fuzz_note(name, &packet->sequence, sizeof packet->sequence);
+    if (packet->type == EITS_PACKET_RAW) {
+        eits_packet_raw head;
+        memcpy(&head, payload, sizeof head);
+        fuzz_note(name, payload, sizeof head);
+        fuzz_note_floats(name, payload + sizeof head, head.n_rows);
+        from = sizeof head + 4u * head.n_rows;
+    } else if (packet->type == EITS_PACKET_INFO) {
+        from = offsetof(eits_packet_info, board);
+    }
+    fuzz_note(name, payload + from, packet->size - from);
+}
+
 static void check_packet(const eits_link_packet *packet)
 {
     const uint8_t *payload = packet->payload;
@@ -89,6 +137,8 @@ static void check_packet(const eits_link_packet *packet)
         }
     } else if (packet->type == EITS_PACKET_IMAGE || packet->type == EITS_PACKET_TOUCHES) {
         check_solved(packet);
+    } else if (packet->type == EITS_PACKET_FOLLOWED) {
+        check_followed(packet);
     } else if (packet->type == EITS_PACKET_EVENTS) {
         const size_t head = sizeof(eits_packet_events), one = sizeof(eits_packet_event);
         MUST(size >= head && (size - head) % one == 0);
@@ -127,6 +177,7 @@ static void listen(void)
         m.known = true;
         m.expected = packet.sequence + 1;
         check_packet(&packet);
+        note_packet(&packet);
     }
     MUST(decoder.crc_errors + decoder.framing_errors + decoder.version_errors + decoder.overruns ==
          0);
@@ -147,6 +198,11 @@ static double volts(void *user, const uint8_t electrodes[4], uint64_t at_ns)
 static void check_board(void)
 {
     const fw_scan_settings *s = &m.instrument.settings;
+    const uint32_t pins[] = {fake.spi_calls, fake.lines_calls, fake.bursts, fake.flash_steps,
+                             fake.erases,    fake.feeds,       fake.resets, fake.leds};
+    fuzz_note("pins", pins, sizeof pins);
+    fuzz_note("pins", &fake.generator, sizeof fake.generator);
+    fuzz_note("pins", fake.selected[0], 4);
     MUST(s->samples >= 4 && s->samples <= FW_MAX_SAMPLES && s->settle_us <= 50000);
     /* at 350 uA, 100 uA for each kilohertz */
     MUST(s->excitation_millihz >= 3500000 && s->excitation_millihz <= 250000000);
@@ -229,7 +285,7 @@ static size_t usual(uint8_t type, uint8_t *payload)
 {
     switch (type) {
     case EITS_PACKET_STREAM:
-        USUAL(eits_command_stream, .what = 15, .every = 1);
+        USUAL(eits_command_stream, .what = fw_follow_possible(&m.instrument) ? 31 : 15, .every = 1);
     case EITS_PACKET_TARE:
         USUAL(eits_command_tare, .frames = 4);
     case EITS_PACKET_SCAN:
@@ -574,8 +630,10 @@ static void check_end(void)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static bool ready;
-    if (!ready)
+    if (!ready) {
         prepare();
+        fuzz_end_input();
+    }
     ready = true;
     static fuzz_bytes in; /* of before the power went, too */
     in = (fuzz_bytes){data, data + size};

@@ -30,6 +30,21 @@ static void spoil(small_model *made, uint32_t which)
     small_model_seal(made);
 }
 
+/* What a taught model has: the rows' precision, of which each leans a little on all others. */
+static void add_precision(small_model *made)
+{
+    enum { PACKED = SMALL_FOLDED * (SMALL_FOLDED + 1) / 2 };
+    uint8_t section[4 * PACKED], *at = section;
+    uint64_t state = 3;
+    for (uint32_t i = 0; i < SMALL_FOLDED; ++i) {
+        for (uint32_t j = 0; j <= i; ++j, at += 4)
+            small_put_f32(at, i == j ? 2.0f : 0.1f * (float)small_random(&state));
+    }
+    const small_model bare = *made;
+    *made = small_model_with_section(&bare, "PREC", section, sizeof section);
+    free(bare.memory);
+}
+
 static void make_models(void)
 {
     for (uint32_t k = 0; k < MODELS; ++k) {
@@ -47,7 +62,10 @@ static void make_models(void)
         spec.fields = k % 2 == 0;
         blobs[k] = small_model_make(spec);
         spoil(&blobs[k], k);
+        if (k == 0 || k == 8)
+            add_precision(&blobs[k]);
         MUST(eits_model_open(&models[k], blobs[k].blob, blobs[k].size) == EITS_OK);
+        fuzz_note("models", blobs[k].blob, blobs[k].size);
     }
 }
 
@@ -202,6 +220,13 @@ static void check_reference(const twins *t)
     for (int k = 0; k < t->count; ++k)
         MUST(eits_get_reference(t->ctx[k], &of[k]) == EITS_OK);
     MUST(a->ready == b->ready && a->count == b->count);
+    const eits_real numbers[] = {a->v0_rms, a->gain, a->correlation, a->noise_v, a->lambda_noise};
+    fuzz_note("reference", &a->ready, sizeof a->ready);
+    fuzz_note("reference", &a->outliers, sizeof a->outliers);
+    if (a->ready) {
+        fuzz_note_reals("reference", numbers, sizeof numbers / sizeof numbers[0]);
+        fuzz_note_reals("reference", a->v0, SMALL_ROWS);
+    }
     if (!a->ready)
         return;
     MUST(same_bits(&a->gain, &b->gain, sizeof a->gain) &&

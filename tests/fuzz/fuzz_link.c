@@ -28,6 +28,8 @@ static void check_packet(const eits_link_decoder *decoder, const eits_link_packe
     const size_t wire = eits_link_encode(again, sizeof again, packet->type, packet->sequence,
                                          packet->payload, packet->size, NULL, 0);
     MUST(wire > 0 && wire <= EITS_LINK_ENCODED(packet->size));
+    fuzz_note("packets", packet->payload, packet->size);
+    fuzz_note("packets", again, wire);
     const size_t cut = packet->size / 2;
     static uint8_t halves[EITS_LINK_ENCODED(ROOM)];
     MUST(eits_link_encode(halves, sizeof halves, packet->type, packet->sequence, packet->payload,
@@ -111,6 +113,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
          a->framing_errors == b->framing_errors);
     MUST(a->overruns == b->overruns && a->version_errors == b->version_errors &&
          a->other_version == b->other_version);
+    const uint32_t counts[] = {a->packets,  a->crc_errors,     a->framing_errors,
+                               a->overruns, a->version_errors, a->other_version};
+    fuzz_note("counts", counts, sizeof counts);
     const uint32_t counted =
         a->packets + a->crc_errors + a->framing_errors + a->overruns + a->version_errors;
     const uint32_t ended = ended_stretches(bytes, rest);

@@ -52,7 +52,8 @@ static void use(const eits_model *model)
     }
     uint32_t sums[EITS_SELF_TEST_SUMS];
     if (options.max_touches % 4 == 0) /* one in four: as long as all the rest */
-        (void)eits_self_test_sums(ctx, sums);
+        if (eits_self_test_sums(ctx, sums) == EITS_OK)
+            fuzz_note("self-test", sums, sizeof sums);
     options.iterations = 1 + (options.iterations - 1) % MAX_ITERATIONS;
     options.touch_sweeps = 2;
     options.warm_start = 1;
@@ -83,6 +84,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memcpy(&before, &model, sizeof model);
     const eits_status status = eits_model_open(&model, blob, size);
     MUST(status == EITS_OK || memcmp(&model, &before, sizeof model) == 0);
+    fuzz_note("opened", &status, sizeof status);
     MUST(eits_model_open(&before, blob + 1, size) == EITS_E_MODEL_ALIGNMENT);
     if (status == EITS_OK)
         use(&model);

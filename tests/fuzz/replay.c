@@ -1,5 +1,5 @@
-/* Every file of the folders named as arguments into a fuzz target: the kept corpus as a test, under
- * any compiler. */
+/* Every file of a folder into a fuzz target: the kept corpus as a test, under any compiler. With
+ * sums, also that what came out is what it was: replay FOLDER [SUMS NAME]. */
 #include "fuzz.h"
 
 #include <dirent.h>
@@ -24,25 +24,55 @@ static int replay(const char *path)
     memcpy(exact, bytes, size);
     fprintf(stderr, "%s\n", path);
     (void)LLVMFuzzerTestOneInput(exact, size);
+    fuzz_end_input();
     free(exact);
     return 1;
+}
+
+/* Whether the file has these sums of the target, and no others. */
+static int same_sums(const char *path, const char *target)
+{
+    char of[32], name[32];
+    uint32_t value;
+    int wrong = 0, right = 0;
+    FILE *file = fopen(path, "r");
+    while (file != NULL && fscanf(file, "%31s %31s %x", of, name, &value) == 3) {
+        const fuzz_sum *sum = fuzz_sums;
+        while (sum->name != NULL && strcmp(sum->name, name) != 0)
+            ++sum;
+        if (strcmp(of, target) != 0)
+            continue;
+        if (sum->name != NULL && sum->all == value)
+            ++right;
+        else
+            ++wrong;
+    }
+    if (file != NULL)
+        fclose(file);
+    for (const fuzz_sum *sum = fuzz_sums; sum->name != NULL; ++sum)
+        --right;
+    if (wrong == 0 && right == 0)
+        return 1;
+    printf("%s: other results than before. Where that is meant, its lines are\n", path);
+    for (const fuzz_sum *sum = fuzz_sums; sum->name != NULL; ++sum)
+        printf("%s %s 0x%08X\n", target, sum->name, sum->all);
+    return 0;
 }
 
 int main(int argc, char **argv)
 {
     int files = 0;
-    for (int i = 1; i < argc; ++i) {
-        DIR *folder = opendir(argv[i]);
-        for (struct dirent *entry; folder != NULL && (entry = readdir(folder)) != NULL;) {
-            char path[4096];
-            if (entry->d_name[0] == '.')
-                continue;
-            snprintf(path, sizeof path, "%s/%s", argv[i], entry->d_name);
-            files += replay(path);
-        }
-        if (folder != NULL)
-            closedir(folder);
+    fuzz_sums_wanted = argc > 3;
+    DIR *folder = argc > 1 ? opendir(argv[1]) : NULL;
+    for (struct dirent *entry; folder != NULL && (entry = readdir(folder)) != NULL;) {
+        char path[4096];
+        if (entry->d_name[0] == '.')
+            continue;
+        snprintf(path, sizeof path, "%s/%s", argv[1], entry->d_name);
+        files += replay(path);
     }
+    if (folder != NULL)
+        closedir(folder);
     printf("%d inputs\n", files);
-    return files > 0 ? 0 : 1;
+    return files > 0 && (argc <= 3 || same_sums(argv[2], argv[3])) ? 0 : 1;
 }

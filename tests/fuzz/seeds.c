@@ -111,6 +111,48 @@ static void scripts(void)
     }
 }
 
+/* fuzz_skin.c reads these: one finger or two, at rest or moving, that lift and come again. */
+static void fingers(void)
+{
+    for (unsigned k = 0; k < 48; ++k) {
+        const uint8_t sign = (uint8_t)(k % 3 == 1 ? 0x90 : 0x70);
+        const uint8_t script[] = {(uint8_t)(k * 37),
+                                  (uint8_t)(k * 91),
+                                  (uint8_t)(20 + k),
+                                  0,
+                                  (uint8_t)(k * 13),
+                                  (uint8_t)(k * 29),
+                                  80,
+                                  sign,
+                                  14,
+                                  8,
+                                  (uint8_t)(200 + k * 7),
+                                  (uint8_t)(k * 3),
+                                  100,
+                                  sign,
+                                  (uint8_t)(1 + 8 * (k % 2)),
+                                  (uint8_t)(k % 5 * 9),
+                                  (uint8_t)(k * 5),
+                                  14,
+                                  (uint8_t)(k % 4 == 3 ? 0x84 : 2),
+                                  3,
+                                  6,
+                                  5,
+                                  (uint8_t)(k % 3),
+                                  0,
+                                  (uint8_t)(k * 13),
+                                  (uint8_t)(k * 29),
+                                  80,
+                                  sign,
+                                  14,
+                                  (uint8_t)(k % 4 == 2 ? 3 : 10),
+                                  7,
+                                  90,
+                                  14};
+        keep("fingers", k, script, sizeof script);
+    }
+}
+
 /* Of the board: every command as usual and with an odd field; every model uploaded, also with the
  * power gone at some write; every fault in a running stream. */
 static void boards(void)
@@ -125,6 +167,14 @@ static void boards(void)
     const uint8_t locked[] = {3, 6, 11, 1, 0, 14, 0, 6, 11, 0, 5, 1, 1, 0,  14,  1, 4,
                               0, 0, 9,  1, 0, 3,  0, 3, 60, 0, 2, 0, 6, 12, 200, 3, 90};
     keep("locked", 0, locked, sizeof locked);
+    /* touches after each drive, of a model that has fields */
+    for (unsigned k = 0; k < 4; ++k) {
+        const uint8_t followed[] = {
+            (uint8_t)k, 5,  4,   1, 3, 10, 0, 3,   0, 0,  2,
+            0,          3,  250, 0, 1, 0,  3, 100, 7, 60, (uint8_t)(120 + 8 * k),
+            3,          200};
+        keep("followed", k, followed, sizeof followed);
+    }
     /* 1 kHz in 1000 samples: more current than is safe */
     const uint8_t slow[] = {2, 0,  3, 2,   4,    1, 200, 0x40, 0x42, 0x0F,
                             0, 12, 0, 200, 0xE8, 3, 0,   0,    3,    9};
@@ -188,12 +238,16 @@ int main(int argc, char **argv)
     static const struct {
         const char *target;
         void (*write)(void);
-    } all[] = {{"model", models}, {"link", packets}, {"frame", scripts}, {"board", boards}};
+    } all[] = {{"model", models},
+               {"link", packets},
+               {"frame", scripts},
+               {"skin", fingers},
+               {"board", boards}};
     folder = argc == 3 ? argv[2] : ".";
     for (size_t k = 0; argc == 3 && k < sizeof all / sizeof all[0]; ++k) {
         if (strcmp(argv[1], all[k].target) == 0)
             return all[k].write(), 0;
     }
-    fprintf(stderr, "seeds model|link|frame|board FOLDER\n");
+    fprintf(stderr, "seeds model|link|frame|skin|board FOLDER\n");
     return 2;
 }

@@ -25,6 +25,12 @@ from mutants import ROOT, Mutant
 
 BUILD = ROOT / "build" / "host"
 TESTS = {"eitskin_f32": "tests/c", "eitskin_f64": "tests/c", "fw_app": "tests/firmware"}
+FUZZ = ROOT / "tests" / "fuzz"
+CORPORA = {  # what came of the fuzzer's kept inputs is a test, too
+    "eitskin_f32": ("link_f32", "model_f32", "frame_f32", "skin_f32"),
+    "eitskin_f64": ("model_f64", "frame_f64", "skin_f64"),
+    "fw_app": ("board_f32",),
+}
 LIBRARIES = {
     "csrc/src": ("eitskin_f32", "eitskin_f64"),
     "firmware/app": ("fw_app",),
@@ -105,6 +111,9 @@ def list_tests(library: Library) -> None:
     for name, source in names.items():
         library.tests[f"test_{name}"] = seconds[name]
         library.texts[f"test_{name}"] = source.read_text()
+    for name in CORPORA[library.name]:
+        library.tests[f"replay_{name}"] = seconds[f"corpus_{name}"]
+        library.texts[f"replay_{name}"] = ""
 
 
 @functools.cache
@@ -117,9 +126,13 @@ def sanitizer() -> str:
 def run_test(library: Library, test: str, folder: Path, most_cpu_seconds: float) -> str:
     """How it fails with the libraries in ``folder``, before the sound ones; empty where it
     passes."""
-    program = BUILD / TESTS[library.name] / test
+    program = [str(BUILD / TESTS[library.name] / test)]
+    if test.startswith("replay_"):
+        name = test.removeprefix("replay_")
+        corpus = FUZZ / "corpus" / name.split("_")[0]
+        program = [str(BUILD / "tests" / "fuzz" / test), str(corpus), str(FUZZ / "sums.txt"), name]
     paths = [folder, BUILD, BUILD / "firmware"]
-    limited = f'ulimit -t {max(1, round(most_cpu_seconds))}; exec "$0"'
+    limited = f'ulimit -t {max(1, round(most_cpu_seconds))}; exec "$0" "$@"'
     environment = {
         **os.environ,
         "LD_LIBRARY_PATH": ":".join(map(str, paths)),
@@ -127,7 +140,7 @@ def run_test(library: Library, test: str, folder: Path, most_cpu_seconds: float)
         "ASAN_OPTIONS": "detect_leaks=0",
     }
     done = subprocess.run(
-        ["sh", "-c", limited, str(program)], capture_output=True, check=False, env=environment
+        ["sh", "-c", limited, *program], capture_output=True, check=False, env=environment
     )
     if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
         return "does not end"
