@@ -10,8 +10,8 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.options_table import SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
-from eitskin.reference.engine import orthonormal
 from eitskin.reference.fista import fista
+from eitskin.reference.frame_stage import orthonormal
 from eitskin.reference.problem import check_gap
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt, session, small, small_blob, small_model
