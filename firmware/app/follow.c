@@ -197,10 +197,12 @@ const float *fw_follow_align(fw_instrument *instrument, fw_frame *frame)
     return trusted ? engine->aligned : NULL;
 }
 
-void fw_follow_found(fw_instrument *instrument, const eits_touch *touches, uint32_t count)
+void fw_follow_found(fw_instrument *instrument, const eits_touch *touches, uint32_t count,
+                     eits_info *info)
 {
     fw_follow *follow = &instrument->follow;
     memcpy(follow->found, touches, count * sizeof touches[0]);
     follow->found_count = count;
     follow->found_any = true;
+    (void)eits_fast_name(instrument->engine.fast, info);
 }

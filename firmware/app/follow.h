@@ -27,7 +27,9 @@ void fw_follow_take(fw_instrument *instrument, bool taken);
  * NULL: it is not to be solved. */
 const float *fw_follow_align(fw_instrument *instrument, fw_frame *frame);
 
-/* What was found in that frame; drives hear of it at the end of the next one. */
-void fw_follow_found(fw_instrument *instrument, const eits_touch *touches, uint32_t count);
+/* What was found in that frame; drives hear of it at the end of the next one. `info` keeps what may
+ * be reported of it. */
+void fw_follow_found(fw_instrument *instrument, const eits_touch *touches, uint32_t count,
+                     eits_info *info);
 
 #endif

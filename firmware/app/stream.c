@@ -177,28 +177,28 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fl
                          (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS | EITS_STREAM_FOLLOWED)) != 0;
     if (wanted && status == EITS_OK)
         (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
+    eits_info info = *eits_get_info(ctx);
     if (volts != frame->volts && status == EITS_OK)
-        fw_follow_found(instrument, touches, count);
+        fw_follow_found(instrument, touches, count, &info);
     const uint32_t done_us = fw_now_us(instrument);
-    const eits_info *info = eits_get_info(ctx);
     eits_packet_solved head = {.frame = frame->number,
                                .time_us = frame->time_us,
                                .solve_us = solved_us - began_us,
                                .touch_us = done_us - solved_us,
                                .status = (uint16_t)-status,
-                               .stop = (uint16_t)info->stop,
-                               .masked = (uint16_t)info->masked,
-                               .iterations = info->iterations,
-                               .nonzeros = info->nonzeros,
-                               .macs = low_word(info->macs),
-                               .touch_macs = low_word(info->touch_macs),
-                               .lambda = info->lambda,
-                               .lambda_max = info->lambda_max,
-                               .lambda_noise = info->lambda_noise,
-                               .gap_rel = info->gap_rel,
-                               .residual = info->residual,
-                               .data_norm = info->data_norm};
-    fw_diagnostics_head(&head, info, quality, eits_get_options(ctx));
+                               .stop = (uint16_t)info.stop,
+                               .masked = (uint16_t)info.masked,
+                               .iterations = info.iterations,
+                               .nonzeros = info.nonzeros,
+                               .macs = low_word(info.macs),
+                               .touch_macs = low_word(info.touch_macs),
+                               .lambda = info.lambda,
+                               .lambda_max = info.lambda_max,
+                               .lambda_noise = info.lambda_noise,
+                               .gap_rel = info.gap_rel,
+                               .residual = info.residual,
+                               .data_norm = info.data_norm};
+    fw_diagnostics_head(&head, &info, quality, eits_get_options(ctx));
     fw_stats_add(&instrument->stats, EITS_STAGE_SOLVE, head.solve_us);
     if (wanted)
         fw_stats_add(&instrument->stats, EITS_STAGE_TOUCHES, head.touch_us);
@@ -206,7 +206,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fl
     instrument->touched = count > 0;
     fw_fault_set(&instrument->faults, EITS_FAULT_SOLVER, status != EITS_OK,
                  (fw_fault_detail){.frame = frame->number, .value = (int32_t)status});
-    send_diagnostics(instrument, frame, info, status == EITS_OK);
+    send_diagnostics(instrument, frame, &info, status == EITS_OK);
     send_solved(instrument, frame, &head, touches, count);
     send_events(instrument, frame, status, touches, count);
     return done_us - began_us;

@@ -481,6 +481,80 @@ static void test_named_electrodes(void)
     bench_close(b);
 }
 
+/* Bits that may be reported of those found; all electrodes go with their bit. */
+static uint32_t named(bench *b, uint32_t found)
+{
+    eits_info info = {
+        .diagnostics = found, .open_electrodes = 1, .bridged_electrodes = 2, .noisy_electrodes = 4};
+    CHECK_EQUAL(eits_fast_name(b->fast, &info), EITS_OK);
+    CHECK_EQUAL(info.open_electrodes != 0,
+                (info.diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN) != 0);
+    CHECK_EQUAL(info.bridged_electrodes != 0, (info.diagnostics & EITS_DIAGNOSTIC_BRIDGED) != 0);
+    CHECK_EQUAL(info.noisy_electrodes != 0,
+                (info.diagnostics & EITS_DIAGNOSTIC_ELECTRODE_NOISY) != 0);
+    return info.diagnostics;
+}
+
+static void test_what_is_named(void)
+{
+    enum {
+        FAULTS = EITS_DIAGNOSTIC_ELECTRODE_OPEN | EITS_DIAGNOSTIC_BRIDGED |
+            EITS_DIAGNOSTIC_ELECTRODE_NOISY | EITS_DIAGNOSTIC_OUTLIER,
+        CLIPPED = EITS_DIAGNOSTIC_SATURATED,
+        CROWDED = EITS_DIAGNOSTIC_CROWDED
+    };
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_real aligned[SMALL_ROWS];
+    drives(b, 8);
+    (void)align(b, aligned);
+    CHECK_EQUAL(named(b, FAULTS | CROWDED), FAULTS); /* nothing touches: at once */
+    CHECK_EQUAL(named(b, CROWDED), CROWDED);
+    CHECK_EQUAL(named(b, 0), 0);
+    put(b, 0, 20, 11, 1);
+    drives(b, 8);
+    (void)align(b, aligned); /* it landed */
+    CHECK_EQUAL(named(b, FAULTS | CLIPPED), CLIPPED);
+    drives(b, 8);
+    (void)align(b, aligned); /* it stays */
+    CHECK_EQUAL(named(b, CLIPPED), CLIPPED);
+    CHECK_EQUAL(named(b, FAULTS), FAULTS);
+    put(b, 0, 22, 9, 1);
+    drives(b, 4);
+    put(b, 0, 26, 6, 1);
+    drives(b, 4);
+    (void)align(b, aligned); /* it moved */
+    CHECK_EQUAL(named(b, FAULTS | CROWDED), 0);
+    CHECK_EQUAL(named(b, FAULTS | CROWDED), FAULTS);
+    CHECK_EQUAL(named(b, CROWDED), CROWDED);
+    drives(b, 16);
+    (void)align(b, aligned);
+    b->fingers = 0;
+    drives(b, 8);
+    (void)align(b, aligned); /* it lifted */
+    CHECK_EQUAL(named(b, 0), 0);
+    CHECK_EQUAL(named(b, EITS_DIAGNOSTIC_OUTLIER), 0);
+    drives(b, EITS_FAST_GONE);
+    (void)align(b, aligned);
+    CHECK_EQUAL(named(b, EITS_DIAGNOSTIC_OUTLIER), EITS_DIAGNOSTIC_OUTLIER);
+    CHECK_EQUAL(named(b, EITS_DIAGNOSTIC_OUTLIER), EITS_DIAGNOSTIC_OUTLIER);
+    measure(b);
+    b->frame[eits_fast_rows(b->fast, b->next, &(uint32_t){0})[2]] += (eits_real)(500 * b->sigma);
+    give(b);
+    (void)align(b, aligned); /* the last drive's row may be a contact's first */
+    CHECK_EQUAL(named(b, FAULTS), EITS_DIAGNOSTIC_OUTLIER);
+    CHECK_EQUAL(named(b, FAULTS), EITS_DIAGNOSTIC_OUTLIER);
+    drives(b, 8);
+    CHECK_EQUAL(eits_fast_begin(b->fast), EITS_OK);
+    drives(b, 8);
+    (void)align(b, aligned);
+    CHECK_EQUAL(named(b, CROWDED), 0);
+    CHECK_EQUAL(eits_fast_begin(b->fast), EITS_OK);
+    CHECK_EQUAL(named(b, CROWDED), CROWDED); /* of the frame before */
+    (void)align(b, aligned);
+    CHECK_EQUAL(named(b, CROWDED), 0);
+    bench_close(b);
+}
+
 static void test_a_clock_that_stands_or_goes_back(void)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
@@ -561,6 +635,7 @@ static void test_what_is_refused(void)
     eits_real volts[SMALL_ROWS] = {0};
     eits_fast_touch touches[EITS_FAST_TOUCHES];
     eits_touch found[1];
+    eits_info info = {.diagnostics = 0};
     uint32_t count = 0, state;
     uint8_t *memory = b->aligned;
     memset(found, 0, sizeof found);
@@ -593,6 +668,8 @@ static void test_what_is_refused(void)
     CHECK_EQUAL(eits_fast_confirm(b->fast, NULL, 1), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_fast_confirm(b->fast, NULL, 0), EITS_OK);
     CHECK_EQUAL(eits_fast_confirm(b->fast, found, EITS_MAX_TOUCHES + 1), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_name(NULL, &info), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_name(b->fast, NULL), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_fast_begin(NULL), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_reference_set(b->skin.ctx, b->quiet, SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_fast_begin(b->fast), EITS_E_NO_REFERENCE); /* of unknown noise */
@@ -627,6 +704,7 @@ int main(void)
     test_frames_begin_and_end_touches();
     test_touches_that_move_on();
     test_named_electrodes();
+    test_what_is_named();
     test_a_clock_that_stands_or_goes_back();
     test_a_touch_that_leaves_the_skin();
     test_what_is_refused();

@@ -13,6 +13,7 @@
  *         eits_reconstruct(ctx, frame, n_rows, NULL, NULL);
  *         eits_find_touches(ctx, found, EITS_MAX_TOUCHES, &n);
  *         eits_fast_confirm(fast, found, n);
+ *         eits_fast_name(fast, &info);                         // a copy of the context's
  *     }
  *
  * What its numbers are and how far they are off: docs/results/fast-path.md.
@@ -109,6 +110,12 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
  * context named in it are left out of drives until it names them no more. Errors: EITS_E_ARGUMENT.
  */
 eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count);
+
+/* The diagnostics in `info`, a copy of the last aligned frame's, that may be reported: where a
+ * touch landed, moved or lifted in its scan, only what the two solved frames before had as well;
+ * elsewhere all but CROWDED, which the one before must have had. Electrodes go with their bit;
+ * saturated rows are always reported. Once a solved frame. Errors: EITS_E_ARGUMENT. */
+eits_status eits_fast_name(eits_fast *fast, eits_info *info);
 
 #ifdef __cplusplus
 }

@@ -84,6 +84,9 @@ struct eits_fast {
     uint32_t unexplained; /* a bit for each of the last 32 drives */
     uint32_t unexplained_frames;
     uint32_t glitched, changed;           /* in the last drive; within this one */
+    uint32_t fresh;                       /* begun since a frame was last aligned */
+    uint32_t stirred, next_aligned;       /* touches changed in that frame; next_id as it was */
+    uint32_t named, named_before;         /* diagnostics of the last two solved frames */
     uint32_t wild;                        /* rows since the last frame */
     uint8_t suspect[EITS_MAX_ELECTRODES]; /* wild rows of each electrode, less those that are not */
     /* tracks */

@@ -17,27 +17,38 @@ static const eits_real *was(const fast_drive *d, uint32_t k, const eits_real *no
     return spare;
 }
 
-/* Whether touch k went far, or changed much, since any of the drives. */
-static int has_moved(const eits_fast *fast, uint32_t k)
+/* How far touch k went, squared, and how much it changed since any of the drives. */
+static void went(const eits_fast *fast, uint32_t k, eits_real *square, eits_real *change)
+{
+    const eits_real *now = fast->state + FAST_SIZE * k;
+    *square = *change = 0;
+    for (uint32_t n = 0; n < fast->drives; ++n) {
+        eits_real spare[FAST_WAYS];
+        const eits_real *then = was(&fast->drive[n], k, now, spare);
+        const eits_real dx = then[FAST_X] - now[FAST_X], dy = then[FAST_Y] - now[FAST_Y];
+        const eits_real far = dx * dx + dy * dy, much = eits_fabs(then[FAST_C] - now[FAST_C]);
+        *square = far > *square ? far : *square;
+        *change = much > *change ? much : *change;
+    }
+}
+
+/* Whether touch k went far, or changed much, since any of the drives: for sure, so that the frame
+ * is aligned; `perhaps`, by limits that its noise may pass. */
+static int has_moved(const eits_fast *fast, uint32_t k, uint32_t *perhaps)
 {
     const uint32_t at = FAST_SIZE * k;
-    const eits_real *now = fast->state + at;
     const eits_real place = eits_sqrt(fast->p[at][at] + fast->p[at + 1][at + 1]);
     const eits_real strength = eits_sqrt(fast->p[at + FAST_C][at + FAST_C]);
     /* A still touch keeps the frame's bits: what the filter's own noise moves is below these
      * limits, and a frame that nothing has changed in is solved as it was measured. */
     eits_real far = EITS_FAST_MOVED_SD * place, much = EITS_FAST_MOVED_SD * strength;
-    const eits_real least = EITS_FAST_MOVED_STRENGTH * eits_fabs(now[FAST_C]);
+    const eits_real least = EITS_FAST_MOVED_STRENGTH * eits_fabs(fast->state[at + FAST_C]);
+    eits_real square, change;
+    went(fast, k, &square, &change);
+    *perhaps |= square > fast_square(EITS_FAST_MOVED_MM) || change > least;
     far = far > EITS_FAST_MOVED_MM ? far : EITS_FAST_MOVED_MM;
     much = much > least ? much : least;
-    for (uint32_t n = 0; n < fast->drives; ++n) {
-        eits_real spare[FAST_WAYS];
-        const eits_real *then = was(&fast->drive[n], k, now, spare);
-        const eits_real dx = then[FAST_X] - now[FAST_X], dy = then[FAST_Y] - now[FAST_Y];
-        if (dx * dx + dy * dy > far * far || eits_fabs(then[FAST_C] - now[FAST_C]) > much)
-            return 1;
-    }
-    return 0;
+    return square > far * far || change > much;
 }
 
 static void align_touch(eits_fast *fast, uint32_t k, eits_real *aligned)
@@ -70,9 +81,15 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     if (!fast->begun)
         return EITS_E_NO_REFERENCE;
     eits_copy(aligned, volts, length);
+    if (fast->fresh)
+        fast->named = fast->named_before = 0;
+    fast->fresh = 0;
+    fast->stirred = fast->glitched || fast->next_id != fast->next_aligned;
+    fast->next_aligned = fast->next_id;
     for (uint32_t k = 0; k < fast->count; ++k) {
-        if (has_moved(fast, k))
+        if (has_moved(fast, k, &fast->stirred))
             align_touch(fast, k, aligned);
+        fast->stirred |= !fast->known[k].on;
         fast->known[k].aligned = 1;
         eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
     }
@@ -83,6 +100,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
     fast->unexplained_frames = explained ? 0 : fast->unexplained_frames + 1;
+    fast->stirred |= !explained;
     *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
     if (explained || fast->unexplained_frames > EITS_FAST_FRAMES)
         *state |= (uint32_t)EITS_FAST_TRUSTED;
@@ -190,5 +208,27 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     /* a frame with rows that are no touch's may show any */
     seed(fast, found, taken, fast->wild == 0 ? count : 0);
     fast->wild = 0;
+    return EITS_OK;
+}
+
+eits_status eits_fast_name(eits_fast *fast, eits_info *info)
+{
+    if (fast == NULL || info == NULL)
+        return EITS_E_ARGUMENT;
+    /* A contact in a drive's last rows is an outlier to the solver, and what the alignment leaves
+     * of a rise or a lift may look like a second touch: neither is there in the next frame, as a
+     * fault is. */
+    const uint32_t now = info->diagnostics, crowded = EITS_DIAGNOSTIC_CROWDED;
+    const uint32_t twice = now & fast->named, thrice = twice & fast->named_before;
+    info->diagnostics = fast->stirred ? thrice | (now & EITS_DIAGNOSTIC_SATURATED)
+                                      : (now & ~crowded) | (twice & crowded);
+    fast->named_before = fast->named;
+    fast->named = now;
+    if (!(info->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN))
+        info->open_electrodes = 0;
+    if (!(info->diagnostics & EITS_DIAGNOSTIC_BRIDGED))
+        info->bridged_electrodes = 0;
+    if (!(info->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_NOISY))
+        info->noisy_electrodes = 0;
     return EITS_OK;
 }

@@ -161,6 +161,9 @@ eits_status eits_fast_begin(eits_fast *fast)
     memset(fast->suspect, 0, sizeof fast->suspect);
     fast->count = fast->held_count = fast->quiet = fast->waited = fast->seeds = 0;
     fast->timed = fast->unexplained = fast->unexplained_frames = fast->glitched = 0;
+    /* What frames named stays until the next is aligned: one may still be solved meanwhile. */
+    fast->fresh = 1;
+    fast->next_aligned = fast->next_id;
     for (uint32_t n = 0; n < fast->drives; ++n) {
         /* Nothing is wrong with drives that were not measured yet; the first frame is not held back
          * for them. */

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine, aligned
+from eitskin.core.results import Info
 from eitskin.errors import FrameError, UsageError
 
 
@@ -135,3 +136,17 @@ class FastCore:
         )
         self._check(self._lib.eits_fast_confirm(self._state, given, len(found)))
         return self.touches()
+
+    def named(self, found: Info) -> Info:
+        """What may be reported of the diagnostics ``found`` in the last aligned frame: where
+        touches changed in its scan, only what the two solved frames before had. Once a solved
+        frame.
+        """
+        names = "open_electrodes", "bridged_electrodes", "noisy_electrodes"
+        given = {name: sum(1 << one for one in getattr(found, name)) for name in names}
+        info = self._ffi.new("eits_info *", {"diagnostics": found.diagnostics, **given})
+        self._check(self._lib.eits_fast_name(self._state, info))
+        kept: dict[str, Any] = {
+            name: getattr(found, name) if getattr(info, name) else () for name in names
+        }
+        return replace(found, diagnostics=int(info.diagnostics), **kept)

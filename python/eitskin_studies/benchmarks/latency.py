@@ -44,7 +44,8 @@ WHOLE, DRIVES = "whole frames", "after each drive"
 REPORT = {WHOLE: "frame", DRIVES: "drive"}
 QUICK_S = 0.06  # on the emulated board presses of drives are held so long, and as far apart
 HEAD = ("method", "rise, ms", "missed", "presses with a false touch", "false touches a press",
-    "presses with a false diagnostic", "scan, ms", "at the device, ms", "at the host, ms",
+    "presses with a false diagnostic", "frames with one",
+    "scan, ms", "at the device, ms", "at the host, ms",
     "error then, mm")  # fmt: skip
 PARTS_HEAD = ("part", "median ms", "p95 ms", "worst ms", "of")
 
@@ -78,13 +79,15 @@ class Told:
     diagnostics: tuple[str, ...]
     solve_ms: float
     link_ms: float
+    frame: bool
 
 
 @dataclass(frozen=True)
 class Judged:
     """The presses of one rise: what was first told of each (``scan_ms``: from the contact to the
     end of the scan, or drive, that told; ``later_ms``: from there until the packet was made);
-    presses with a false touch, how many those were, and presses with a diagnostic."""
+    presses with a false touch, how many those were, presses with a diagnostic, and whole frames
+    that were solved, and those with one."""
 
     method: str
     rise_ms: int
@@ -95,6 +98,8 @@ class Judged:
     with_false: int
     false_touches: int
     diagnosed: int
+    frames: int
+    frames_diagnosed: int
 
     @property
     def missed(self) -> int:
@@ -259,12 +264,14 @@ def follow(
             link_ms = 1e3 * sizes[0] * BITS_A_BYTE / BAUD
             if isinstance(item, Report):
                 age_us = item.live.followed.head.age_us
-                yield Told(began_s, began_s + 2 * half_s, _places(item), (), age_us / 1e3, link_ms)
+                yield Told(
+                    began_s, began_s + 2 * half_s, _places(item), (), age_us / 1e3, link_ms, False
+                )
             elif item.info is not None:
                 shown = _places(item) if report == "frame" else np.zeros((0, 2))
                 age_ms = item.info.age_us / 1e3
                 ended_s = began_s + scan_s
-                yield Told(began_s, ended_s, shown, item.diagnostics, age_ms, link_ms)
+                yield Told(began_s, ended_s, shown, item.diagnostics, age_ms, link_ms, True)
 
 
 def _places(item: Frame | Report) -> FloatArray:
@@ -277,6 +284,7 @@ def judge(
     """What was told of each press, session by session. False: a touch over ``FALSE_MM`` from the
     press, a second one, one before the contact or over ``LINGER_S`` after the press has gone."""
     scans, errors, later, counts, diagnosed = [], [], [], [], 0
+    solved = [one for _, told in sessions for one in told if one.frame]
     for presses, told in sessions:
         ends_s = [press.contact_s for press in presses[1:]] + [np.inf]
         at = 0
@@ -308,6 +316,8 @@ def judge(
         sum(count > 0 for count in counts),
         sum(counts),
         diagnosed,
+        len(solved),
+        sum(bool(one.diagnostics) for one in solved),
     )
 
 
@@ -355,6 +365,7 @@ def rows(result: Latency) -> list[list[str]]:
             _percent(one.with_false, one.presses),
             f"{one.false_touches / one.presses:.2f}",
             _percent(one.diagnosed, one.presses),
+            f"{100 * one.frames_diagnosed / max(1, one.frames):.2f} %",
             _times(_spread(one.scan_ms)),
             _times(whole.get("device")),
             _times(whole.get("host")),

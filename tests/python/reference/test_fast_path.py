@@ -10,7 +10,7 @@ import pytest
 
 from eitskin.core.engine import CoreEngine
 from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
-from eitskin.core.results import Reconstruction
+from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.prebuilt import load_prebuilt
@@ -62,6 +62,11 @@ class Twins(Player):
         c, numpy = super().aligned(frame), self.path.aligned(frame)
         assert (c.explained, c.trusted) == (numpy.explained, numpy.trusted)
         assert self.engine.dtype == np.float32 or c.volts.tobytes() == numpy.volts.tobytes()
+        return c
+
+    def named(self, found: Info) -> Info:
+        c = super().named(found)
+        assert c.diagnostics == self.path.named(found.diagnostics)
         return c
 
     def confirm(self, found: Reconstruction) -> list[FastTouch]:

@@ -1,5 +1,6 @@
 """``eitskin bench latency``: what counts as told, as false, as late; the page; a run."""
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,7 +20,7 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "latency.md"
 def told(number: int, *places: tuple[float, float], named: str = "") -> Told:
     """By the frame whose scan takes 20 ms from 20 ms times ``number``."""
     return Told(0.02 * number, 0.02 * (number + 1), np.array(places).reshape(-1, 2),
-        (named,) if named else (), 8.0, 1.0)  # fmt: skip
+        (named,) if named else (), 8.0, 1.0, True)  # fmt: skip
 
 
 def test_what_is_told_of_presses() -> None:
@@ -31,7 +32,9 @@ def test_what_is_told_of_presses() -> None:
         told(31, (39.0, 0.0), (41.0, 0.0)), told(40, (40.0, 0.0), (0.0, 0.0)),
         told(51, (40.0, 0.0)),  # 120 ms after the lift
     ]  # fmt: skip
+    frames.insert(3, replace(told(5), frame=False))
     one = judge("m", 0, [(presses, frames)])
+    assert (one.frames, one.frames_diagnosed) == (7, 1)
     assert one.scan_ms == pytest.approx((30.0, 30.0)) and one.error_mm == pytest.approx((5.0, 1.0))
     assert (one.missed, one.with_false, one.false_touches, one.diagnosed) == (1, 1, 3, 1)
     early = judge("m", 0, [(presses[:1], [told(0, (0.0, 0.0)), told(1, (30.0, 0.0))])] * 2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
 from eitskin.core.fast import FastCore, FastTouch
+from eitskin.core.results import Reconstruction
 from eitskin.device.wire.link_table import FollowedTouch, RawFlags
 from eitskin.device.wire.packets import BoardInfo, FollowedTouches, RawFrame
 from eitskin.errors import FrameError
@@ -71,9 +73,11 @@ class DrivesTwin:
         self.different += aligned.trusted != bool(raw.flags & RawFlags.TRUSTED)
         return np.asarray(aligned.volts) if aligned.trusted else None
 
-    def found(self, touches: Sequence[Touch]) -> None:
-        """What the solver found in the last frame: drives hear of it with the next."""
-        self._found = touches
+    def found(self, result: Reconstruction) -> Reconstruction:
+        """What the solver found in the last frame: drives hear of it with the next; with the
+        diagnostics that are reported."""
+        self._found = result.touches
+        return replace(result, info=self._fast.named(result.info))
 
     def _drives_at(self, time_us: int) -> list[tuple[int, int]]:
         """Drives of a scan that began at ``time_us``, and their middles by the board's clock."""

@@ -175,7 +175,7 @@ class HostTwin:
             self._count(frame, frame.refused is not None, 1.0, self._from_before)
             return None
         if self._drives is not None and aligned is not None:
-            self._drives.found(result.touches)
+            result = self._drives.found(result)
         assert frame.solved is not None
         same, difference = (
             frame.refused is None

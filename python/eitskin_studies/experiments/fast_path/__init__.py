@@ -47,6 +47,7 @@ class Row:
     count: int
     make: Callable[[Player, States, int, np.random.Generator, float], Outcome]
     snr_db: float = 60.0
+    fault: tuple[str, ...] = ()  # diagnostics, any of which names it
 
 
 def rows() -> list[Row]:
@@ -80,11 +81,16 @@ def rows() -> list[Row]:
     ]
     listed.append(Row("a second finger 30 ms later", "pairs", 200, partial(_pair, later_s=0.03)))
     listed.append(Row("quiet", "presses", 100, partial(_fault, spoil=_nothing, press=False)))
-    faults = {"glitches": _glitches, "electrode open": _open, "electrode noisy": _noisy,
-              "gain drifts by 0.5 %": _drift}  # fmt: skip
+    electrode = "electrode open", "electrode noisy"
+    faults: list[tuple[str, Spoil, tuple[str, ...]]] = [
+        ("glitches", _glitches, ("outlier",)),
+        ("electrode open", _open, electrode),
+        ("electrode noisy", _noisy, electrode),
+        ("gain drifts by 0.5 %", _drift, ()),
+    ]
     return listed + [
-        Row(f"{name}, then a press", "presses", 50, partial(_fault, spoil=spoil))
-        for name, spoil in faults.items()
+        Row(f"{name}, then a press", "presses", 50, partial(_fault, spoil=spoil), fault=named)
+        for name, spoil, named in faults
     ]
 
 
@@ -107,7 +113,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             player = Player(model, blob)
             player.tare(v0, sigma, rng)
             outcomes.append(row.make(player, drawn[row.kind], k, rng, sigma))
-        found.append({"name": row.name, **_summary(outcomes)})
+        found.append({"name": row.name, **_summary(outcomes, row.fault)})
     words = (
         f"Seed {settings.seed}; discs of radius 8 mm, contrast 5, 60 dB unless said; frames from"
         f" {ELEMENTS} elements, contacts spread by 30 %, a tare of 64 frames; 100 us a row, drives"
@@ -287,11 +293,13 @@ def _drift(
 # ---- what came of it ----
 
 
-def _summary(outcomes: list[Outcome]) -> dict[str, Any]:
+def _summary(outcomes: list[Outcome], fault: tuple[str, ...]) -> dict[str, Any]:
     first = np.array([one for each in outcomes for one in each.first if one]).reshape(-1, 2)
     fingers = sum(len(each.first) for each in outcomes)
     steady = [float(np.median(one)) for each in outcomes for one in each.errors if one]
     frames: Counter[str] = sum((each.frames for each in outcomes), Counter())
+    named_s = [[each.named[name] for name in fault if name in each.named] for each in outcomes]
+    after_ms = [1e3 * (min(each) - FAULT_S) for each in named_s if each]
     return {
         "scenes": len(outcomes),
         "drives": sum(len(each.told) for each in outcomes),
@@ -303,6 +311,9 @@ def _summary(outcomes: list[Outcome]) -> dict[str, Any]:
         "first_mm": _quantiles(first[:, 1]),
         "steady_mm": _quantiles(steady),
         "frames": dict(frames),
+        "fault": bool(fault),
+        "fault_ms": _quantiles(after_ms),
+        "fault_named": len(after_ms),
     }
 
 
@@ -330,9 +341,12 @@ def _table(found: list[dict[str, Any]]) -> Table:
                 f"{100 * frames.get('explained', 0) / count:.0f} %",
                 f"{100 * frames.get('same', 0) / count:.1f} %",
                 f"{100 * frames.get('named', 0) / count:.2f} %",
+                f"{one['fault_named']} of {one['scenes']}; {_two(one['fault_ms'], 0)}"
+                if one["fault"] else "-",
             )
         )  # fmt: skip
     head = ("scene", "scenes", "with any false touch (95 %)", "fingers missed",
             "first report, ms after contact: median, p95", "error then, mm", "error later, mm",
-            "frames explained", "of the same bits", "with a fault named")  # fmt: skip
+            "frames explained", "of the same bits", "with a diagnostic",
+            "fault named, ms after: median, p95")  # fmt: skip
     return Table("rows", head, tuple(lines))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
 from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
-from eitskin.core.results import Reconstruction
+from eitskin.core.results import Info, Reconstruction
 from eitskin.model.model import Model
 from eitskin.scoring.matching import GATE_MM
 
@@ -58,13 +58,14 @@ class TrueInTime:
 class Outcome:
     """What was told of one scene: false touches, of each finger the delay of its first report and
     the error then (or None), errors by finger, frames counted, and how many were told of after each
-    drive."""
+    drive; when a diagnostic was first reported."""
 
     false: int = 0
     first: list[tuple[float, float] | None] = field(default_factory=list)
     errors: list[list[float]] = field(default_factory=list)
     frames: Counter[str] = field(default_factory=Counter)
     told: list[tuple[float, int]] = field(default_factory=list)
+    named: dict[str, float] = field(default_factory=dict)
 
 
 class Player:
@@ -89,6 +90,10 @@ class Player:
         """The scan at one instant."""
         return self.fast.aligned(frame)
 
+    def named(self, found: Info) -> Info:
+        """What is reported of the solver's diagnostics."""
+        return self.fast.named(found)
+
     def confirm(self, found: Reconstruction) -> list[FastTouch]:
         """What the solver made of it goes back."""
         return self.fast.confirm(found.touches)
@@ -108,21 +113,22 @@ class Player:
                 frame[rows] = volts[mine]
                 told = self.drive(number, volts[mine], middle_s)
                 if number == drives[-1]:
-                    told = self._whole_frame(frame, out.frames)
+                    told = self._whole_frame(frame, out, end_s)
                 _score(out, truth, told, middle_s, end_s)
         return out
 
-    def _whole_frame(self, frame: FloatArray, count: Counter[str]) -> list[FastTouch]:
+    def _whole_frame(self, frame: FloatArray, out: Outcome, end_s: float) -> list[FastTouch]:
         aligned = self.aligned(frame)
-        count["frames"] += 1
-        count["explained"] += aligned.explained
-        count["same"] += np.array_equal(aligned.volts, frame.astype(aligned.volts.dtype))
+        out.frames["frames"] += 1
+        out.frames["explained"] += aligned.explained
+        out.frames["same"] += np.array_equal(aligned.volts, frame.astype(aligned.volts.dtype))
         if not aligned.trusted:
             return self.fast.touches()
         found = self.engine.reconstruct(aligned.volts)
-        info = found.info
-        electrodes = (*info.open_electrodes, *info.bridged_electrodes, *info.noisy_electrodes)
-        count["named"] += bool(electrodes) or "outlier" in info.diagnostics_by_name
+        names = self.named(found.info).diagnostics_by_name
+        out.frames["named"] += bool(names)
+        for name in names:
+            out.named.setdefault(name, end_s)
         return self.confirm(found)
 
 

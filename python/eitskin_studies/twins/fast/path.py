@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.diagnostics_table import Touch
+from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.fast import AlignedFrame, FastTouch
 from eitskin.model.model import Model
 from eitskin_studies.twins.constants_table import (
@@ -78,6 +78,7 @@ from eitskin_studies.twins.fast.tracks import (
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 _MEMORY = 32  # drives of which it is known whether they were explained
+_SATURATED, _CROWDED = (1 << DIAGNOSTICS.index(name) for name in ("saturated", "crowded"))
 
 
 @dataclass(eq=False)
@@ -133,6 +134,7 @@ class FastPath:
         self._masked = np.zeros(len(v0), dtype=np.bool_)
         self._wild, self._suspect = 0, np.zeros(int(self._table.max()) + 1, dtype=np.int64)
         self._seeds: list[tuple[float, float]] = []
+        self._named, self._stirred, self._next_aligned = (0, 0), False, self._next_id
 
     # ---- a drive ----
 
@@ -390,14 +392,25 @@ class FastPath:
 
     # ---- whole frames ----
 
+    def named(self, diagnostics: int) -> int:
+        """What may be reported of the bits that the solver found in the last aligned frame."""
+        twice = diagnostics & self._named[0]
+        thrice, self._named = twice & self._named[1], (diagnostics, self._named[0])
+        if self._stirred:
+            return thrice | diagnostics & _SATURATED
+        return diagnostics & ~_CROWDED | twice & _CROWDED
+
     def aligned(self, volts: FloatArray) -> AlignedFrame:
         """The last scan's rows (m,) in V, all drives measured once since the last call, brought to
         the instant of its last drive. Touches that stay as they are change no bit."""
         out = volts.copy()
+        self._stirred = self._glitched or self._next_id != self._next_aligned
+        self._next_aligned = self._next_id
         for k, known in enumerate(self._known):
             now = self.tracks.state[k, :3]
             known.at = now[:2].copy()
             then = [past.state.get(known.id, np.array([*now[:2], 0.0])) for past in self._past]
+            self._stirred |= not known.on
             if not self._moved(k, now, np.array(then)):
                 continue
             for drive, was in zip(self.drives, then, strict=True):
@@ -406,15 +419,18 @@ class FastPath:
                 out[drive.rows] += change / self._gain[drive.rows]
         explained = all(past.explained for past in self._past) and not self._held
         self._unexplained_frames = 0 if explained else self._unexplained_frames + 1
+        self._stirred |= not explained
         return AlignedFrame(out, explained, explained or self._unexplained_frames > FAST_FRAMES)
 
     def _moved(self, k: int, now: FloatArray, then: FloatArray) -> bool:
         variance = np.diag(self.tracks.p)[SIZE * k : SIZE * k + 3]
+        least = FAST_MOVED_STRENGTH * abs(now[C])
         far = max(FAST_MOVED_MM, FAST_MOVED_SD * float(np.sqrt(variance[0] + variance[1])))
-        much = max(FAST_MOVED_STRENGTH * abs(now[C]), FAST_MOVED_SD * float(np.sqrt(variance[C])))
+        much = max(least, FAST_MOVED_SD * float(np.sqrt(variance[C])))
         x, y = (then[:, :2] - now[:2]).T
-        moved = x * x + y * y > far * far
-        return bool((moved | (np.abs(then[:, C] - now[C]) > much)).any())
+        square, change = float((x * x + y * y).max()), float(np.abs(then[:, C] - now[C]).max())
+        self._stirred |= square > FAST_MOVED_MM * FAST_MOVED_MM or change > least
+        return square > far * far or change > much
 
     def confirm(self, found: Iterable[Touch], electrodes: Iterable[int] = ()) -> list[FastTouch]:
         """What the whole-frame solver found in the last aligned frame, and the electrodes that it
