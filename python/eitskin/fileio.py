@@ -5,6 +5,8 @@ Links are followed; devices and FIFOs are written into.
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
 import os
 import shutil
@@ -14,7 +16,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from eitskin.errors import FileError, missing_extra
 
@@ -50,7 +52,9 @@ def write_beside(path: str | Path) -> Iterator[Path]:
     special = target.exists() and not target.is_file()
     try:
         handle, name = tempfile.mkstemp(
-            prefix=f".{target.name}.", suffix=target.suffix, dir=None if special else target.parent
+            prefix=f".{target.name[:40]}.",
+            suffix=target.suffix,
+            dir=None if special else target.parent,
         )
         os.close(handle)
     except OSError as error:
@@ -75,12 +79,19 @@ def followed(path: str | Path) -> Path:
     """Where links lead from ``path``; the file at the end need not exist.
 
     Raises:
-        FileError: the links go in a circle.
+        FileError: the links go in a circle, or a name is too long.
     """
+    path = Path(path)
     try:
-        return Path(path).resolve() if Path(path).is_symlink() else Path(path)
-    except (OSError, RuntimeError):
-        raise FileError(f"{path}: its links go in a circle; remove them") from None
+        if path.exists() and not path.is_file():
+            return path  # a device, or the pipe behind /dev/stdout, which has no other name
+        return path.resolve() if path.is_symlink() else path
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise FileError(f"{path}: cannot write there ({error.strerror})") from None
+    except RuntimeError:  # how Python up to 3.12 names a circle
+        pass
+    raise FileError(f"{path}: its links go in a circle; remove them")
 
 
 def replace_by(temporary: Path, target: Path) -> None:
@@ -105,6 +116,17 @@ def sync_folder(path: Path) -> None:
             os.fsync(folder)
         finally:
             os.close(folder)
+
+
+def locked(stream: IO[bytes]) -> bool:
+    """Lock ``stream`` as who records to it; False where another recorder has it."""
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
 
 
 def _mode(path: Path) -> int:

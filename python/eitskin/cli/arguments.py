@@ -2,12 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import argparse
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path, PosixPath
 from typing import Any
 
 from eitskin.errors import UsageError
 
 MAX_RING_OHM = 1e7
+
+
+class Output(PosixPath):
+    """A file that a command writes; ``refuse_named_twice`` looks for these."""
+
+
+def refuse_named_twice(options: argparse.Namespace) -> None:
+    """Refuse an output that another option names too, before it is written over.
+
+    Raises:
+        UsageError: one is.
+    """
+    named = list(_files_of(options))
+    for name, path in named:
+        for other, file in named:
+            if name != other and isinstance(path, Output) and _same(path, file):
+                raise UsageError(
+                    f"{path}: named twice, as {name} and as {other}; name another file to write"
+                )
+
+
+def _files_of(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
+    """Names of options, and the files they name: a path, or what follows "sim:" and the like."""
+    for name, value in vars(options).items():
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, Path):
+                yield name, one
+            elif isinstance(one, str) and ("." in one or "/" in one):
+                yield name, Path(one)
+                yield name, Path(one.partition(":")[2].partition("?")[0])
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        if one.exists() and other.exists():
+            return one.is_file() and one.samefile(other)
+        return os.path.realpath(one) == os.path.realpath(other)
+    except (OSError, ValueError):
+        return False
 
 
 def option(

@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import add_device, open_named, print_table
+from eitskin.cli.device_options import add_device, open_named, print_table, whole
 from eitskin.errors import UsageError
 
 
@@ -45,10 +45,11 @@ def run(options: argparse.Namespace) -> int:
     for _, on, off, name in pairs:
         if on and off:
             raise UsageError(f"board: --{name} and its contrary contradict each other; give one")
+    whole("--limit-ua", options.limit_ua, 0, 10_000)
     with open_named(options) as device:
         if options.clear_faults:
             device.clear_faults()
-        info = device.info()
+        info = device.board if device.transport.replays else device.info()
         wanted = Setting(info.settings)
         for bit, on, off, _ in pairs:
             wanted = (wanted | bit) if on else (wanted & ~bit) if off else wanted

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.errors import EitskinError, FrameError, UsageError
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def add_parser(subparsers: Any) -> None:
         default="increase",
     )
     option(parser, "--seed S", "of the resamples behind the intervals", default=1)
-    option(parser, "-o --output OUT.eitm", "the model with its calibration", Path)
+    option(parser, "-o --output OUT.eitm", "the model with its calibration", Output)
     option(parser, "--json")
     parser.set_defaults(run=run)
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.errors import FileError, MissingExtraError, UsageError
 
 if TYPE_CHECKING:
@@ -32,8 +31,8 @@ def add_parser(subparsers: Any) -> None:
     )
     option(parser, "--snr-db DB", "20 log10(rms(V0)/sigma)", default=60.0)
     option(parser, "--seed", "of noise and contacts", default=1)
-    option(parser, "--picture PNG", None, Path, default=Path("demo.png"))
-    option(parser, "--frames NPZ", "also write the simulated frames, with their truth", Path)
+    option(parser, "--picture PNG", None, Output, default=Output("demo.png"))
+    option(parser, "--frames NPZ", "also write the simulated frames, with their truth", Output)
     option(parser, "--no-board", "leave the emulated board out")
     option(parser, "--json")
     parser.set_defaults(run=run)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eitskin.cli.arguments import check_ring, option
+from eitskin.cli.arguments import Output, check_ring, option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.cli.import_options import (
     add_import_options,
@@ -49,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     option(device, "--frames N", "to be measured, 4 to 1024", default=32)
     option(device, "--model MODEL.eitm", "the board's, where it is not the prebuilt one", Path)
     option(parser, "--json", "print the report as JSON")
-    option(parser, "--picture FILE", "draw what was measured (needs matplotlib)", Path)
+    option(parser, "--picture FILE", "draw what was measured (needs matplotlib)", Output)
     parser.add_argument(
         "--touch",
         action="append",

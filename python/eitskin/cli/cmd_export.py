@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 
 
 def add_parser(subparsers: Any) -> None:
@@ -24,7 +24,7 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "frames FRAMES.npz", "frames of the model's protocol", Path, nargs="?")
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
     option(parser, "--elements", "about how many triangles", default=3000)
-    option(parser, "-o --output OUT.mat", "file to write", Path, required=True)
+    option(parser, "-o --output OUT.mat", "file to write", Output, required=True)
     option(parser, "--json")
     parser.set_defaults(run=run)
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.import_options import add_import_options, read_options, read_protocol, write_layout
 
 
@@ -24,7 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         ),
     )
     option(parser, "source", "CSV or other text, NPY, NPZ, MAT, or a frames file to repair", Path)
-    option(parser, "-o --output OUT.npz", "frames file to write", Path, required=True)
+    option(parser, "-o --output OUT.npz", "frames file to write", Output, required=True)
     option(parser, "--json", "say what was written as JSON")
     add_import_options(parser)
     parser.set_defaults(run=run)

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import check_ring, option
+from eitskin.cli.arguments import Output, check_ring, option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.errors import UsageError, VerificationError
 
@@ -29,7 +29,7 @@ def add_parser(subparsers: Any) -> None:
         build, "skin SKIN.toml", "skin description, or a .mat with an EIDORS model", Path, nargs="?"
     )
     option(build, "--paper", "the paper's 194 mm disk instead of a file")
-    option(build, "-o --output MODEL.eitm", None, Path, required=True)
+    option(build, "-o --output MODEL.eitm", None, Output, required=True)
     option(build, "--rank", "rows of the reduced Jacobian (default: 64, or all if fewer)", int)
     option(build, "--pixels", "pixels along the longer side", default=32)
     option(build, "--storage", choices=("f32", "f16", "i16", "i8"), default="f32")

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.budget_options import add_wish, read_target
 from eitskin.errors import UsageError
 
@@ -33,7 +33,7 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "--period TIME", "to measure a frame, as 12ms (default: the budget, or 20.8ms)")
     option(parser, "--worst", "hold the costliest frame to the budget, not the mean one")
     option(parser, "--warm", "also points that begin each frame from the last's image")
-    option(parser, "-o --output MODEL.eitm", "build and write the model to use", Path)
+    option(parser, "-o --output MODEL.eitm", "build and write the model to use", Output)
     option(parser, "--skin SKIN.toml", "of the model (default: the paper's 194 mm disk)", Path)
     option(parser, "--json")
     parser.set_defaults(run=run)

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.budget_options import add_wish, named_target
 from eitskin.cli.device_options import add_solver, named_solver
 from eitskin.cli.progress import bar
@@ -65,9 +65,9 @@ def add_parser(subparsers: Any) -> None:
         default=1,
     )
     option(parser, "--saturation-v V", "leave channels at or beyond +-V out", float)
-    option(parser, "-o --output OUT.npz", "write images, touches and solver info", Path)
-    option(parser, "--picture FILE", "all frames, the truth where known (PNG, SVG, PDF)", Path)
-    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
+    option(parser, "-o --output OUT.npz", "write images, touches and solver info", Output)
+    option(parser, "--picture FILE", "all frames, the truth where known (PNG, SVG, PDF)", Output)
+    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Output)
     option(parser, "--json")
     parser.set_defaults(run=run)
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import (
     add_device,
     add_scan,
@@ -39,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     add_device(parser)
-    option(parser, "-o --output RUN.eits", None, Path, required=True)
+    option(parser, "-o --output RUN.eits", None, Output, required=True)
     option(parser, "--overwrite", "write over a file that exists")
     add_stream(parser, "raw,image,touches")
     option(parser, "--seconds S", "stop after S seconds of the board's time", float)

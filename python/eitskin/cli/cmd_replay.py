@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import add_verbose, add_zones, read_mode, read_zones, say, whole
 from eitskin.errors import FrameError, UsageError, VerificationError
 
@@ -31,9 +31,9 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "--first N", "the first N frames only", int)
     add_zones(parser)
     option(parser, "--model MODEL.eitm", "the board's model where it is not the prebuilt one", Path)
-    option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Path)
-    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
-    option(parser, "--frames OUT.npz", "write the raw frames for  reconstruct  and  doctor", Path)
+    option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Output)
+    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Output)
+    option(parser, "--frames OUT.npz", "write the raw frames for  reconstruct  and  doctor", Output)
     option(parser, "--check", "solve again here and compare; exit code 10 where bits differ")
     add_verbose(parser)
     option(parser, "--json", "print for programs")

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.progress import bar, lines
 from eitskin.errors import FileError, UsageError
 
@@ -29,7 +29,7 @@ def add_parser(subparsers: Any) -> None:
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     one = what.add_parser("run", help="simulate a scene: frames with their truth")
     option(one, "scene SCENE", SCENE_HELP)
-    option(one, "-o --output FRAMES", "frames file to write (.npz)", Path, required=True)
+    option(one, "-o --output FRAMES", "frames file to write (.npz)", Output, required=True)
     pixels = "of mask and conductivity; 0: none (default: %(default)s)"
     option(one, "--truth-pixels N", pixels, default=64)
     option(one, "--json")
@@ -44,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
         "picture", help="draw a scene: touches on the skin, voltages over time"
     )
     option(picture, "scene SCENE", SCENE_HELP)
-    option(picture, "-o --output FILE", None, Path, required=True)
+    option(picture, "-o --output FILE", None, Output, required=True)
     picture.set_defaults(run=run_picture)
     names = what.add_parser("list", help="the scenes that come with the package")
     option(names, "--json")

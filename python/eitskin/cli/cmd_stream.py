@@ -4,10 +4,9 @@ to."""
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import (
     add_device,
     add_outputs,
@@ -38,9 +37,9 @@ def add_parser(subparsers: Any) -> None:
     )
     add_device(parser)
     add_stream(parser, "touches")
-    option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Path)
-    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Path)
-    option(parser, "--record RUN.eits", "also record every packet, as  eitskin record  does", Path)
+    option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Output)
+    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Output)
+    option(parser, "--record RUN.eits", "also record every packet, as  eitskin record", Output)
     option(parser, "--overwrite", "write over files that exist, of --record and --to")
     add_zones(parser)
     add_outputs(parser)

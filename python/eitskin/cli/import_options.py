@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def add_import_options(parser: argparse.ArgumentParser) -> None:
     """Add all of them to ``parser``; defaults change nothing."""
     known = parser.add_argument_group("a layout: all of these in a file")
     option(known, "--layout FILE", "how lines are frames (TOML); other options go before it", Path)
-    option(known, "--save-layout FILE", "write that, for import and text: boards", Path)
+    option(known, "--save-layout FILE", "write that, for import and text: boards", Output)
     _add_protocol(parser.add_argument_group("protocol: the order of the result"))
     _add_place(parser.add_argument_group("where the frames are in the source"))
     _add_repairs(parser.add_argument_group("what differs in the source, and what to repair"))

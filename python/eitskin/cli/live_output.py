@@ -59,7 +59,7 @@ class Rows:
         from eitskin.scoring.stream_check import line
 
         live = frame.live
-        if live.events is not None and live.solved is None and live.raw is None:
+        if live.solved is None and live.raw is None:
             return []
         if self._verbose or live.touches is None or live.image is not None or live.raw is not None:
             return [line(frame.compared, solver=self._verbose)]

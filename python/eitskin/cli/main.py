@@ -5,16 +5,19 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
+import os
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib.metadata import entry_points
 from typing import NoReturn
 
 from eitskin import __version__
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import option, refuse_named_twice
 from eitskin.config import nearest
-from eitskin.errors import EitskinError, UsageError
+from eitskin.errors import EitskinError, FileError, UsageError
 
 COMMANDS = (
     "demo", "model", "reconstruct", "import", "export", "doctor", "scene", "calibrate", "teach",
@@ -63,6 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code (docs/reference/error-codes.md) and prints errors as
     one line on stderr."""
     traceback = False
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")  # names that the terminal cannot show
     try:
         parser = build_parser()
         options = parser.parse_args(arguments)
@@ -70,7 +76,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command is None:
             print(f"{parser.format_help()}\nTo begin:  {FIRST}")
             return 0
-        return int(options.run(options) or 0)
+        refuse_named_twice(options)
+        code = int(options.run(options) or 0)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code
     except EitskinError as error:
         if traceback:
             raise
@@ -79,9 +89,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
+    except OSError as error:  # most of all a full disk behind standard output
+        if traceback:
+            raise
+        _say_last(f"{error.filename or 'output'}: {error.strerror or error}")
+        return FileError.exit_code
     except KeyboardInterrupt:
         print("eitskin: stopped", file=sys.stderr)
         return 130
+
+
+def _say_last(text: str) -> None:
+    """Say why it ends, and drop what standard output still holds, which would fail again."""
+    with suppress(OSError, ValueError, AttributeError):
+        print(f"eitskin: {text}", file=sys.stderr, flush=True)
+    with suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.errors import FrameError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ def add_parser(actions: Any) -> None:
     """Add ``fit``."""
     parser = actions.add_parser("fit", help="presses to a model, with what it is worth")
     option(parser, "presses PRESSES.npz", "from  eitskin teach record", Path)
-    option(parser, "-o --output MODEL.eitm", None, Path, required=True)
+    option(parser, "-o --output MODEL.eitm", None, Output, required=True)
     option(parser, "--skin SKIN.toml", "default: the description in the presses' file", Path)
     option(
         parser,
@@ -28,7 +28,7 @@ def add_parser(actions: Any) -> None:
         "how far places given by hand may be off, an axis; they are refined",
         default=0.0,
     )
-    option(parser, "--picture OUT.png", "presses, where the others put them, and the rows", Path)
+    option(parser, "--picture OUT.png", "presses, where the others put them, and the rows", Output)
     option(parser, "--json")
     parser.set_defaults(run=run)
 
@@ -42,6 +42,11 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.teaching.teach import teach
 
     refuse_unwritable(options.output, options.picture)
+    if options.picture is not None:
+        from eitskin.view.sheets import check_picture
+        from eitskin.view.taught_picture import draw_taught
+
+        check_picture(options.picture)
     presses = load_presses(options.presses)
     skin = described_skin(presses, options.skin)
 
@@ -53,8 +58,6 @@ def run(options: argparse.Namespace) -> int:
     except FrameError as error:
         raise FrameError(f"{options.presses}: {error}") from None
     if options.picture is not None:
-        from eitskin.view.taught_picture import draw_taught
-
         draw_taught(options.picture, taught)
     save_model(options.output, taught.model)
     if options.json:

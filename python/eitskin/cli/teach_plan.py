@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 
 
 def add_parser(actions: Any) -> None:
@@ -22,13 +22,13 @@ def add_parser(actions: Any) -> None:
     )
     option(parser, "skin SKIN.toml", "skin description", Path)
     option(parser, "-n --presses N", "how many places", default=50)
-    option(parser, "-o --output PLAN.csv", "the places, for  teach record", Path)
-    option(parser, "--picture TEMPLATE.pdf", "in true size, on A4 pages; .svg: one sheet", Path)
+    option(parser, "-o --output PLAN.csv", "the places, for  teach record", Output)
+    option(parser, "--picture TEMPLATE.pdf", "in true size, on A4 pages; .svg: one sheet", Output)
     option(
         parser,
         "--practice SCENE.toml",
         "a scene with a finger that presses so, to try  teach record --device sim:SCENE.toml",
-        Path,
+        Output,
     )
     option(parser, "--json")
     parser.set_defaults(run=run)
@@ -42,11 +42,13 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.teaching.practice import practice_scene
 
     refuse_unwritable(options.output, options.picture, options.practice)
+    if options.picture is not None:
+        from eitskin.view.template_picture import check_template, draw_template
+
+        check_template(options.picture)
     skin, protocol = load_skin(options.skin)
     plan = plan_places(skin, protocol, options.presses)
     if options.picture is not None:
-        from eitskin.view.template_picture import draw_template
-
         pages = draw_template(options.picture, skin, plan.place_mm)
     if options.output is not None:
         save_plan(options.output, plan)

@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import add_device, say
-from eitskin.errors import UsageError
+from eitskin.errors import FrameError, UsageError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from eitskin.frames.frames import Frames
     from eitskin.live.session import Session
     from eitskin.skin.protocol import Protocol
+    from eitskin.skin.skin import Skin
     from eitskin.teaching.guide import GuideEvent
     from eitskin.teaching.plan import Plan
 
@@ -45,7 +46,7 @@ def add_parser(actions: Any) -> None:
         Path,
         required=True,
     )
-    option(parser, "-o --output PRESSES.npz", None, Path, required=True)
+    option(parser, "-o --output PRESSES.npz", None, Output, required=True)
     option(parser, "--overwrite", "begin again where the output exists")
     option(parser, "--skin SKIN.toml", "kept in the file, for  teach fit", Path)
     option(
@@ -77,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     plan = _with_given(plan, options)
     refuse_unwritable(options.output)
     if options.skin is not None:
-        load_skin(options.skin)
+        _say_off(plan, load_skin(options.skin)[0])
         text = read_bytes(options.skin, "skin description", 1_000_000).decode("utf-8")
     if options.frames is not None:
         frames = load_frames(options.frames, allow_nonfinite=True)
@@ -100,6 +101,13 @@ def _with_given(plan: Plan, options: argparse.Namespace) -> Plan:
         old = getattr(plan, name)
         plan = replace(plan, **{name: np.where(np.isnan(old), value, old)})
     return plan
+
+
+def _say_off(plan: Plan, skin: Skin) -> None:
+    off = [k + 1 for k in range(len(plan)) if not skin.outline.contains(plan.place_mm[k : k + 1])]
+    if off:
+        names = ", ".join(map(str, off[:5])) + (", ..." if len(off) > 5 else "")
+        say(f"off the skin {skin.name!r}: places {names} of {len(plan)}; are they in mm?")
 
 
 def _in_time(frames: Frames) -> TimedFrames:
@@ -146,11 +154,10 @@ def _live(session: Session) -> TimedFrames:
 def _guide(
     options: argparse.Namespace, plan: Plan, text: str, protocol: Protocol, frames: TimedFrames
 ) -> int:
-    from eitskin.teaching.guide import PressFile, PressGuide, guide_presses
+    from eitskin.teaching.guide import PressGuide, guide_presses
+    from eitskin.teaching.press_file import PressFile
 
-    if options.overwrite:
-        options.output.unlink(missing_ok=True)
-    file = PressFile(options.output, plan, protocol, text)
+    file = PressFile(options.output, plan, protocol, text, anew=options.overwrite)
     if file.numbers:
         say(f"{options.output}: {len(file.numbers)} presses are there; going on")
     guide = PressGuide(plan, start=file.following)
@@ -163,10 +170,26 @@ def _guide(
         where = f"{event.number + 1:3d} of {len(plan)}, at ({x:.1f}, {y:.1f}) mm"
         print(f"{where}: {event.text}", flush=True)
 
+    stopped, key = False, _keys()
+
+    def pressed() -> str:
+        nonlocal stopped
+        typed = key()
+        stopped = stopped or typed == "q"
+        return typed
+
     try:
-        guide_presses(frames, guide, file, shown, _keys())
+        guide_presses(frames, guide, file, shown, pressed)
     except KeyboardInterrupt:
+        stopped = True
         print("eitskin: stopped", file=sys.stderr)
+    finally:
+        file.close()
+    if not file.numbers and not stopped:
+        raise FrameError(
+            f"{options.output}: not written, as the frames ended before any press of the plan was"
+            " held"
+        )
     left = len(plan) - file.following
     print(f"{options.output}: {len(file.numbers)} presses" + (f", {left} places left" * (left > 0)))
     return 0

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.errors import FrameError
 
 
@@ -26,7 +26,7 @@ def add_parser(actions: Any) -> None:
     )
     option(parser, "model MODEL.eitm", "from  eitskin teach fit  or  update", Path)
     option(parser, "presses PRESSES.npz", "new ones, from  eitskin teach record", Path)
-    option(parser, "-o --output NEW.eitm", None, Path, required=True)
+    option(parser, "-o --output NEW.eitm", None, Output, required=True)
     option(parser, "--json")
     parser.set_defaults(run=run)
 

@@ -302,6 +302,8 @@ class Session:
                     self.summary.add(item)
                     watcher.known = self.known  # another one where a model was uploaded
                     happened = gestures.take(item)
+                    if not self.settings.mode & Stream.TOUCHES and item.touches is not None:
+                        item = replace(item, touches=None)  # read for the gestures alone
                     yield Frame(item, watcher.see(item), self.known, now_s, arrived_ns, happened)
                 elif isinstance(item, Fault):
                     self.summary.faults += item.raised
@@ -461,11 +463,13 @@ class Session:
 
     def _replayed(self) -> Generator[Item, None, None]:
         """The recording; with ``loop`` again and again, as if it went on."""
-        how, offset_us = self.settings, 0
+        how, offset_us, what = self.settings, 0, self._streamed
+        if what & Stream.EVENTS:
+            what |= Stream.TOUCHES  # of which gestures are made where none were recorded
         while True:
             last_us = step_us = 0
             every, frames = how.every or 1, how.frames
-            items = replayed(self.device, self._streamed, every=every, frames=frames)
+            items = replayed(self.device, what, every=every, frames=frames)
             for item in items:
                 if isinstance(item, LiveFrame):
                     if self._over(item):

@@ -13,7 +13,8 @@ from eitskin.device.known_model import scanned_protocol
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame
 from eitskin.live.session import Session
-from eitskin.teaching.guide import GuideEvent, PressFile, PressGuide, Step, scan_of_presses
+from eitskin.teaching.guide import GuideEvent, PressGuide, Step, scan_of_presses
+from eitskin.teaching.press_file import PressFile
 
 if TYPE_CHECKING:
     from eitskin.skin.skin import Skin
@@ -44,6 +45,8 @@ class Teacher:
         session.settings = replace(session.settings, scan=scan_of_presses(board, session.replays))
         protocol = scanned_protocol(board, session.known, session.name)
         with self._lock:
+            if self._file is not None:
+                self._file.close()
             self._file = PressFile(self.path, self.plan, protocol, self._text)
             self._guide = PressGuide(self.plan, start=self._file.following)
             if self._skin is None and session.known is not None:

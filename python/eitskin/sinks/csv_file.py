@@ -5,11 +5,11 @@ readable file."""
 from __future__ import annotations
 
 import csv
-from contextlib import suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from eitskin.device.recordings.new_file import RecordingFile
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
 from eitskin.sinks.sink import Sink, Source, Told
@@ -24,11 +24,10 @@ COLUMNS = (*HEAD, *TOUCH, "found", "refused", "events", *DRIVE)
 
 
 class CsvSink:
-    """One open file, flushed after each frame."""
+    """One open file, written to after each frame."""
 
-    def __init__(self, stream: Any) -> None:
-        self._stream = stream
-        self._put([COLUMNS])
+    def __init__(self, file: RecordingFile) -> None:
+        self._file = file
 
     def write(self, told: Told) -> None:
         message = told.message
@@ -39,46 +38,38 @@ class CsvSink:
             shared["found"] = "; ".join(message["found"])
             shared["events"] = " ".join(event["kind"] for event in message["events"])
         lines = [shared | touch for touch in message["touches"] or [{}]]
-        self._put([[line.get(name) for name in COLUMNS] for line in lines])
+        self._file.write(_text([[line.get(name) for name in COLUMNS] for line in lines]))
+        self._file.sync_now_and_then()
 
     def close(self) -> None:
-        self._stream.close()
-
-    def _put(self, rows: list[Any]) -> None:
-        text = StringIO()
-        csv.writer(text, lineterminator="\n").writerows(rows)
-        self._stream.write(text.getvalue().encode())
-        self._stream.flush()
+        self._file.close()
 
 
-def new_file(url: str, source: Source) -> Any:
-    """The file that ``csv:FILE`` and the like name, open for writing.
+def _text(rows: list[Any]) -> bytes:
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()
+
+
+def new_file(url: str, source: Source, first: bytes = b"") -> RecordingFile:
+    """The file that ``csv:FILE`` and the like name, begun with ``first``.
 
     Raises:
         UsageError: it names none.
-        FileError: it exists already, or cannot be written.
+        FileError: it exists already, another process records to it, or it cannot be written.
     """
     scheme, _, name = url.partition(":")
     if not name:
         raise UsageError(f"--to {url}: name a file, as in  {scheme}:touches.{scheme}")
     path = Path(name)
     refuse_unwritable(path)
-    try:
-        return path.open("wb" if source.overwrite else "xb")
-    except FileExistsError:
+    if path.exists() and not source.overwrite:
         raise FileError(
             f"{path}: exists already; name another file, or write over it with  --overwrite"
-        ) from None
-    except OSError as error:
-        raise FileError(f"{path}: cannot write it ({error.strerror})") from None
+        )
+    return RecordingFile(path, first, overwrite=source.overwrite)
 
 
 def open_sink(url: str, source: Source) -> Sink:
     """See the module. Raises as ``new_file``."""
-    stream = new_file(url, source)
-    try:
-        return CsvSink(stream)
-    except OSError as error:
-        with suppress(OSError):
-            stream.close()
-        raise FileError(f"--to {url}: cannot write it ({error.strerror})") from None
+    return CsvSink(new_file(url, source, _text([COLUMNS])))

@@ -51,7 +51,7 @@ class McapSink:
         if table["status"] != self._status or told.notice is not None:
             self._put("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", table, now)
             self._status = table["status"]
-        self._stream.flush()
+        self._stream.sync_now_and_then()
 
     def close(self) -> None:
         if self._writer is None:

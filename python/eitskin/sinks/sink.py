@@ -79,8 +79,11 @@ def without_password(url: str) -> str:
     return re.sub(r"(?<=//)([^/@:]*):[^/@]*@", r"\1:...@", url)
 
 
-def address(url: str, port: int | None, *, usage: str) -> tuple[SplitResult, str, int]:
-    """The parts of ``url``, its host (this machine where none is named) and port.
+def address(
+    url: str, port: int | None, *, usage: str, lowest: int = 1
+) -> tuple[SplitResult, str, int]:
+    """The parts of ``url``, its host (this machine where none is named) and port; a server may have
+    0 as its ``lowest``, which is any.
 
     Raises:
         UsageError: it cannot be read, or names no port and there is no usual one.
@@ -92,7 +95,7 @@ def address(url: str, port: int | None, *, usage: str) -> tuple[SplitResult, str
     except ValueError:
         raise UsageError(f"--to {shown}: no address; write  {usage}") from None
     chosen = port if named is None else named
-    if not url.startswith(f"{parts.scheme}://") or chosen is None or not 0 <= chosen <= 65535:
+    if not url.startswith(f"{parts.scheme}://") or chosen is None or not lowest <= chosen <= 65535:
         raise UsageError(f"--to {shown}: write  {usage}")
     return parts, parts.hostname or THIS_MACHINE, chosen
 

@@ -17,24 +17,21 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from eitskin.device.settings import ScanSettings
-from eitskin.errors import FrameError, UsageError
-from eitskin.skin.protocol import Protocol
+from eitskin.errors import UsageError
 from eitskin.teaching.plan import Plan
-from eitskin.teaching.presses import Presses, joined, load_presses, save_presses
+from eitskin.teaching.press_file import PressFile
 
 if TYPE_CHECKING:
     from eitskin.device.wire.packets import BoardInfo
 
 FloatArray = npt.NDArray[np.float64]
 
-SAME_PLACE_MM = 0.02
 PACE_US = 25_000  # a frame: a hold of twelve is .3 s
 JUMPS = 2  # between frames at rest: so many of the greatest are not counted as noise
 
@@ -270,71 +267,6 @@ class PressGuide:
 
 def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-class PressFile:
-    """The presses of a session on disk, whole after each: one that is killed goes on later where it
-    stopped. ``following`` is the place after the last that is there.
-
-    Raises:
-        FrameError: an earlier file has another protocol, or places that are not the plan's.
-        FileError: it cannot be read or written.
-    """
-
-    def __init__(self, path: Path, plan: Plan, protocol: Protocol, skin: str) -> None:
-        self.path, self.plan, self.protocol, self.skin = path, plan, protocol, skin
-        self.presses = load_presses(path) if path.exists() else None
-        self.numbers: list[int] = []
-        if self.presses is None:
-            return
-        if self.presses.protocol.hash != protocol.hash:
-            raise FrameError(f"{path}: made with another protocol; give another -o, or --overwrite")
-        for place in self.presses.place_mm:
-            away = np.linalg.norm(plan.place_mm - place, axis=1)
-            self.numbers.append(int(np.argmin(away)))
-            if away.min() > SAME_PLACE_MM or self.numbers != sorted(set(self.numbers)):
-                raise FrameError(
-                    f"{path}: its places are not this plan's; give another -o, or --overwrite"
-                )
-
-    @property
-    def following(self) -> int:
-        """The place after the last press, from 0."""
-        return self.numbers[-1] + 1 if self.numbers else 0
-
-    def add(self, number: int, untouched: FloatArray, pressed: FloatArray, time_s: float) -> None:
-        """One more press, at place ``number``; on disk when this returns."""
-        one = np.array([number])
-        new = Presses(
-            self.protocol, untouched[None], pressed[None], self.plan.place_mm[one],
-            depth_mm=_known(self.plan.depth_mm[one]), force_n=_known(self.plan.force_n[one]),
-            time_s=np.array([time_s]), skin=self.skin,
-        )  # fmt: skip
-        if self.presses is not None:
-            times = self.presses.time_s
-            new = joined(self.presses, new)
-            if times is not None:
-                new = replace(new, time_s=np.append(times, time_s))
-        save_presses(self.path, new)
-        self.presses = new
-        self.numbers.append(number)
-
-    def back(self) -> int:
-        """Forget the last press; returns its place, 0 where there was none."""
-        if self.presses is None:
-            return 0
-        number = self.numbers.pop()
-        if self.numbers:
-            self.presses = self.presses.take(np.arange(len(self.numbers)))
-            save_presses(self.path, self.presses)
-        else:
-            self.presses = None
-            self.path.unlink(missing_ok=True)
-        return number
-
-
-def _known(values: FloatArray) -> FloatArray | None:
-    return None if np.isnan(values).all() else values
 
 
 def scan_of_presses(board: BoardInfo, replays: bool) -> ScanSettings:

@@ -27,6 +27,7 @@ from eitskin.fileio import read_bytes, write_beside
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.teaching.kernel import Kernel, field_sensitivity
+from eitskin.teaching.presses import MAX_MM
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -132,6 +133,18 @@ def load_plan(path: str | Path) -> Plan:
     wrong = np.flatnonzero(~np.isfinite(values[:, :2]).all(axis=1))
     if len(wrong):
         raise FrameError(f"{path}: line {wrong[0] + 2} has no x_mm or y_mm")
+    far = np.flatnonzero((np.abs(values[:, :2]) > MAX_MM).any(axis=1))
+    if len(far):
+        raise FrameError(
+            f"{path}: line {far[0] + 2} is not within {MAX_MM:g} mm; x_mm and y_mm are in mm"
+        )
+    odd = np.flatnonzero(
+        ~((values[:, 2:] >= 0) & (values[:, 2:] <= 1e6) | np.isnan(values[:, 2:])).all(axis=1)
+    )
+    if len(odd):
+        raise FrameError(
+            f"{path}: line {odd[0] + 2}: depth_mm and force_n must be 0 to 1e6, or empty"
+        )
     if not 1 <= len(values) <= MAX_PLACES:
         raise FrameError(f"{path}: {len(values)} places; a plan has 1 to {MAX_PLACES}")
     return Plan(values[:, :2], values[:, 2], values[:, 3])

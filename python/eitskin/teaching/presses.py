@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -155,14 +155,19 @@ def save_presses(path: str | Path, presses: Presses) -> None:
     Raises:
         FileError: it cannot be written.
     """
-    optional = {n: getattr(presses, n) for n in OPTIONAL if getattr(presses, n) is not None}
     with write_beside(path) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(
-            stream, format=FORMAT, version=VERSION, n_electrodes=presses.protocol.n_electrodes,
-            current_a=presses.protocol.current_a, drive_measure=presses.protocol.drive_measure,
-            untouched=presses.untouched, pressed=presses.pressed, place_mm=presses.place_mm,
-            skin=presses.skin, **optional,
-        )  # fmt: skip
+        write_presses(stream, presses)
+
+
+def write_presses(stream: IO[bytes], presses: Presses) -> None:
+    """Write them to an open file."""
+    optional = {n: getattr(presses, n) for n in OPTIONAL if getattr(presses, n) is not None}
+    np.savez_compressed(
+        stream, format=FORMAT, version=VERSION, n_electrodes=presses.protocol.n_electrodes,
+        current_a=presses.protocol.current_a, drive_measure=presses.protocol.drive_measure,
+        untouched=presses.untouched, pressed=presses.pressed, place_mm=presses.place_mm,
+        skin=presses.skin, **optional,
+    )  # fmt: skip
 
 
 def load_presses(path: str | Path) -> Presses:

@@ -6,11 +6,11 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
+from eitskin_studies.harness.sections import existing_page
 
 if TYPE_CHECKING:
     from eitskin_studies.harness.sections import Filling
@@ -22,7 +22,7 @@ def add_page_option(parser: argparse.ArgumentParser, page: str = "benchmarks") -
         parser,
         "--page FILE.md",
         f"fill the marked places of this page, docs/results/{page}.md",
-        Path,
+        existing_page,
     )
     option(parser, "--json")
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import Output, option
 from eitskin.cli.progress import bar
 from eitskin.errors import FileError, UsageError
 
@@ -46,9 +46,9 @@ def add_parser(subparsers: Any) -> None:
     )
     option(parser, "--threads N", "of the C core's frames", default=1)
     option(parser, "--json", "print JSON, with the curves over the threshold")
-    option(parser, "--csv FILE", "write the numbers of every scene", Path)
-    option(parser, "--picture PNG", "draw test scenes as each method shows them", Path)
-    option(parser, "--curves PNG", "draw MIoU over the threshold", Path)
+    option(parser, "--csv FILE", "write the numbers of every scene", Output)
+    option(parser, "--picture PNG", "draw test scenes as each method shows them", Output)
+    option(parser, "--curves PNG", "draw MIoU over the threshold", Output)
     parser.set_defaults(run=run)
 
 

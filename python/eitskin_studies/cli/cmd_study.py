@@ -8,6 +8,7 @@ from typing import Any
 
 from eitskin.cli.arguments import option
 from eitskin.errors import FileError
+from eitskin_studies.harness.sections import existing_page
 
 
 def add_parser(subparsers: Any) -> None:
@@ -26,7 +27,7 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "--seed S", "of all that is random", default=1)
     option(parser, "--share X", "of the usual number of scenes", default=1.0)
     option(parser, "--data DIR", "measured frames, for the study on them", Path)
-    option(parser, "--page FILE.md", "fill the marked places of this page", Path)
+    option(parser, "--page FILE.md", "fill the marked places of this page", existing_page)
     option(parser, "--no-pictures", "tables and data only")
     option(parser, "--json", "print the data instead of tables")
     parser.set_defaults(run=run)

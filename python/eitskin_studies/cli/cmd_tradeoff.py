@@ -8,6 +8,7 @@ from typing import Any
 
 from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
+from eitskin_studies.harness.sections import existing_page
 
 
 def add_parser(subparsers: Any) -> None:
@@ -42,7 +43,7 @@ def add_parser(subparsers: Any) -> None:
     option(run, "--no-peers", "no other methods on the same scenes")
     option(run, "--front FRONT.json", "also write what the package ships of the results", Path)
     option(run, "--recorded FRONT.json", "also write what the page shows", Path)
-    option(run, "--page PAGE.md", "also put tables and pictures into this page", Path)
+    option(run, "--page PAGE.md", "also put tables and pictures into this page", existing_page)
     option(run, "--no-pictures", "tables only")
     option(run, "--json", "print the results as JSON")
     run.set_defaults(run=run_run)

@@ -27,6 +27,24 @@ _CELL = re.compile(r"\{([^{}|]+)\|([^{}|]+)\|([^{}|]+)\}")
 _INTERVAL = re.compile(r" (?:\(-?[\d.]+ to [\d.]+\)|\[-?[\d.]+, [\d.]+\])")
 
 
+def existing_page(text: str) -> Path:
+    """A page that is named at the command line, refused before any work where it cannot be filled.
+
+    Raises:
+        FileError: it cannot be read.
+        ConfigError: it is no text.
+    """
+    _read(Path(text))
+    return Path(text)
+
+
+def _read(page: Path) -> str:
+    try:
+        return read_bytes(page, "page").decode("utf-8")
+    except UnicodeDecodeError:
+        raise ConfigError(f"{page}: not UTF-8 text, so not a page") from None
+
+
 def fill_marks(page: Path, name: str, filling: Filling) -> None:
     """Write texts and tables between their marks in ``page``, so that none is ever copied by hand;
     of the tables what ``pages.toml`` says of the page ``name``, and its sentences about them.
@@ -35,7 +53,7 @@ def fill_marks(page: Path, name: str, filling: Filling) -> None:
         FileError: the page cannot be read or written.
         ConfigError: a mark is missing; nothing was written.
     """
-    text = read_bytes(page, "page").decode("utf-8")
+    text = _read(page)
     texts, tables = filling
     parts = load_toml(PARTS, "list of what pages show").get(name, {})
     contents = {mark: _wrapped(content) for mark, content in texts.items()}

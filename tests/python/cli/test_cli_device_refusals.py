@@ -162,6 +162,16 @@ def write_model(folder: Path) -> Path:
     return path
 
 
+def test_settings_of_a_recorded_board_are_shown(
+    refused: Refused, scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run.eits"
+    assert main(["record", "--device", f"sim:{scene}", "--frames", "1", "-o", str(path)]) == 0
+    assert main(["board", "--device", f"file:{path}"]) == 0
+    assert "settings  none" in capsys.readouterr().out
+    assert "is a recording" in refused(DEVICE, "board", "--lock", "--device", f"file:{path}")
+
+
 def test_a_recording_without_raw_frames(refused: Refused, scene: Path, tmp_path: Path) -> None:
     path = tmp_path / "run.eits"
     assert main(["record", "--device", f"sim:{scene}", "-o", str(path), "--mode", "touches"]) == 0

@@ -84,6 +84,15 @@ def test_replay_shows_what_was_seen_live(done: Done, scene: Path, tmp_path: Path
     assert lines[:2] == live.splitlines()[:2] and lines[2].startswith("2 frames")
 
 
+def test_gestures_of_a_recording_that_has_touches_alone(done: Done, tmp_path: Path) -> None:
+    path, tap = tmp_path / "run.eits", ("--device", "sim:tap", "--ignore", "all")
+    live = [line for line in done("stream", *tap).splitlines() if "tap" in line]
+    done("record", *tap, "--mode", "touches", "-o", path)
+    *shown, _ = done("replay", path, "--mode", "events").splitlines()
+    assert len(live) == 1 and shown[-1:] == live
+    assert not any(line.split()[1].isdigit() for line in shown)
+
+
 def test_a_recording_is_a_device_too(done: Done, run: Path) -> None:
     shown, replayed = (
         done(*command).splitlines()[0]

@@ -1,6 +1,7 @@
 """What the command line refuses: the documented exit code, one line that says what to do, no
 traceback, no file left."""
 
+import io
 import struct
 import sys
 from collections.abc import Callable
@@ -339,6 +340,24 @@ def test_a_disk_that_is_full(
     output = tmp_path / "out.npz"
     line = refused(FILE, "reconstruct", frames_file, "-o", output)
     assert line == f"{output}: cannot write it (No space left on device)"
+
+
+def test_standard_output_on_a_full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = io.StringIO()
+    with Path("/dev/full").open("w") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        monkeypatch.setattr(sys, "stderr", said)
+        assert main(["scene", "list"]) == FILE
+    assert said.getvalue() == "eitskin: output: No space left on device\n"
+
+
+def test_a_name_that_the_terminal_cannot_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    out = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setattr("eitskin.cli.main.FIRST", "eitskin stream --device sim:k\u00e9\udcff")
+    assert main([]) == 0
+    out.flush()
+    assert out.buffer.getvalue().endswith(rb"sim:k\xe9\udcff" + b"\n")
 
 
 def test_a_folder_that_cannot_be_written(

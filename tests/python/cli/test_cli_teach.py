@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from eitskin.cli.main import main
 from eitskin.model.eitm import save_model
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
@@ -140,6 +141,20 @@ def test_a_model_from_physics_is_none_to_adapt(refused: Refused, files: Path, ac
     out = ("-o", files / "new.eitm") if action == "update" else ()
     line = refused(MODEL, "teach", action, files / "physics.eitm", files / "good.npz", *out)
     assert line.endswith("no press has taught; make one with  eitskin teach fit")
+
+
+def test_frames_without_a_press_leave_the_old_file(
+    files: Path, frames_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan, old = files / "plan.csv", (files / "good.npz").read_bytes()
+    plan.write_text("x_mm,y_mm\n1,2\n500,0\n")
+    given = ["--plan", plan, "-o", files / "good.npz", "--frames", frames_file, "--overwrite"]
+    skin = ["--skin", files / "skin.toml"]
+    assert main(list(map(str, ["teach", "record", *given, *skin]))) == FRAME
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].endswith("off the skin 'small': places 2 of 2; are they in mm?")
+    assert said[1].endswith("as the frames ended before any press of the plan was held")
+    assert (files / "good.npz").read_bytes() == old
 
 
 def test_frames_of_another_protocol_check_nothing(

@@ -27,6 +27,9 @@ FILES = {
     "small.toml": "[skin]\ndiameter_mm = -194\n",
     "weights.csv": "press,grams\nfirst,heavy\n",
     "notes.txt": "the skin was dry\n",
+    "cm.csv": "x_cm,y_cm\n1,2\n",
+    "far.csv": "x_mm,y_mm\n1,2\n2e5,0\n",
+    "deep.csv": "x_mm,y_mm,depth_mm\n1,2,-4\n",
 }
 
 

@@ -33,6 +33,22 @@ def test_links_in_a_circle_are_refused(tmp_path: Path) -> None:
         write_bytes(tmp_path / "a", b"")
 
 
+def test_a_pipe_behind_a_link_is_written_into(tmp_path: Path) -> None:
+    """As /dev/stdout is, which leads to a name that no file has."""
+    read, write = os.pipe()
+    (tmp_path / "stdout").symlink_to(f"/proc/self/fd/{write}")
+    write_bytes(tmp_path / "stdout", b"content")
+    os.close(write)
+    with os.fdopen(read, "rb") as stream:
+        assert stream.read() == b"content"
+
+
+def test_long_names(tmp_path: Path) -> None:
+    write_bytes(tmp_path / ("a" * 251 + ".npz"), b"content")
+    with pytest.raises(FileError, match="File name too long"):
+        write_bytes(tmp_path / ("a" * 252 + ".npz"), b"")
+
+
 @pytest.mark.parametrize("kept", [0o600, 0o664, 0o755])
 def test_a_file_keeps_its_mode(tmp_path: Path, kept: int) -> None:
     path = tmp_path / "out"

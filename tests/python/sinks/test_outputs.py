@@ -123,6 +123,7 @@ REFUSED = [
     ("tui://x", 2, "did you mean 'tuio'?"),
     ("udp://localhost", 2, "udp://HOST:PORT"),
     ("udp://127.0.0.1:9/path", 2, "nothing may follow the port"),
+    ("udp://127.0.0.1:0", 2, "udp://HOST:PORT"),
     ("ws://127.0.0.1:99999", 2, "write  ws://"),
     ("ws://127.0.0.1:{taken}", 13, "name another port"),
     ("foxglove://127.0.0.1:{taken}", 13, "name another port"),
@@ -148,6 +149,17 @@ def test_what_cannot_be_opened_is_refused_in_a_line(
             Outputs(["udp://127.0.0.1:9", url.format(folder=tmp_path, **ports)], swipe.source)
     assert error.value.exit_code == code and part in str(error.value)
     assert str(error.value).count("\n") == 0
+
+
+@pytest.mark.parametrize("kind", ["csv", "mcap"])
+def test_one_writes_to_a_file(swipe: Swipe, kind: str, tmp_path: Path) -> None:
+    """An old file stays whole until the new one has begun, and a second writer is refused."""
+    path, source = tmp_path / "touches", replace(swipe.source, overwrite=True)
+    path.write_bytes(b"old")
+    with path.open("rb") as old, Outputs([f"{kind}:{path}"], source):
+        with pytest.raises(EitskinError, match="another process records to it"):
+            Outputs([f"{kind}:{path}"], source)
+        assert old.read() == b"old"
 
 
 @pytest.mark.parametrize("kind", ["csv", "mcap"])
@@ -188,7 +200,7 @@ def test_a_missing_extra_is_named(
         monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.setattr("eitskin.sinks.osc.find_spec", lambda package: None)
     where = {"lsl": "lsl:", "mcap": f"mcap:{tmp_path}/x.mcap", "foxglove": "foxglove:"}
-    url = where.get(name, f"{name}://127.0.0.1:0")
+    url = where.get(name, f"{name}://127.0.0.1:9")
     with pytest.raises(EitskinError, match=rf"eitskin\[{name}\]") as error:
         Outputs([url], swipe.source)
     assert error.value.exit_code == 9 and not list(tmp_path.iterdir())

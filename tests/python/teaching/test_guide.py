@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from eitskin.cli.main import main
-from eitskin.errors import FrameError
+from eitskin.errors import FileError, FrameError
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.protocol import adjacent, opposite
 from eitskin.skin.skin import Skin
-from eitskin.teaching.guide import GuideEvent, PressFile, PressGuide, Step, guide_presses
+from eitskin.teaching.guide import GuideEvent, PressGuide, Step, guide_presses
 from eitskin.teaching.plan import Plan, load_plan, plan_places, save_plan
+from eitskin.teaching.press_file import PressFile
 from eitskin.teaching.presses import load_presses
 from small_models import EIGHT_OPPOSITE_TOML
 
@@ -108,14 +109,39 @@ def test_a_press_before_the_first_is_not_the_first(early, said: str, tmp_path: P
 
 def test_a_killed_session_goes_on_and_can_go_back(tmp_path: Path) -> None:
     path = tmp_path / "p.npz"
-    Finger().good(0).good(1).guided(path, 3)
+    first, _ = Finger().good(0).good(1).guided(path, 3)
+    with pytest.raises(FileError, match="another process records to it"):
+        Finger().guided(path, 3)
+    first.close()
     file, said = Finger().good(2).add(20).guided(path, 3)
     assert file.numbers == [0, 1, 2] and said[-1].step is Step.DONE
     assert file.back() == 2 and len(load_presses(path)) == 2
+    file.close()
     with pytest.raises(FrameError, match="its places are not this plan's"):
         PressFile(path, plan_of(1), ROWS, "")
     with pytest.raises(FrameError, match="made with another protocol"):
         PressFile(path, plan_of(3), adjacent(8), "")
+
+
+def test_begun_again_the_old_presses_stay_until_the_first_new_one(tmp_path: Path) -> None:
+    old, link = tmp_path / "old.npz", tmp_path / "p.npz"
+    Finger().good(0).good(1).add(20).guided(old, 2)[0].close()
+    link.symlink_to(old)
+    file = PressFile(link, plan_of(2), ROWS, "", anew=True)
+    assert file.following == 0 and len(load_presses(old)) == 2
+    file.add(1, np.ones(ROWS.n_rows), np.full(ROWS.n_rows, 2.0), 0.5)
+    assert link.is_symlink() and np.array_equal(load_presses(old).place_mm, plan_of(2).place_mm[1:])
+    assert file.back() == 1 and link.is_symlink() and not old.exists()
+
+
+def test_presses_that_another_program_wrote_meanwhile_stay(tmp_path: Path) -> None:
+    path, frame = tmp_path / "p.npz", np.ones(ROWS.n_rows)
+    files = [PressFile(path, plan_of(2), ROWS, "") for _ in range(2)]
+    files[0].add(0, frame, 2 * frame, 0.0)
+    with pytest.raises(FileError, match="another program wrote it meanwhile"):
+        files[1].add(1, frame, 3 * frame, 0.0)
+    files[0].add(1, frame, 2 * frame, 1.0)
+    assert np.array_equal(load_presses(path).pressed, [2 * frame, 2 * frame])
 
 
 def test_places_spread_over_the_skin(tmp_path: Path) -> None:

@@ -1,9 +1,8 @@
-"""The file of a recording: begun whole, locked against other recorders, brought to the disk every
-second."""
+"""The file of a recording or of a sink: begun whole, locked against other recorders, brought to the
+disk every second."""
 
 from __future__ import annotations
 
-import fcntl
 import os
 import tempfile
 import threading
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from eitskin.errors import FileError
-from eitskin.fileio import followed, replace_by, sync_folder
+from eitskin.fileio import followed, locked, replace_by, sync_folder
 
 SYNC_S = 1.0
 
@@ -37,7 +36,7 @@ class RecordingFile:
                 self._replace(target, first)
             else:
                 self._file = target.open("xb", buffering=0)
-                _locked(self._file)
+                locked(self._file)
                 self.write(first)
                 sync_folder(target)
         except FileExistsError:
@@ -49,14 +48,14 @@ class RecordingFile:
 
     def _replace(self, target: Path, first: bytes) -> None:
         with target.open("rb") as old:
-            if not _locked(old):
+            if not locked(old):
                 raise FileError(
                     f"{self._path}: another process records to it; stop that, or name another file"
                 )
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         self._file = os.fdopen(handle, "wb", buffering=0)
         try:
-            _locked(self._file)
+            locked(self._file)
             self.write(first)
             replace_by(Path(name), target)
         except BaseException:
@@ -82,6 +81,13 @@ class RecordingFile:
                 " read"
             )
 
+    def tell(self) -> int:
+        """How many bytes are written."""
+        return self._file.tell()
+
+    def flush(self) -> None:
+        """Nothing is held back; for writers that want to be sure."""
+
     def sync_now_and_then(self) -> None:
         """Once a second, begin to bring what was written to the disk; the caller does not wait."""
         if time.monotonic() - self._synced < SYNC_S:
@@ -103,14 +109,3 @@ class RecordingFile:
             self._syncing.join()
         self._sync()
         self._file.close()
-
-
-def _locked(stream: IO[bytes]) -> bool:
-    """Lock ``stream`` as a recorder does; False where another recorder has it."""
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks
-        return True
-    return True

@@ -1,0 +1,138 @@
+"""The presses of a session on disk, as they come."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import FileError, FrameError
+from eitskin.fileio import followed, locked, write_beside
+from eitskin.skin.protocol import Protocol
+from eitskin.teaching.plan import Plan
+from eitskin.teaching.presses import Presses, joined, load_presses, write_presses
+
+FloatArray = npt.NDArray[np.float64]
+
+SAME_PLACE_MM = 0.02
+
+
+class PressFile:
+    """The presses of a session on disk, whole after each: one that is killed goes on later where it
+    stopped; ``anew``: an earlier file is written over with the first press. ``following`` is the
+    place after the last that is there. Locked against other recorders until it is closed.
+
+    Raises:
+        FrameError: an earlier file has another protocol, or places that are not the plan's.
+        FileError: it cannot be read or written, or another process records to it.
+    """
+
+    def __init__(
+        self, path: Path, plan: Plan, protocol: Protocol, skin: str, *, anew: bool = False
+    ) -> None:
+        self.path, self.plan, self.protocol, self.skin = path, plan, protocol, skin
+        self._held: IO[bytes] | None = None
+        self.numbers: list[int] = []
+        if path.is_file():
+            self._held = path.open("rb")
+            if not locked(self._held):
+                self.close()
+                raise FileError(
+                    f"{path}: another process records to it; stop that, or name another file"
+                )
+        try:
+            self.presses = load_presses(path) if path.exists() and not anew else None
+            self._find_places()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Let others record to it; may be called twice."""
+        if self._held is not None:
+            self._held.close()
+
+    def _find_places(self) -> None:
+        path, plan, protocol = self.path, self.plan, self.protocol
+        if self.presses is None:
+            return
+        if self.presses.protocol.hash != protocol.hash:
+            raise FrameError(f"{path}: made with another protocol; give another -o, or --overwrite")
+        for place in self.presses.place_mm:
+            away = np.linalg.norm(plan.place_mm - place, axis=1)
+            self.numbers.append(int(np.argmin(away)))
+            if away.min() > SAME_PLACE_MM or self.numbers != sorted(set(self.numbers)):
+                raise FrameError(
+                    f"{path}: its places are not this plan's; give another -o, or --overwrite"
+                )
+
+    @property
+    def following(self) -> int:
+        """The place after the last press, from 0."""
+        return self.numbers[-1] + 1 if self.numbers else 0
+
+    def add(self, number: int, untouched: FloatArray, pressed: FloatArray, time_s: float) -> None:
+        """One more press, at place ``number``; on disk when this returns."""
+        one = np.array([number])
+        new = Presses(
+            self.protocol, untouched[None], pressed[None], self.plan.place_mm[one],
+            depth_mm=_known(self.plan.depth_mm[one]), force_n=_known(self.plan.force_n[one]),
+            time_s=np.array([time_s]), skin=self.skin,
+        )  # fmt: skip
+        if self.presses is not None:
+            times = self.presses.time_s
+            new = joined(self.presses, new)
+            if times is not None:
+                new = replace(new, time_s=np.append(times, time_s))
+        self._save(new)
+        self.presses = new
+        self.numbers.append(number)
+
+    def _save(self, presses: Presses) -> None:
+        """Write them; the new file is locked before it has its name.
+
+        Raises:
+            FileError: it cannot be written, or another program wrote it since.
+        """
+        if self.path.is_file():
+            ours = self._held is not None and os.path.samestat(
+                self.path.stat(), os.fstat(self._held.fileno())
+            )
+            if not ours:
+                raise FileError(
+                    f"{self.path}: another program wrote it meanwhile; this press is not in it;"
+                    " name another file"
+                )
+        with write_beside(self.path) as temporary:
+            stream = temporary.open("wb")
+            try:
+                locked(stream)
+                write_presses(stream, presses)
+                stream.flush()
+            except BaseException:
+                stream.close()
+                raise
+        self.close()
+        self._held = stream
+
+    def back(self) -> int:
+        """Forget the last press; returns its place, 0 where there was none."""
+        if self.presses is None:
+            return 0
+        number = self.numbers.pop()
+        if self.numbers:
+            self.presses = self.presses.take(np.arange(len(self.numbers)))
+            self._save(self.presses)
+        else:
+            self.presses = None
+            if self.path.is_file():
+                followed(self.path).unlink()
+        return number
+
+
+def _known(values: FloatArray) -> FloatArray | None:
+    return None if np.isnan(values).all() else values
