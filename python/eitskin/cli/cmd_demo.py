@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.fileio import refuse_unwritable
     from eitskin.frames.frames import save_frames
     from eitskin.view.demo_picture import draw_demo
-    from eitskin.view.sheets import check_picture
+    from eitskin.view.panels import check_picture
 
     refuse_unwritable(options.picture, options.frames)
     if not -20 <= options.snr_db <= 200 or options.seed < 0:

@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
                 "--resistor-ring: a ring stands in for the skin; leave --skin and --touch out"
             )
     if options.picture is not None:
-        from eitskin.view.sheets import check_picture
+        from eitskin.view.panels import check_picture
 
         check_picture(options.picture)
     protocol, skin, n_electrodes = read_protocol(options)

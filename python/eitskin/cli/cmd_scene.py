@@ -149,8 +149,8 @@ def run_picture(options: argparse.Namespace) -> int:
     from eitskin.scene.compiler import compile_scene
     from eitskin.scene.library_scenes import find_scene
     from eitskin.scene.runner import run
+    from eitskin.view.panels import check_picture
     from eitskin.view.scene_pictures import draw_scene
-    from eitskin.view.sheets import check_picture
 
     _check_folder(options.output)
     check_picture(options.output)
@@ -177,7 +177,7 @@ def run_list(options: argparse.Namespace) -> int:
 
 def run_effects(options: argparse.Namespace) -> int:
     """Print the effects without importing them, or one effect with its parameters."""
-    from eitskin.scene.parameters import describe_parameters
+    from eitskin.scene.effect_table import describe_parameters
     from eitskin.scene.registry import Registry, summary_of
     from eitskin.scene.runner import plain
 

@@ -30,7 +30,7 @@ def check_drawn(options: argparse.Namespace, what: Stream) -> None:
     from eitskin.device.wire.link_table import Stream
     from eitskin.fileio import refuse_unwritable
     from eitskin.view.film import check_film
-    from eitskin.view.sheets import check_picture
+    from eitskin.view.panels import check_picture
 
     if options.picture is None and options.film is None:
         return

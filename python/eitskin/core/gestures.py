@@ -151,12 +151,6 @@ class Gestures:
         """Events and touches that found no room."""
         return int(self._state.dropped)
 
-    @property
-    def idle(self) -> bool:
-        """Whether no finger is followed and no tap is waited on: what comes next does not depend on
-        what was before."""
-        return not self._state.tapped and not any(one.state for one in self._state.contact)
-
     def update(self, touches: Iterable[Touch], time_us: int) -> list[GestureEvent]:
         """What the frame at ``time_us`` (modulo 2^32) tells, zones last."""
         count = 0

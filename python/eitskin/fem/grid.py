@@ -86,15 +86,6 @@ class Grid:
             )
         return picture[self.index[:, 1], self.index[:, 0]]
 
-    def neighbours(self) -> IntArray:
-        """Each kept pixel's neighbours left, right, below, above: places among the kept, (n, 4); -1
-        for none."""
-        framed = np.pad(self.number, 1, constant_values=-1)
-        ix, iy = self.index[:, 0] + 1, self.index[:, 1] + 1
-        return np.column_stack(
-            [framed[iy, ix - 1], framed[iy, ix + 1], framed[iy - 1, ix], framed[iy + 1, ix]]
-        )
-
     def locate(self, points_mm: npt.ArrayLike) -> IntArray:
         """The kept pixel in which each of ``points_mm`` (k, 2) lies, (k,); -1 outside of all."""
         cell = np.floor(

@@ -157,7 +157,7 @@ def check(
     refuse_unwritable(output, picture, film)
     if picture is not None or film is not None:
         from eitskin.view.film import check_film
-        from eitskin.view.sheets import check_picture
+        from eitskin.view.panels import check_picture
 
         check_picture(picture)
         check_film(film)

@@ -31,9 +31,9 @@ from eitskin.scene.effect import (
     Step,
     VoltageStep,
 )
+from eitskin.scene.effect_table import parse_parameters
 from eitskin.scene.forward_steps import Change, UpdateCost, count_costs, touched_unknowns
 from eitskin.scene.motion import Mix, Motion
-from eitskin.scene.parameters import parse_parameters
 from eitskin.scene.plan import Plan, make_plan
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.reading import live_rows, solved_impedance, with_bridges

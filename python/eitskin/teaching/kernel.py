@@ -29,7 +29,6 @@ FloatArray = npt.NDArray[np.float64]
 Sensitivity = Callable[[FloatArray], FloatArray]
 
 FIELD_PIXELS, FIELD_ELEMENTS = 64, 6000
-MATERN_LENGTH = 0.2  # of the places' greatest distance from their middle, times exp(log scale)
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from eitskin.demo.demo import TOUCHES, Demo
 from eitskin.view.frame_pictures import found_marks
+from eitskin.view.panels import draw_frame
 from eitskin.view.pictures import Mark
-from eitskin.view.sheets import draw_frame
 
 
 def draw_demo(path: str | Path, demo: Demo) -> None:

@@ -12,8 +12,8 @@ from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.gain import channel_gains
 from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
 from eitskin.frames.doctor.report import FAULT, Report
-from eitskin.view.sheet_texts import wrapped
-from eitskin.view.sheets import check_picture, save_picture
+from eitskin.view.panel_texts import wrapped
+from eitskin.view.panels import check_picture, save_picture
 
 MEASURED, EXPECTED, BAD = "#1f5f99", "#b0b7bd", "#c2410c"
 GAIN_SPAN = 0.3

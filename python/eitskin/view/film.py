@@ -12,8 +12,8 @@ import numpy as np
 from eitskin.errors import missing_extra
 from eitskin.fileio import write_beside
 from eitskin.model.model import Model
+from eitskin.view.panels import check_path, panels_figure
 from eitskin.view.pictures import Panel, largest
-from eitskin.view.sheets import check_path, panels_figure
 
 if TYPE_CHECKING:
     from PIL.Image import Image

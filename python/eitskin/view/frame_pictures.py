@@ -10,8 +10,8 @@ from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 from eitskin.scoring.score import FrameScore
+from eitskin.view.panels import draw_panels
 from eitskin.view.pictures import Mark, Panel, found_mark
-from eitskin.view.sheets import draw_panels
 
 MAX_PANELS = 36
 

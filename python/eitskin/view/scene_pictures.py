@@ -11,8 +11,8 @@ import numpy as np
 from eitskin.fem.grid import grid_for
 from eitskin.frames.frames import Frames
 from eitskin.scene.description import Scene
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, Panel, draw_panel, load_matplotlib
-from eitskin.view.sheets import save_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

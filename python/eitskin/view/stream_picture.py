@@ -10,8 +10,8 @@ import numpy as np
 
 from eitskin.model.model import Model
 from eitskin.scoring.stream_check import ComparedFrame, spread
+from eitskin.view.panels import draw_frame, draw_panels
 from eitskin.view.pictures import Mark, Panel, found_mark
-from eitskin.view.sheets import draw_frame, draw_panels
 
 MAX_PANELS = 36
 MAX_KEPT = 20 * MAX_PANELS

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from eitskin.view.sheets import check_picture, save_picture
+from eitskin.view.panels import check_picture, save_picture
 
 if TYPE_CHECKING:
     from eitskin.teaching.teach import Taught

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from eitskin.fileio import write_beside
 from eitskin.skin.skin import Skin
+from eitskin.view.panels import check_path
 from eitskin.view.pictures import load_matplotlib
-from eitskin.view.sheets import check_path
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -156,7 +156,7 @@ def run_growth(options: argparse.Namespace) -> int:
     check_within("--rounds", options.rounds, 1, 1000)
     refuse_unwritable(options.page, options.picture)
     if options.picture is not None:
-        from eitskin.view.sheets import check_picture
+        from eitskin.view.panels import check_picture
 
         check_picture(options.picture)
     result = bench_growth.run(options.rounds, options.cache, progress=progress_bar)

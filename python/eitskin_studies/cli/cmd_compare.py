@@ -112,7 +112,7 @@ def _check(options: argparse.Namespace) -> None:
         if path is not None and not path.parent.is_dir():
             raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
     if options.picture is not None or options.curves is not None:
-        from eitskin.view.sheets import check_picture
+        from eitskin.view.panels import check_picture
 
         check_picture(options.picture)
         check_picture(options.curves)

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from eitskin.fem.grid import Grid
 from eitskin.scoring import metrics
 from eitskin.skin.skin import Skin
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panel, load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD, AlgorithmResult
 from eitskin_studies.experiments.algorithms.scenes import shown_set
 from eitskin_studies.pictures.comparison_pictures import truth_marks

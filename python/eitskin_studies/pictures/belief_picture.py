@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import FOUND, INK, STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.experiments.belief.tables import HIGH, LOW, Sets, coverage, curve
 
 SMALLEST = 1e-3

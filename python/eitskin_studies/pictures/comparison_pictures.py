@@ -7,8 +7,8 @@ from pathlib import Path
 
 from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
+from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
-from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.compare.run import CompareResult, Comparison
 
 

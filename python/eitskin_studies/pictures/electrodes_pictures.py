@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 
 EQUALS = {"noise": "equal noise a row", "time": "equal time, 20.8 ms a frame"}
 COLOURS = {"noise": "#1565c0", "time": "#ef6c00"}

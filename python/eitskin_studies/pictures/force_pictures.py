@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.skin.skin import Skin
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, RIM, STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.experiments.force.law import LOADS_G
 from eitskin_studies.experiments.force.readouts import INTEGRAL, PEAK, TOUCH
 from eitskin_studies.experiments.force.scenes import RADIUS_SHARES

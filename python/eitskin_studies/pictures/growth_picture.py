@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.benchmarks.growth import GrowthTimes, exponent
 
 SOLVE, TOUCHES, MACS = "#1f6fb4", "#d1661f", "#7a7a7a"

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import COLOURS, INK, STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.experiments.homogeneous.cases import IDEAL, MEASURED_TANK, SIMULATED_TANK
 from eitskin_studies.experiments.homogeneous.tables import Row
 from eitskin_studies.experiments.homogeneous.uniformity import deviations_percent

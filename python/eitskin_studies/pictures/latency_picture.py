@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.benchmarks.latency import Latency
 
 COLOURS = ("#1f5fa8", "#2a9d8f", "#e9a03b", "#b3202c")

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from eitskin.view.panels import DPI
 from eitskin.view.pictures import FOUND, INK, load_matplotlib
-from eitskin.view.sheets import DPI
 
 Found = Mapping[str, Mapping[str, Any]]
 

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
+from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
-from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.experiments.multitouch.ambiguity import ScoredFrame
 from eitskin_studies.experiments.multitouch.ambiguity_tables import found_some, reliabilities
 from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, MAX, MIN, NARROW, RING, WIDE

@@ -19,8 +19,8 @@ from eitskin.tuning.front import (
     preset,
 )
 from eitskin.tuning.report_time import report_us
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.tradeoff.fronts import pareto
 from eitskin_studies.tradeoff.table import MIN_GAIN
 

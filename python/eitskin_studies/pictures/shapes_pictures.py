@@ -11,8 +11,8 @@ import numpy as np
 
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import FOUND, INK, RIM, STYLE, Mark, Panel, draw_panel, load_matplotlib
-from eitskin.view.sheets import save_picture
 
 MIN_LOG10 = -3.0
 MISSED = "#c62828"

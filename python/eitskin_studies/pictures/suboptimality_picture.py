@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.benchmarks.suboptimality import MIN, GapCurves
 
 COLOURS = {

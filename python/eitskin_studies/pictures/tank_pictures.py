@@ -11,8 +11,8 @@ import numpy as np
 
 from eitskin.scoring.metrics import THRESHOLDS
 from eitskin.view.frame_pictures import true_marks
+from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import STYLE, Mark, Panel, load_matplotlib
-from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.tanks import tank, touch_like
 

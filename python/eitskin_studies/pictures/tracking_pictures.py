@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eitskin.core.diagnostics_table import Touch
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 
 if TYPE_CHECKING:
     from eitskin_studies.experiments.tracking.counted import TrackCount

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.tuning.front import F767_MHZ, Conditions, Front, Point
+from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, load_matplotlib
-from eitskin.view.sheets import save_picture
 from eitskin_studies.pictures.report_time_picture import draw_report_time
 from eitskin_studies.tradeoff.table import best_points, x_of
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from eitskin.skin.outline import Outline
+from eitskin.view.panels import DPI
 from eitskin.view.pictures import FOUND, INK, RIM, load_matplotlib
-from eitskin.view.sheets import DPI
 
 WRONG = "#b2182b"
 FAILS_BELOW = 90.0

@@ -40,14 +40,14 @@ def test_image_there_and_back() -> None:
         grid.values(np.zeros((3, 3)))
 
 
-def test_neighbours_and_locate() -> None:
+def test_a_place_is_in_the_pixel_around_it() -> None:
     grid = grid_for(disk(100.0), 16)
-    centres, neighbours = grid.centres_mm(), grid.neighbours()
-    for column, step in enumerate([(-1, 0), (1, 0), (0, -1), (0, 1)]):
-        has = neighbours[:, column] >= 0
+    centres, kept = grid.centres_mm(), set(map(tuple, grid.index.tolist()))
+    for step in [(-1, 0), (1, 0), (0, -1), (0, 1)]:
         moved = centres + np.array(step) * grid.pixel_mm
-        np.testing.assert_allclose(centres[neighbours[has, column]], moved[has], atol=1e-9)
-        assert np.array_equal(grid.locate(moved), neighbours[:, column])
+        at = grid.locate(moved)
+        np.testing.assert_allclose(centres[at[at >= 0]], moved[at >= 0], atol=1e-9)
+        assert [k >= 0 for k in at] == [tuple(one) in kept for one in (grid.index + step).tolist()]
     assert np.array_equal(grid.locate(centres), np.arange(grid.n_pixels))
     assert grid.locate([(1e6, 0), (-50.1, 0), (0, 50.1)]).tolist() == [-1, -1, -1]
 

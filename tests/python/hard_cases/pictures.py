@@ -12,8 +12,8 @@ from touch_scenes import frames_of, groups
 
 from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TouchScene
+from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
-from eitskin.view.sheets import draw_panels, save_picture
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
 from eitskin_studies.pictures.comparison_pictures import truth_marks
 from small_models import prebuilt

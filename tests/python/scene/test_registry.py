@@ -10,8 +10,8 @@ import pytest
 from scene_helpers import effect_module
 
 from eitskin.errors import ConfigError
+from eitskin.scene.effect_table import describe_parameters, parse_parameters
 from eitskin.scene.parameter import parameter
-from eitskin.scene.parameters import describe_parameters, parse_parameters
 from eitskin.scene.registry import BUILT_IN, ENTRY_POINT_GROUP, Registry
 
 ROOT = Path(__file__).resolve().parents[3]

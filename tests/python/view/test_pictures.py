@@ -13,8 +13,8 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import polygon
 from eitskin.skin.skin import Skin, paper_skin
 from eitskin.view import pictures
+from eitskin.view.panels import draw_frame, draw_panels, save_picture
 from eitskin.view.pictures import Mark, Panel, found_mark
-from eitskin.view.sheets import draw_frame, draw_panels, save_picture
 
 SKIN = paper_skin()
 GRID = grid_for(SKIN.outline)

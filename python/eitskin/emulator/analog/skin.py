@@ -66,11 +66,6 @@ class AnalogSkin:
         self._quiet_next = 0
         self._frame = -1  # of the scene, shown in this scan; -1 is a quiet one
 
-    @property
-    def began(self) -> bool:
-        """Whether the scene has begun."""
-        return self._began is not None
-
     def begin(self, at: int) -> None:
         """Let the scene's time 0 be ``at`` (ticks)."""
         self._began = at

@@ -307,7 +307,7 @@ def _draw(path: Path, data: dict[str, Any], splits: int) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from eitskin.view.sheets import save_picture
+    from eitskin.view.panels import save_picture
 
     figure = Figure(figsize=(7, 4.2), layout="constrained")
     FigureCanvasAgg(figure)

@@ -13,9 +13,9 @@ from eitskin.fem.grid import grid_for
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.skin import Skin, load_skin
+from eitskin.view.panel_texts import wrapped
+from eitskin.view.panels import frame_figure, panels_figure, save_picture
 from eitskin.view.pictures import Mark, Panel
-from eitskin.view.sheet_texts import wrapped
-from eitskin.view.sheets import frame_figure, panels_figure, save_picture
 
 HAND = Path(__file__).parents[3] / "examples" / "hand.toml"
 LONG = "a recording of the second morning, electrode 5 loose, $x_1$, by the window"

@@ -16,6 +16,7 @@ from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import write_beside
 from eitskin.skin.skin import Skin
+from eitskin.view.panel_texts import Key, plain, wrapped
 from eitskin.view.pictures import (
     INK,
     MARGIN,
@@ -27,7 +28,6 @@ from eitskin.view.pictures import (
     largest,
     load_matplotlib,
 )
-from eitskin.view.sheet_texts import Key, plain, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,7 +63,7 @@ class Cell:
 
 
 @dataclass
-class Sheet:
+class Page:
     """A figure under way: ``height`` grows from its top as things are put in."""
 
     width: float
@@ -187,45 +187,45 @@ def panels_figure(
     columns = columns or _columns(len(panels), cell, size)
     rows = math.ceil(len(panels) / columns)
     width = max(columns * cell.whole + 2 * EDGE, MIN_WIDTH)
-    sheet = Sheet(width)
+    page = Page(width)
     if title:
-        sheet.text(wrapped(title, width - 2 * EDGE, 11, "bold"), 11, "bold")
+        page.text(wrapped(title, width - 2 * EDGE, 11, "bold"), 11, "bold")
     headings = [_heading(panel.title, cell, size) for panel in panels]
     left = (width - columns * cell.whole) / 2
     places = []
     for row in range(rows):
         here = range(row * columns, min((row + 1) * columns, len(panels)))
         lines = max(len(headings[k].split("\n")) for k in here)
-        sheet.height += GAP + lines * LINE * size / 8.5
+        page.height += GAP + lines * LINE * size / 8.5
         for k in here:
             x = left + (k - row * columns) * cell.whole + cell.left
-            places.append((x, sheet.height, cell.width, cell.height))
-        sheet.height += cell.height + cell.below
-    bar_top = sheet.height = sheet.height + GAP
+            places.append((x, page.height, cell.width, cell.height))
+        page.height += cell.height + cell.below
+    bar_top = page.height = page.height + GAP
     coloured = any(panel.values is not None or panel.fill_truth for panel in panels)
     if coloured:
-        sheet.height += BAR + TICKS
+        page.height += BAR + TICKS
         unit = UNIT_TEXT if limit is None else "change of conductivity (S/m)"
-        sheet.text(wrapped(unit, width - 2 * EDGE, 8.5), 8.5)
+        page.text(wrapped(unit, width - 2 * EDGE, 8.5), 8.5)
     key = Key(panels, width) if legend else None
-    key_top = sheet.height
+    key_top = page.height
     if key is not None:
-        sheet.height += key.height
+        page.height += key.height
     if note:
-        sheet.height += 0.04
-        sheet.text(wrapped(note, width - 2 * EDGE, 8), 8)
-    figure = _figure(sheet)
+        page.height += 0.04
+        page.text(wrapped(note, width - 2 * EDGE, 8), 8)
+    figure = _figure(page)
     for k, (panel, place) in enumerate(zip(panels, places, strict=True)):
-        axes = _axes(figure, sheet, place)
+        axes = _axes(figure, page, place)
         shown = _titled(panel, headings[k])
         colours = draw_panel(axes, skin, grid, shown, limit=limit, small=small)
         _axis_labels(axes, small, k % columns == 0)
     if coloured:
         bar_width = min(0.7 * width, 3.2)
         place = ((width - bar_width) / 2, bar_top, bar_width, BAR)
-        _bar(figure, colours, _axes(figure, sheet, place))
+        _bar(figure, colours, _axes(figure, page, place))
     if key is not None:
-        key.draw(figure, key_top / sheet.height)
+        key.draw(figure, key_top / page.height)
     return figure
 
 
@@ -251,22 +251,22 @@ def frame_figure(
     cell = _cell(skin, small=False)
     columns = 1 if cell.width > 2 * cell.height else len(panels)
     width = max(columns * cell.whole + 2 * EDGE, MIN_WIDTH)
-    sheet = Sheet(width)
+    page = Page(width)
     if title:
-        sheet.text(wrapped(title, width - 2 * EDGE, 11, "bold"), 11, "bold")
+        page.text(wrapped(title, width - 2 * EDGE, 11, "bold"), 11, "bold")
     label = "\n".join(wrapped(f"change of conductivity ({unit})", cell.whole - GAP, 9))
     lines = label.count("\n") + 1
     left, places = (width - columns * cell.whole) / 2, []
     for row in range(math.ceil(len(panels) / columns)):
-        sheet.height += GAP + LINE * 10 / 8.5
+        page.height += GAP + LINE * 10 / 8.5
         for k in range(columns if columns > 1 else 1):
             x = left + k * cell.whole + cell.left
-            places.append((x, sheet.height, cell.width, cell.height))
-        sheet.height += cell.height + cell.below + GAP + BAR + TICKS + lines * LINE * 9 / 8.5
+            places.append((x, page.height, cell.width, cell.height))
+        page.height += cell.height + cell.below + GAP + BAR + TICKS + lines * LINE * 9 / 8.5
         del row
-    figure = _figure(sheet)
+    figure = _figure(page)
     for k, (panel, place) in enumerate(zip(panels, places, strict=True)):
-        axes = _axes(figure, sheet, place)
+        axes = _axes(figure, page, place)
         shows = panel.values is not None or panel.fill_truth
         changes = [mark.change or 0.0 for mark in panel.truth]
         limit = largest(image if panel.values is not None else changes)
@@ -276,12 +276,12 @@ def frame_figure(
         bar_top = top + high + cell.below + GAP
         if shows:
             bar_width = min(0.9 * wide, 3.2)
-            bar = _axes(figure, sheet, (x + (wide - bar_width) / 2, bar_top, bar_width, BAR))
+            bar = _axes(figure, page, (x + (wide - bar_width) / 2, bar_top, bar_width, BAR))
             _bar(figure, coloured, bar, label)
         else:
             key = Key([panel], cell.whole)
             middle = (x + wide / 2) / width
-            key.draw(figure, bar_top / sheet.height, middle)
+            key.draw(figure, bar_top / page.height, middle)
     return figure
 
 
@@ -319,28 +319,28 @@ def _titled(panel: Panel, heading: str) -> Panel:
     return Panel(plain(heading), panel.values, panel.truth, panel.found, panel.fill_truth)
 
 
-def _figure(sheet: Sheet) -> Figure:
+def _figure(page: Page) -> Figure:
     matplotlib = load_matplotlib()
-    sheet.height += EDGE
+    page.height += EDGE
     with matplotlib.rc_context(STYLE):
-        figure: Figure = matplotlib.figure.Figure(figsize=(sheet.width, sheet.height))
+        figure: Figure = matplotlib.figure.Figure(figsize=(page.width, page.height))
         matplotlib.backends.backend_agg.FigureCanvasAgg(figure)
-        for top, text, size, weight in sheet.texts:
+        for top, text, size, weight in page.texts:
             figure.text(
-                0.5, 1 - top / sheet.height, plain(text), ha="center", va="center",
+                0.5, 1 - top / page.height, plain(text), ha="center", va="center",
                 fontsize=size, fontweight=weight, color=INK,
             )  # fmt: skip
     return figure
 
 
-def _axes(figure: Figure, sheet: Sheet, place: tuple[float, float, float, float]) -> Axes:
-    """Axes at ``place``: left, top, width and height in inches from the sheet's upper left."""
+def _axes(figure: Figure, page: Page, place: tuple[float, float, float, float]) -> Axes:
+    """Axes at ``place``: left, top, width and height in inches from the page's upper left."""
     left, top, width, height = place
-    bottom = sheet.height - top - height
+    bottom = page.height - top - height
     matplotlib = load_matplotlib()
     with matplotlib.rc_context(STYLE):
         return figure.add_axes(
-            (left / sheet.width, bottom / sheet.height, width / sheet.width, height / sheet.height)
+            (left / page.width, bottom / page.height, width / page.width, height / page.height)
         )
 
 
