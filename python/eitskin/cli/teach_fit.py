@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
 
     refuse_unwritable(options.output, options.picture)
     if options.picture is not None:
-        from eitskin.view.sheets import check_picture
+        from eitskin.view.panels import check_picture
         from eitskin.view.taught_picture import draw_taught
 
         check_picture(options.picture)
