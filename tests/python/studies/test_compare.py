@@ -127,7 +127,7 @@ class Oracle:
     def reconstruct(self, dv: np.ndarray) -> np.ndarray:
         sets = {6: "train", 8: "test"}
         scenes = random_touches(SKIN.outline, 3, len(dv), sets[len(dv)]).scenes
-        return np.array([pixel_cover(self.grid, s.centres_mm(), s.radii_mm()) for s in scenes])  # type: ignore[arg-type]
+        return np.array([pixel_cover(self.grid, s.centres_mm(), s.radii_mm()) for s in scenes])
 
     def touches(self, dv: np.ndarray) -> Sequence[np.ndarray]:
         return [
