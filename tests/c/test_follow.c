@@ -265,6 +265,30 @@ static void where_touches_may_give_all_it_stays(void)
     tear_down(&b);
 }
 
+/* A touch on the edge of two pixels is of both: rounding does not choose one. */
+static void on_the_edge_of_pixels_rounding_decides_nothing(void)
+{
+    double goes[2];
+    for (int side = 0; side < 2; ++side) {
+        bench b;
+        eits_context *ctx = set_up(&b, 2);
+        const eits_model *m = &b.c.model;
+        const double edge = (double)m->origin_x_mm + (double)m->pixel_mm;
+        const eits_touch touch = {.x_mm = (eits_real)(edge * (1 + (side == 0 ? -4 : 4) * EPS)),
+                                  .y_mm = (eits_real)(m->origin_y_mm + 0.5f * m->pixel_mm)};
+        for (int frame = 0; frame < 2; ++frame) {
+            uint64_t macs = 0;
+            change_fold(&b, 0, 0.01 * frame);
+            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, &touch, 1, 1, &macs), frame);
+        }
+        goes[side] = (double)(ctx->reference.v0[9] / b.quiet[9]) - 1;
+        tear_down(&b);
+    }
+    CHECK(fabs(goes[0]) > 1e-4);
+    CHECK_NEAR(goes[0], goes[1], 100 * EPS);
+}
+
 /* A round skin has no pixel in the corner where the touch is; ratios know no size. */
 static void the_size_of_differences_follows_on_any_outline(void)
 {
@@ -426,6 +450,7 @@ int main(void)
     a_row_that_one_frame_lacks_stays();
     under_a_touch_only_its_size_follows();
     where_touches_may_give_all_it_stays();
+    on_the_edge_of_pixels_rounding_decides_nothing();
     the_size_of_differences_follows_on_any_outline();
     the_size_follows_under_the_same_touches_alone();
     a_frame_of_no_use_is_not_followed();

@@ -71,6 +71,30 @@ static void orders_have_each_drive_once_and_whole(void)
     CHECK_EQUAL(with_order(4, 9, 80, 0, 160), EITS_E_MODEL_VALUE);   /* drives mixed */
 }
 
+static eits_status with_place_factor(float factor, uint32_t size)
+{
+    uint8_t bytes[8] = {0};
+    small_put_f32(bytes, factor);
+    small_model bare = small_model_make(TINY);
+    small_model made = small_model_with_section(&bare, "PLAC", bytes, size);
+    eits_model model;
+    const eits_status status = eits_model_open(&model, made.blob, made.size);
+    if (status == EITS_OK)
+        CHECK(model.place_factor == factor);
+    small_model_free(&made);
+    small_model_free(&bare);
+    return status;
+}
+
+static void a_place_factor_is_a_number_from_0_on(void)
+{
+    CHECK_EQUAL(with_place_factor(0, 4), EITS_OK);
+    CHECK_EQUAL(with_place_factor(4.5f, 4), EITS_OK);
+    CHECK_EQUAL(with_place_factor(4.5f, 8), EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(with_place_factor(-1, 4), EITS_E_MODEL_VALUE);
+    CHECK_EQUAL(with_place_factor(NAN, 4), EITS_E_MODEL_VALUE);
+}
+
 static void dimensions(void)
 {
     static const struct {
@@ -418,6 +442,7 @@ static void many_bytes_changed_and_sealed(void)
 int main(void)
 {
     orders_have_each_drive_once_and_whole();
+    a_place_factor_is_a_number_from_0_on();
     dimensions();
     numbers_of_the_dimensions();
     electrodes_folds_and_pixels();

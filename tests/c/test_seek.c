@@ -6,6 +6,7 @@
 #include "base/vec.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
+#include "evidence/evidence.h"
 #include "kernels/kernels.h"
 #include "touch/disc_fit.h"
 
@@ -149,10 +150,87 @@ static void a_disc_a_whole_pixel_beyond_the_rim_is_no_touch(void)
     }
 }
 
+/* The answer to disc k of `touch`, moved, in doubles. */
+static void answer(eits_context *ctx, const eits_touch *touch, double dx, double dy, double *out)
+{
+    eits_real atom[RANK];
+    const eits_disc disc = {.x_mm = touch->x_mm + (eits_real)dx,
+                            .y_mm = touch->y_mm + (eits_real)dy,
+                            .radius_mm = touch->radius_mm};
+    (void)eits_disc_atom(ctx, &ctx->scratch, &disc, atom, NULL);
+    for (int i = 0; i < RANK; ++i)
+        out[i] = (double)atom[i];
+}
+
+/* C = unit (G'G)^-1, G by finite differences, beside the answers of both touches. */
+static void a_place_is_as_sure_as_the_fit_and_the_models_factor_say(void)
+{
+    static const eits_disc disc[2] = {{-10, 3, 9, R(0.05), 1}, {14, 3, 9, R(0.05), 1}};
+    const double step = sizeof(eits_real) == 4 ? 0.02 : 1e-4, factor = 2.5;
+    eits_touch touch[EITS_MAX_TOUCHES];
+    dense_bench b = {0};
+    eits_context *ctx = pressed(&b, disc, 2, EITS_SIGN_INCREASE);
+    for (uint32_t i = 0; i < RANK; i += 3)
+        ctx->frame.y[i] *= R(0.98);
+    const double total = (double)eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, RANK);
+    CHECK_EQUAL(found(ctx, touch), 2);
+    CHECK(touch[0].x_variance_mm2 == 0 && touch[0].y_variance_mm2 == 0);
+    b.c.model.place_factor = (float)factor;
+    CHECK_EQUAL(found(ctx, touch), 2);
+    const double unit = factor * (double)ctx->info.unexplained * total / (RANK - 2 * 4);
+    CHECK(unit > 0);
+    for (int k = 0; k < 2; ++k) {
+        double g[2][RANK], back[RANK], both[2 * RANK], h[3];
+        const eits_disc at = {touch[k].x_mm, touch[k].y_mm, touch[k].radius_mm, 0, 1};
+        const double change = (double)(touch[k].strength_s_per_m_mm2 / eits_disc_area(ctx, &at));
+        for (int axis = 0; axis < 2; ++axis) {
+            const double dx = axis == 0 ? step : 0, dy = axis == 1 ? step : 0;
+            answer(ctx, &touch[k], dx, dy, g[axis]);
+            answer(ctx, &touch[k], -dx, -dy, back);
+            for (int i = 0; i < RANK; ++i)
+                g[axis][i] = change * (g[axis][i] - back[i]) / (2 * step);
+            answer(ctx, &touch[0], 0, 0, both);
+            answer(ctx, &touch[1], 0, 0, both + RANK);
+            dense_project_out(g[axis], both, 2, RANK);
+        }
+        for (int i = 0; i < 3; ++i)
+            h[i] = dense_dot(g[i / 2], g[(i + 1) / 2], RANK);
+        const double det = h[0] * h[2] - h[1] * h[1];
+        CHECK_NEAR((double)touch[k].x_variance_mm2 / (unit * h[2] / det), 1, 0.03);
+        CHECK_NEAR((double)touch[k].y_variance_mm2 / (unit * h[0] / det), 1, 0.03);
+        CHECK_NEAR((double)touch[k].xy_covariance_mm2 / (unit * h[2] / det), -h[1] / h[2], 0.03);
+    }
+    dense_bench_close(&b);
+}
+
+/* A touch that nothing is left beside has no place to be unsure of. */
+static void without_a_residual_a_place_is_not_rated(void)
+{
+    static const eits_disc disc = {-21, 9, 9, R(0.05), 1};
+    dense_bench b = {0};
+    eits_context *ctx = pressed(&b, &disc, 1, EITS_SIGN_INCREASE);
+    eits_fit f = eits_fit_none(ctx, &ctx->scratch);
+    b.c.model.place_factor = 1;
+    f.count = 1;
+    f.disc[0] = disc;
+    eits_fit_restart(ctx, &ctx->scratch, &f);
+    eits_zero(f.residual, RANK);
+    f.place_mm2[0][0] = 7;
+    f.tested = 1;
+    eits_place_touches(ctx, &ctx->scratch, &f);
+    CHECK(f.place_mm2[0][0] == 7); /* the test has said it */
+    f.tested = 0;
+    eits_place_touches(ctx, &ctx->scratch, &f);
+    CHECK(f.place_mm2[0][0] == 0);
+    dense_bench_close(&b);
+}
+
 int main(void)
 {
     touches_that_the_image_does_not_show_are_found();
     what_explains_too_little_is_no_touch();
     a_disc_a_whole_pixel_beyond_the_rim_is_no_touch();
+    a_place_is_as_sure_as_the_fit_and_the_models_factor_say();
+    without_a_residual_a_place_is_not_rated();
     return checks_report("seek");
 }

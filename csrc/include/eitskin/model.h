@@ -215,6 +215,9 @@ typedef struct eits_model {
      * of the rows' noise that P whitens, P R^-1 P' = I (section PREC of taught models); NULL: none
      */
     const float *precision;
+    /* what the covariance of a place by the fit's normal equations is multiplied by (section PLAC
+     * of taught models); 0: places are not rated so */
+    float place_factor;
     const char *meta; /* JSON, not terminated by 0; NULL if absent */
     uint32_t meta_size;
 } eits_model;

@@ -7,15 +7,36 @@
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-uint64_t eits_project(const eits_context *ctx, eits_real *v)
+uint64_t eits_take_out(const eits_context *ctx, const eits_real *directions, uint32_t count,
+                       eits_real *v)
 {
     const uint32_t rank = ctx->model->rank;
     const size_t stride = EITS_STRIDE(rank);
     /* One direction after another, not all products first: in float32 the directions are orthogonal
      * to rounding only, and so what one leaves of the next is seen. */
-    for (uint32_t k = 0; k < ctx->projection.count; ++k) {
-        const eits_real *direction = ctx->projection.basis + stride * k;
+    for (uint32_t k = 0; k < count; ++k) {
+        const eits_real *direction = directions + stride * k;
         eits_axpy(ctx->kernels, v, -eits_dot(ctx->kernels, direction, v, rank), direction, rank);
     }
-    return (uint64_t)ctx->projection.count * 2u * rank;
+    return (uint64_t)count * 2u * rank;
+}
+
+int eits_add_direction(const eits_context *ctx, eits_real *directions, uint32_t count,
+                       eits_real least, uint64_t *macs)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_real *one = directions + EITS_STRIDE(rank) * (size_t)count;
+    const eits_real before = eits_dot(ctx->kernels, one, one, rank);
+    *macs += eits_take_out(ctx, directions, count, one);
+    const eits_real after = eits_dot(ctx->kernels, one, one, rank), scale = 1 / eits_sqrt(after);
+    if (!(after > least * before))
+        return 0;
+    for (uint32_t i = 0; i < rank; ++i)
+        one[i] *= scale;
+    return 1;
+}
+
+uint64_t eits_project(const eits_context *ctx, eits_real *v)
+{
+    return eits_take_out(ctx, ctx->projection.basis, ctx->projection.count, v);
 }

@@ -7,12 +7,18 @@
  * A disc is a touch with probability rise / (rise + HALF), a logistic function of the logarithm of
  * its rise. A place is off by what the data leave open (the covariance, as far as it was found
  * true), by what the test would move it, and by what the skin is unlike its model, for which the
- * reference's distance from the model's stands. */
+ * reference's distance from the model's stands.
+ *
+ * A taught model has no such test. There the fit's normal equations say how far a place is known,
+ * with the strengths of all discs free and what is left of the data for their noise, and the model
+ * by how much presses that it had not been taught were further off. */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
+#include "context/projection.h"
 #include "diagnostics/diagnostics.h"
 #include "evidence/constants.h"
+#include "frame/constants.h"
 
 static int is_known(const eits_real *place_mm2, const eits_real *apart_mm)
 {
@@ -41,6 +47,47 @@ void eits_rate_touches(const eits_context *ctx, eits_fit *f)
         f->confidence[k] =
             f->tested && rise > 0 ? 1 - EITS_CONFIDENCE_HALF / (rise + EITS_CONFIDENCE_HALF) : 0;
     }
+}
+
+/* C = unit (G'G)^-1, G (rank x 2) the slopes of disc k's answer by x and y beside the directions.
+ */
+static void place_by_slopes(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k,
+                            const eits_real *directions, uint32_t count, eits_real unit)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_real *x = scratch->row[5], *y = scratch->row[6], *place = f->place_mm2[k];
+    const eits_real by_change = f->disc[k].change * f->disc[k].change;
+    f->macs += eits_disc_atom(ctx, scratch, &f->disc[k], eits_atom(ctx, k), &scratch->row[5]);
+    f->macs += eits_take_out(ctx, directions, count, x) + eits_take_out(ctx, directions, count, y);
+    const eits_real xx = eits_dot(ctx->kernels, x, x, rank),
+                    yy = eits_dot(ctx->kernels, y, y, rank),
+                    xy = eits_dot(ctx->kernels, x, y, rank),
+                    scale = unit / (by_change * eits_fma(xx, yy, -(xy * xy)));
+    f->macs += 3u * (uint64_t)rank;
+    place[0] = scale * yy;
+    place[1] = -scale * xy;
+    place[2] = scale * xx;
+    if (!eits_all_finite(place, 3) || !(place[0] > 0) || !(place[2] > 0))
+        eits_zero(place, 3);
+}
+
+void eits_place_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
+{
+    const uint32_t rank = ctx->model->rank;
+    const eits_real data = (eits_real)rank - (eits_real)(EITS_PLACE_PARAMETERS * f->count),
+                    unit = (eits_real)ctx->model->place_factor * eits_fit_left(ctx, f) /
+                           (data > EITS_MIN_FREEDOM ? data : EITS_MIN_FREEDOM);
+    uint32_t known = 0;
+    if (f->tested || !(ctx->model->place_factor > 0))
+        return;
+    for (uint32_t k = 0; k < f->count && known < rank; ++k) {
+        eits_copy(scratch->square + EITS_STRIDE(rank) * known, eits_atom(ctx, k),
+                  EITS_STRIDE(rank));
+        known += (uint32_t)eits_add_direction(ctx, scratch->square, known, EITS_BASIS_TOLERANCE,
+                                              &f->macs);
+    }
+    for (uint32_t k = 0; k < f->count; ++k)
+        place_by_slopes(ctx, scratch, f, k, scratch->square, known, unit);
 }
 
 void eits_check_count(eits_context *ctx, const eits_fit *f)

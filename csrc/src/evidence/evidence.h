@@ -134,6 +134,10 @@ void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
  * wide as places err; zeros where discs were not tested. */
 void eits_rate_touches(const eits_context *ctx, eits_fit *f);
 
+/* f->place_mm2 of discs that were not tested, by the fit's normal equations, where the model says
+ * how far to trust them. */
+void eits_place_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
+
 /* Sets CROWDED where a disc may be two touches, or none, or the test was cut short. */
 void eits_check_count(eits_context *ctx, const eits_fit *f);
 

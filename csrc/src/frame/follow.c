@@ -82,16 +82,13 @@ static void reduce(eits_context *ctx, const eits_scratch *scratch, const eits_re
     *macs += eits_reduce_whole(ctx, scratch, count, out);
 }
 
-/* out (stride numbers) = F S_j. */
-static void read_column(const eits_context *ctx, const eits_scratch *scratch, uint32_t j,
-                        eits_real *out, uint64_t *macs)
+/* out (stride numbers) += factor S_j. */
+static void add_column(const eits_context *ctx, const eits_scratch *scratch, uint32_t j,
+                       eits_real factor, eits_real *out)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
-    const eits_real *column = eits_column(s, j, scratch->row[7]), scale = eits_column_scale(s, j);
-    eits_zero(out, EITS_STRIDE(ctx->model->rank));
-    for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        out[i] = scale * column[i];
-    *macs += eits_whiten(ctx, out);
+    eits_axpy(ctx->kernels, out, factor * eits_column_scale(s, j),
+              eits_column(s, j, scratch->row[7]), ctx->model->rank);
 }
 
 /* ---- untouched ---- */
@@ -110,8 +107,9 @@ static eits_real best_match(eits_context *ctx, const eits_scratch *scratch, cons
         best = eits_fabs(match[j]) > eits_fabs(match[best]) ? j : best;
     if (!(eits_fabs(match[best]) > eits_lambda_noise_floor(ctx))) /* rounding */
         return 0;
-    read_column(ctx, scratch, best, column, macs);
-    *macs += eits_project(ctx, column);
+    eits_zero(column, EITS_STRIDE(model->rank));
+    add_column(ctx, scratch, best, 1, column);
+    *macs += eits_whiten(ctx, column) + eits_project(ctx, column);
     return match[best] * match[best] /
            (eits_dot(ctx->kernels, y, y, model->rank) *
             eits_dot(ctx->kernels, column, column, model->rank));
@@ -134,36 +132,25 @@ static int move(eits_context *ctx, const eits_scratch *scratch, uint32_t count, 
 
 /* ---- under touches ---- */
 
-/* The kept pixel whose centre is nearest: a place may lie on the skin's edge, where rounding would
- * say which cell it is in. */
-static uint32_t pixel_at(const eits_context *ctx, const eits_touch *touch)
+/* out (stride numbers) = F times what S gives at a touch, linear between centres of pixels: steps
+ * of the fit end on edges of pixels, where rounding would choose the nearest. */
+static void read_place(const eits_context *ctx, const eits_scratch *scratch,
+                       const eits_touch *touch, eits_real *out, uint64_t *macs)
 {
     const eits_model *m = ctx->model;
     const eits_real x = (touch->x_mm - (eits_real)m->origin_x_mm) / (eits_real)m->pixel_mm - R(0.5),
                     y = (touch->y_mm - (eits_real)m->origin_y_mm) / (eits_real)m->pixel_mm - R(0.5);
-    uint32_t best = 0;
-    eits_real least = -1;
+    eits_zero(out, EITS_STRIDE(m->rank));
     for (uint32_t k = 0; k < m->nx * m->ny; ++k) {
-        const eits_real dx = (eits_real)(k % m->nx) - x, dy = (eits_real)(k / m->nx) - y,
-                        apart = eits_fma(dx, dx, dy * dy);
-        if (ctx->cell[k] == EITS_NO_PIXEL || (least >= 0 && apart >= least))
+        const uint32_t j = ctx->cell[k];
+        const eits_real across = 1 - eits_fabs((eits_real)(k % m->nx) - x),
+                        along = 1 - eits_fabs((eits_real)(k / m->nx) - y);
+        if (j == EITS_NO_PIXEL || !(across > 0 && along > 0) || m->column_weight[j] == 0.0f)
             continue;
-        least = apart;
-        best = ctx->cell[k];
+        add_column(ctx, scratch, j, across * along / (eits_real)m->column_weight[j], out);
+        *macs += m->rank;
     }
-    return best;
-}
-
-/* v less its parts along `count` orthonormal directions, stride apart. */
-static uint64_t remove_parts(const eits_context *ctx, const eits_real *direction, uint32_t count,
-                             eits_real *v)
-{
-    const size_t stride = EITS_STRIDE(ctx->model->rank);
-    for (uint32_t k = 0; k < count; ++k) {
-        const eits_real *one = direction + k * stride;
-        eits_axpy(ctx->kernels, v, -eits_dot(ctx->kernels, one, v, ctx->model->rank), one, stride);
-    }
-    return 2u * (uint64_t)count * ctx->model->rank;
+    *macs += eits_whiten(ctx, out);
 }
 
 /* Orthonormal directions that the touches' columns span, stride apart; returns their number. */
@@ -174,17 +161,9 @@ static uint32_t span_touches(const eits_context *ctx, const eits_scratch *scratc
     const uint32_t rank = ctx->model->rank;
     uint32_t known = 0;
     for (uint32_t k = 0; k < count && known < rank; ++k) {
-        eits_real *one = direction + known * EITS_STRIDE(rank);
-        read_column(ctx, scratch, pixel_at(ctx, &touches[k]), one, macs);
-        const eits_real before = eits_dot(ctx->kernels, one, one, rank);
-        *macs += remove_parts(ctx, direction, known, one);
-        const eits_real after = eits_dot(ctx->kernels, one, one, rank),
-                        scale = 1 / eits_sqrt(after);
-        if (!(after > EITS_FOLLOW_LEFT * before)) /* another touch's */
-            continue;
-        for (uint32_t i = 0; i < rank; ++i)
-            one[i] *= scale;
-        ++known;
+        read_place(ctx, scratch, &touches[k], direction + known * EITS_STRIDE(rank), macs);
+        /* not another touch's, nor off the skin */
+        known += (uint32_t)eits_add_direction(ctx, direction, known, EITS_FOLLOW_LEFT, macs);
     }
     return known;
 }
@@ -203,7 +182,7 @@ static eits_real gain_beside(eits_context *ctx, const eits_scratch *scratch,
     reduce(ctx, scratch, b->m2, u, macs);
     const eits_real whole = eits_dot(ctx->kernels, u, u, rank);
     const uint32_t known = span_touches(ctx, scratch, touches, count, scratch->square, macs);
-    *macs += remove_parts(ctx, scratch->square, known, u);
+    *macs += eits_take_out(ctx, scratch->square, known, u);
     const eits_real left = eits_dot(ctx->kernels, u, u, rank);
     return left > EITS_FOLLOW_LEFT * whole ? eits_dot(ctx->kernels, u, y, rank) / left : 0;
 }

@@ -51,6 +51,10 @@ eits_status eits_read_uncertainty(eits_model *model, const eits_section *found);
  * variance below 0, or a model that says how it was whitened besides). */
 eits_status eits_read_precision(eits_model *model, const eits_section *found);
 
+/* Section PLAC, where there is one, into model->place_factor.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (no number from 0 on). */
+eits_status eits_read_place_factor(eits_model *model, const eits_section *found);
+
 /* Section ORDR, where there is one, into model->scan_order and scan_place; the protocol is known.
  * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (not each drive once, whole). */
 eits_status eits_read_scan_order(eits_model *model, const eits_section *found);

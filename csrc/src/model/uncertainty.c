@@ -34,6 +34,16 @@ eits_status eits_read_precision(eits_model *model, const eits_section *section)
     return EITS_OK;
 }
 
+eits_status eits_read_place_factor(eits_model *model, const eits_section *section)
+{
+    if (section->data == NULL)
+        return EITS_OK;
+    if (section->size != sizeof model->place_factor)
+        return EITS_E_MODEL_SECTION;
+    model->place_factor = eits_read_f32(section->data);
+    return eits_between(model->place_factor, 0, 1e30f) ? EITS_OK : EITS_E_MODEL_VALUE;
+}
+
 eits_status eits_read_uncertainty(eits_model *model, const eits_section *section)
 {
     const size_t numbers = (size_t)model->rank * (model->rank + 1u) / 2u;

@@ -161,9 +161,9 @@ uint32_t eits_report_touches(const eits_context *ctx, const eits_fit *f, eits_to
             .strength_s_per_m_mm2 = disc->change * eits_disc_area(ctx, disc),
             .explained = f->explained[k] < 1 ? f->explained[k] : 1,
             .confidence = f->tested ? f->confidence[k] : 0,
-            .x_variance_mm2 = f->tested ? f->place_mm2[k][0] : 0,
-            .xy_covariance_mm2 = f->tested ? f->place_mm2[k][1] : 0,
-            .y_variance_mm2 = f->tested ? f->place_mm2[k][2] : 0,
+            .x_variance_mm2 = f->place_mm2[k][0],
+            .xy_covariance_mm2 = f->place_mm2[k][1],
+            .y_variance_mm2 = f->place_mm2[k][2],
             .long_x_mm = f->tested ? f->long_mm[k][0] : 0,
             .long_y_mm = f->tested ? f->long_mm[k][1] : 0,
         };

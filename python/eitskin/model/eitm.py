@@ -16,10 +16,10 @@ from eitskin.model.eitm_sections import REQUIRED, Sections, decode_sections, enc
 from eitskin.model.model import GAIN_DRIFT_KEPT, REFERENCE_FOLLOWS, Model
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 7
+MAJOR, MINOR = 1, 8
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
-OPTIONAL = ("SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE", "PREC", "ORDR", "SUMS")
+OPTIONAL = ("SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE", "PREC", "PLAC", "ORDR", "SUMS")
 REQUIRED_FLAG = 1
 MAX_SECTIONS = 256
 
@@ -50,8 +50,9 @@ def _assemble(sections: Sections, protocol_hash: int, taught: bool) -> bytes:
         bodies.append(_padded(content))
         offset += len(bodies[-1])
     body = b"".join(entries + bodies)
-    newest = ("SUMS" in sections, "ORDR" in sections, taught, "UNCE" in sections, True)
-    minor = MINOR - newest.index(True)
+    newest = ("PLAC", "SUMS", "ORDR", "PREC", "UNCE")
+    have = [name in sections or (taught and name == "PREC") for name in newest]
+    minor = MINOR - [*have, True].index(True)
     tail = HEADER.pack(MAGIC, MAJOR, minor, offset, 0, len(sections), 0, protocol_hash)[16:]
     crc = zlib.crc32(tail + body)
     return HEADER.pack(MAGIC, MAJOR, minor, offset, crc, len(sections), 0, protocol_hash) + body

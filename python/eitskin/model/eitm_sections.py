@@ -87,6 +87,8 @@ def encode_sections(model: Model) -> Sections:
         sections["WHIT"] = model.row_form.encode()
     if model.precision is not None:
         sections["PREC"] = model.precision.astype("<f4").tobytes()
+    if model.place_factor > 0:
+        sections["PLAC"] = np.float32(model.place_factor).astype("<f4").tobytes()
     if model.protocol.drive_order:
         order = np.concatenate([model.protocol.scan_rows, model.protocol.scan_places])
         sections["ORDR"] = order.astype("<u2").tobytes()
@@ -304,6 +306,17 @@ def _read_precision(sections: Sections, d: _Dims, where: str) -> npt.NDArray[np.
     return values
 
 
+def _read_place_factor(sections: Sections, where: str) -> float:
+    if "PLAC" not in sections:
+        return 0.0
+    if len(sections["PLAC"]) != 4:
+        _refuse(where, "section 'PLAC' that is no number")
+    factor = float(_floats(sections, "PLAC", (1,), where)[0])
+    if not 0 <= factor <= HUGE:
+        _refuse(where, "a number in section 'PLAC' that is out of range")
+    return factor
+
+
 def _read_order(sections: Sections, table: npt.NDArray[np.uint8], where: str) -> tuple[int, ...]:
     """The order of drives; () as they stand."""
     if "ORDR" not in sections:
@@ -381,6 +394,7 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
             decode_row_form(sections["WHIT"], projection, where) if "WHIT" in sections else None
         ),
         precision=_read_precision(sections, d, where),
+        place_factor=_read_place_factor(sections, where),
         model_errors=(
             decode_model_errors(sections["UNCE"], d.rank, where) if "UNCE" in sections else None
         ),

@@ -79,7 +79,8 @@ class Model:
     it was made; ``fields`` where it has them; ``load`` tells loads from strengths, where the skin
     was calibrated; ``model_errors`` how far a real skin may be from it, where that was drawn;
     ``precision`` (k (k + 1) / 2,) of a taught model, the lower triangle of the inverse covariance
-    of the rows' noise.
+    of the rows' noise; ``place_factor`` what the covariance of a place by the fit is multiplied by,
+    0 where that is not known.
     """
 
     protocol: Protocol
@@ -101,6 +102,7 @@ class Model:
     row_form: RowForm | None = None
     model_errors: ModelErrors | None = None
     precision: npt.NDArray[np.float32] | None = None
+    place_factor: float = 0.0
 
     def __repr__(self) -> str:
         name = self.meta.get("skin", {}).get("skin", {}).get("name", "of a skin without a name")

@@ -10,14 +10,18 @@ from eitskin.core.constants_table import (
     CONFIDENCE_HALF,
     MAX_MOVE,
     MIN_CONFIDENCE,
+    MIN_FREEDOM,
     PAIR_ODDS,
     PLACE_DISTANCE,
     PLACE_FACTOR,
     PLACE_MIN,
 )
+from eitskin.reference.disc_fit import Fit
 from eitskin.reference.evidence import Tested
+from eitskin.reference.problem import orthonormal
 
 FloatArray = npt.NDArray[np.float64]
+PLACE_PARAMETERS = 4  # of a disc: strength, place, radius
 
 
 def rated(tested: Tested, distance: float, pixel_mm: float) -> tuple[FloatArray, FloatArray]:
@@ -27,6 +31,26 @@ def rated(tested: Tested, distance: float, pixel_mm: float) -> tuple[FloatArray,
     least = pixel_mm**2 * (PLACE_MIN + PLACE_DISTANCE * distance)
     place = PLACE_FACTOR * tested.place_mm2 + np.column_stack([x * x + least, x * y, y * y + least])
     return tested.rise / (tested.rise + CONFIDENCE_HALF), place
+
+
+def places_by_fit(fit: Fit) -> FloatArray:
+    """The covariance of each disc's place, xx, xy, yy (k, 3), mm^2: by the normal equations with
+    the strengths of all discs free, times the model's factor; zeros where it has none."""
+    rank, factor, count = fit.model.rank, fit.model.place_factor, len(fit.discs)
+    out = np.zeros((count, 3))
+    if not factor > 0:
+        return out
+    unit = factor * fit.left() / max(rank - PLACE_PARAMETERS * count, MIN_FREEDOM)
+    beside = orthonormal([fit.answers(disc)[0] for disc in fit.discs], rank)
+    for k, disc in enumerate(fit.discs):
+        slope = disc.change * fit.answers(disc)[1][:2]
+        slope -= slope @ beside.T @ beside
+        (xx, xy), (_, yy) = slope @ slope.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            place = unit / (xx * yy - xy * xy) * np.array([yy, -xy, xx])
+        if np.isfinite(place).all() and place[0] > 0 and place[2] > 0:
+            out[k] = place
+    return out
 
 
 def miscounted(tested: Tested) -> bool:

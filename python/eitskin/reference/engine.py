@@ -176,7 +176,7 @@ class ReferenceEngine(FrameStage):
         if self._tracker.count == 0:
             moved = self._follower.moved(mean, v0, lambda_max, self._best_match(basis, mean))
         elif self.model.data_kind == "difference":
-            columns = self.seen[:, self._pixels(touches)]
+            columns = self._at(touches)
             y, u = self._whole(mean), self._whole(2 * v0)
             moved = self._follower.grown(v0, gain_beside(u, y, columns))
         else:
@@ -184,12 +184,13 @@ class ReferenceEngine(FrameStage):
         if moved is not None:
             self._fit_to_model(moved)
 
-    def _pixels(self, touches: tuple[Touch, ...]) -> list[int]:
-        """The kept pixels whose centres are nearest to touches."""
-        grid = self.model.grid
+    def _at(self, touches: tuple[Touch, ...]) -> FloatArray:
+        """What S gives at touches, linear between centres of pixels (r, k)."""
+        grid, weight = self.model.grid, self.model.column_weight.astype(np.float64)
         at = np.array([(t.x_mm, t.y_mm) for t in touches]).reshape(-1, 2)
         away = grid.index[None] + 0.5 - ((at - grid.origin_mm) / grid.pixel_mm)[:, None]
-        return [int(one) for one in (away**2).sum(axis=2).argmin(axis=1)]
+        share = np.maximum(1 - np.abs(away), 0).prod(axis=2)
+        return np.asarray(self.seen @ (share / np.where(weight != 0, weight, np.inf)).T)
 
     def _best_match(self, basis: FloatArray, frame: FloatArray) -> float:
         """How much of |y|^2 of ``frame`` (m,) the column of S gives that gives most."""

@@ -14,6 +14,7 @@ from eitskin.core.constants_table import (
     FOLLOW_PARTS,
     FOLLOW_TOUCH,
 )
+from eitskin.reference.problem import orthonormal, project
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -112,14 +113,5 @@ class Follower:
 def gain_beside(u: FloatArray, y: FloatArray, columns: FloatArray) -> float:
     """How much of ``y`` (r,) is ``u`` (r,), beside what ``columns`` (r, k) give; 0 where they may
     give all of it."""
-    directions: list[FloatArray] = []
-    for column in columns.T:
-        rest = column.copy()
-        for one in directions:
-            rest = rest - (one @ rest) * one
-        if rest @ rest > FOLLOW_LEFT * (column @ column):
-            directions.append(rest / np.sqrt(rest @ rest))
-    left = u.copy()
-    for one in directions:
-        left = left - (one @ left) * one
+    left = project(u, orthonormal(columns.T, len(u), FOLLOW_LEFT))
     return float(left @ y / (left @ left)) if left @ left > FOLLOW_LEFT * (u @ u) else 0.0

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.constants_table import (
-    BASIS_TOLERANCE,
     FAR_REGULARISATION,
     FOLD_ROUNDING,
     MAX_OF_NOISE,
@@ -33,6 +32,7 @@ from eitskin.reference.diagnostics import Examiner, Folded, FrameDiagnostics, Re
 from eitskin.reference.problem import (
     FloatArray,
     greatest,
+    orthonormal,
     project,
 )
 from eitskin.reference.reference_outliers import clean
@@ -42,18 +42,6 @@ from eitskin.reference.whitening import Whitening, filled, form_of, whiten
 BoolArray = npt.NDArray[np.bool_]
 
 DEAD = "all voltages are zero; is the skin driven and connected?"
-
-
-def orthonormal(candidates: list[FloatArray], rank: int) -> FloatArray:
-    """An orthonormal basis (k, r) of the span of ``candidates`` (each (r,)), in their order."""
-    rows = np.zeros((0, rank))
-    for candidate in candidates:
-        before = float(candidate @ candidate)
-        v = project(project(candidate, rows), rows)
-        after = float(v @ v)
-        if len(rows) < rank and before > 0 and after > BASIS_TOLERANCE * before:
-            rows = np.vstack([rows, v / np.sqrt(after)])
-    return rows
 
 
 class FrameStage:

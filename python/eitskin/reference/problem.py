@@ -3,6 +3,7 @@ lambda |x|_1."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -10,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import MAX_RISE
+from eitskin.core.constants_table import BASIS_TOLERANCE, MAX_RISE
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -32,6 +33,21 @@ def greatest(g: FloatArray, sign: str) -> float:
 def project(v: FloatArray, basis: FloatArray) -> FloatArray:
     """``v`` (r,) without its part in the span of the orthonormal rows of ``basis`` (k, r)."""
     return v - basis.T @ (basis @ v)
+
+
+def orthonormal(
+    candidates: Iterable[FloatArray], rank: int, least: float = BASIS_TOLERANCE
+) -> FloatArray:
+    """An orthonormal basis (k, r) of the span of ``candidates`` (each (r,)), in their order; not of
+    those of whose square others have all but ``least``."""
+    rows = np.zeros((0, rank))
+    for candidate in candidates:
+        before = float(candidate @ candidate)
+        v = project(project(candidate, rows), rows)
+        after = float(v @ v)
+        if len(rows) < rank and before > 0 and after > least * before:
+            rows = np.vstack([rows, v / np.sqrt(after)])
+    return rows
 
 
 class Certificate(NamedTuple):

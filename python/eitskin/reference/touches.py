@@ -21,7 +21,7 @@ from eitskin.core.options_table import SPLIT_MERGE
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin.model.model import Model
-from eitskin.reference.confidence import miscounted, rated
+from eitskin.reference.confidence import miscounted, places_by_fit, rated
 from eitskin.reference.disc_fit import Disc, Fit, Reduced
 from eitskin.reference.evidence import DataErrors, keep_likely
 from eitskin.reference.seek import seek
@@ -118,6 +118,12 @@ def find_touches(
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
+    if tested is None:
+        found = [
+            replace(touch, x_variance_mm2=float(xx), xy_covariance_mm2=float(xy),
+                    y_variance_mm2=float(yy)) if xx > 0 else touch
+            for touch, (xx, xy, yy) in zip(found, places_by_fit(fit), strict=True)
+        ]  # fmt: skip
     if tested is not None and errors is not None:
         sure, places = rated(tested, errors.distance, model.grid.pixel_mm)
         found = [

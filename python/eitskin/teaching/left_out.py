@@ -4,7 +4,6 @@ whether it fits them."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,13 +22,11 @@ TEMPERATURE = 2.0  # of scores as probabilities: residuals are heavier than norm
 @dataclass(frozen=True, eq=False)
 class LeftOut:
     """n presses, each placed by the others: ``place_mm`` (n, 2); ``error_mm`` (n,);
-    ``mahalanobis2`` (n,) of the error in the others' own covariance; ``score`` (n, k) on the grid,
-    chi^2 less its least; ``misfit`` (n,) the residual at the press's given place over the median;
-    ``explained`` (m,) of each row's energy."""
+    ``score`` (n, k) on the grid, chi^2 less its least; ``misfit`` (n,) the residual at the press's
+    given place over the median; ``explained`` (m,) of each row's energy."""
 
     place_mm: FloatArray
     error_mm: FloatArray
-    mahalanobis2: FloatArray
     score: npt.NDArray[np.float32]
     misfit: FloatArray
     explained: FloatArray
@@ -46,21 +43,19 @@ def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
     seen, white_residual = process.data @ whitening.T, residual @ whitening.T
     count = len(seen)
     misfit = np.sum(white_residual**2, axis=1)
-    found, mahalanobis2 = np.zeros((count, 2)), np.zeros(count)
+    found = np.zeros((count, 2))
     scores = np.zeros((count, grid.n_pixels), dtype=np.float32)
     for i in range(count):
         answer = (mean - (h[:, i : i + 1] + v[i] * w) * residual[i]) @ whitening.T
         scores[i] = _scores(answer, seen[i])
         both = np.vstack([answer, seen[i]])
         both += without_own(white_residual[i], (1 - learned.noise.shrinkage) / count, both)
-        found[i], covariance = _moments(_scores(both[:-1], both[-1]), at, grid.pixel_mm)
-        error = found[i] - process.place_mm[i]
-        mahalanobis2[i] = error @ np.linalg.solve(covariance, error)
+        found[i] = _middle(_scores(both[:-1], both[-1]), at)
     explained = 1 - np.sum(residual**2, axis=0) / np.maximum(
         np.sum(process.data**2, axis=0), 1e-300
     )
     return LeftOut(
-        found, np.linalg.norm(found - process.place_mm, axis=1), mahalanobis2, scores,
+        found, np.linalg.norm(found - process.place_mm, axis=1), scores,
         misfit / np.median(misfit), explained,
     )  # fmt: skip
 
@@ -98,15 +93,10 @@ def _scores(answer: FloatArray, seen: FloatArray) -> FloatArray:
     return np.asarray((score - score.min()) / scale)
 
 
-def _moments(
-    score: npt.NDArray[Any], at: FloatArray, pixel_mm: float
-) -> tuple[FloatArray, FloatArray]:
-    """Mean (2,) and covariance (2, 2) of a press's place by its scores on the grid."""
-    chance = np.exp(-0.5 * np.minimum(score.astype(np.float64), 1400))
-    chance /= chance.sum()
-    mean = chance @ at
-    away = at - mean
-    return mean, (chance[:, None] * away).T @ away + np.eye(2) * pixel_mm**2 / 12
+def _middle(score: FloatArray, at: FloatArray) -> FloatArray:
+    """Mean (2,) of a press's place by its scores on the grid."""
+    chance = np.exp(-0.5 * np.minimum(score, 1400))
+    return np.asarray(chance @ at / chance.sum())
 
 
 def stranger_note(strangers: npt.NDArray[np.int64]) -> str:
@@ -115,16 +105,6 @@ def stranger_note(strangers: npt.NDArray[np.int64]) -> str:
         "presses that do not fit the others (two fingers at once, a slip, a wrong place); leave"
         " them out or record them again: " + ", ".join(map(str, strangers[:12]))
     )
-
-
-def placed(learned: Learned, grid: Grid, difference: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (n, 2) mm and covariance (n, 2, 2) of the places of new presses, differences (n, m)."""
-    at = grid.centres_mm()
-    answer = learned.process.mean(at) @ learned.noise.whitening.T
-    found = [
-        _moments(_scores(answer, seen), at, grid.pixel_mm) for seen in learned.whitened(difference)
-    ]
-    return np.array([one[0] for one in found]), np.array([one[1] for one in found])
 
 
 def refined_places(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import EitskinError, ProtocolError, UsageError
 from eitskin.fem.grid import Grid
 from eitskin.model.force_law import LoadLaw
@@ -45,24 +46,28 @@ OTHER_SCALE = 0.16  # of its logarithm: more is another unit or another skin
 
 
 @dataclass(frozen=True, eq=False)
-class Taught:
-    """A taught ``model``, what was ``learned``, each press ``left_out``, and the ``report``."""
-
-    model: Model
-    learned: Learned
-    left_out: LeftOut
-    report: dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False)
 class HeldOut:
     """Presses solved by the C core with models that did not know them: error (k,) mm of the
-    strongest touch, how many touches, strength of the strongest, and which presses they are."""
+    strongest touch, how many touches, strength of the strongest, the error's square in the
+    covariance by the fit (inf where there is none), and which presses they are."""
 
     error_mm: FloatArray
     count: npt.NDArray[np.int64]
     strength: FloatArray
+    mahalanobis2: FloatArray
     which: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Taught:
+    """A taught ``model``, what was ``learned``, each press ``left_out``, some ``held`` out and
+    solved by the core, and the ``report``."""
+
+    model: Model
+    learned: Learned
+    left_out: LeftOut
+    held: HeldOut
+    report: dict[str, Any]
 
 
 def teach(
@@ -101,33 +106,49 @@ def teach(
     if skin is not None:
         meta["skin"] = skin_to_table(found.seen_as)
     model = taught_model(learned, presses.protocol, grid, presses.untouched, least_share, meta)
+    if len(presses) >= FEW_PRESSES:
+        model = replace(model, place_factor=ellipse_factor(held.mahalanobis2))
     law, law_note = size_law(presses, held, grid)
     notes += law_note
     report = _report(presses, learned, left_out, held, least_share, notes)
+    report["ellipse_factor"] = round(model.place_factor, 3) or None
     report["held_out_by_presses"] = learning_curve(
         learned, presses, given, grid, width_mm, least_share, held
     )
     report["fit_s"] = round(time.monotonic() - begun, 2)
     model = replace(model, load=law, meta={**model.meta, "teach": report})
-    return Taught(model, learned, left_out, report)
+    return Taught(model, learned, left_out, held, report)
 
 
-def solve_presses(model: Model, presses: Presses) -> tuple[FloatArray, FloatArray, FloatArray]:
+def solve_presses(
+    model: Model, presses: Presses
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """By the C core, each against its own untouched frame: error (n,) mm of the strongest touch
-    (the skin's width for none), number of touches, its strength."""
+    (the skin's width for none), number of touches, its strength, and the error's square in the
+    touch's own covariance (inf where that is not known)."""
     core = Reconstructor(model)
     width = model.grid.pixel_mm * max(model.grid.nx, model.grid.ny)
-    out = np.zeros((3, len(presses)))
+    out = np.zeros((4, len(presses)))
     for i in range(len(presses)):
         core.forget()
         core.tare(presses.untouched[i])
         touches = core.reconstruct(presses.pressed[i]).touches
-        out[:, i] = width, len(touches), 0
+        out[:, i] = width, len(touches), 0, np.inf
         if touches:
             first = max(touches, key=lambda one: abs(one.strength_s_per_m_mm2))
             away = np.array([first.x_mm, first.y_mm]) - presses.place_mm[i]
             out[0, i], out[2, i] = np.linalg.norm(away), abs(first.strength_s_per_m_mm2)
-    return out[0], out[1], out[2]
+            out[3, i] = squared(away, first)
+    return out[0], out[1], out[2], out[3]
+
+
+def squared(away_mm: FloatArray, touch: Touch) -> float:
+    """``away_mm`` (2,) of a place in the touch's covariance; inf where that is not known."""
+    if not touch.x_variance_mm2:
+        return np.inf
+    xy = touch.xy_covariance_mm2 or 0.0
+    covariance = np.array([[touch.x_variance_mm2, xy], [xy, touch.y_variance_mm2 or 0.0]])
+    return float(away_mm @ np.linalg.solve(covariance, away_mm))
 
 
 def model_without(
@@ -177,16 +198,22 @@ def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
     for share in LEAST_SHARES:
         parts = [
             solve_presses(
-                replace(one, defaults=replace(one.defaults, touch_min_fraction=share)),
+                replace(
+                    one,
+                    place_factor=1.0,
+                    defaults=replace(one.defaults, touch_min_fraction=share),
+                ),
                 presses.take(which),
             )
             for one, which in tried
         ]
-        error, number, strength = (np.concatenate(part) for part in zip(*parts, strict=True))
+        error, number, strength, mahalanobis2 = (
+            np.concatenate(part) for part in zip(*parts, strict=True)
+        )
         if np.mean(number == 1) >= COUNTED_ONCE:
             break
     which = np.concatenate([which for _, which in tried])
-    return share, HeldOut(error, number.astype(np.int64), strength, which)
+    return share, HeldOut(error, number.astype(np.int64), strength, mahalanobis2, which)
 
 
 def learning_curve(
@@ -251,8 +278,7 @@ def _report(
     placement, kernel = learned.kernel.placement, learned.kernel
     strangers = np.flatnonzero(left_out.misfit > MISFIT)
     silent = np.flatnonzero(left_out.explained < NOTHING)
-    few = len(presses) < FEW_PRESSES
-    if few:
+    if len(presses) < FEW_PRESSES:
         notes.append(f"{len(presses)} presses are too few to tell 90 % ellipses")
     if abs(np.log(placement.scale)) > OTHER_SCALE:
         notes.append(
@@ -275,7 +301,6 @@ def _report(
             "of_a_press": round(float(np.sqrt(np.mean(learned.process.left_out() ** 2))), 3),
             "shrinkage": round(learned.noise.shrinkage, 3),
         },
-        "ellipse_factor": None if few else round(ellipse_factor(left_out.mahalanobis2), 3),
         "placement": {
             "turn_deg": round(placement.turn_deg % 360, 2),
             "scale": round(placement.scale, 4),

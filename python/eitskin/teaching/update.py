@@ -173,7 +173,8 @@ def update(
     else:
         grid = move.grid(model.grid, session.kernel.centre_mm)
     new = taught_model(found[chosen], presses.protocol, grid, presses.untouched, least_share, meta)
-    new = replace(new, defaults=defaults, load=_law(model, new, move, session, presses))
+    law = _law(model, new, move, session, presses)
+    new = replace(new, defaults=defaults, load=law, place_factor=model.place_factor)
     return Updated(new, chosen, move, report)
 
 

@@ -80,6 +80,20 @@ def test_the_order_of_drives_is_kept_and_only_whole_ones_are_read() -> None:
             CoreEngine(sealed(broken))
 
 
+def test_the_factor_of_places_is_kept_and_only_a_number_is_read() -> None:
+    blob = encode_model(replace(small_model(), place_factor=4.5))
+    assert struct.unpack_from("<2H", blob, 4) == (1, 8)
+    assert decode_model(blob, "x").place_factor == 4.5
+    at, size, flags = sections_of(blob)["PLAC"]
+    assert (size, flags) == (4, 0)
+    for value in (-1.0, float("nan"), 2e30):
+        broken = bytearray(blob)
+        struct.pack_into("<f", broken, at, value)
+        assert "'PLAC'" in refusal(sealed(broken))
+        with pytest.raises(EitskinError):
+            CoreEngine(sealed(broken))
+
+
 def test_header_as_documented() -> None:
     blob = small_blob()
     assert blob[:4] == b"EITM"

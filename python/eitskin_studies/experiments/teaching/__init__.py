@@ -19,7 +19,7 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.teaching.left_out import CHI2_90, placed
+from eitskin.teaching.left_out import CHI2_90
 from eitskin.teaching.presses import Presses, load_presses
 from eitskin.teaching.teach import Taught, solve_presses, teach
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
@@ -107,8 +107,7 @@ def _conditions(splits: int) -> str:
         " each judged, each against the untouched frame just before it; medians over splits. No"
         " number of a method was chosen on the judged presses of its split; the recipe as a whole"
         " was chosen on this set. Two presses are sums of two real ones; exact: two touches, each"
-        f" within {PAIR_MM:g} mm of its own. Ellipses by the fit's posterior times the model's"
-        " factor."
+        f" within {PAIR_MM:g} mm of its own. Ellipses are the core's own."
     )
 
 
@@ -126,7 +125,7 @@ def _split(presses: Presses, count: int, seed: int) -> dict[str, Any]:
 
 
 def _judged(taught: Taught, judged: Presses, seed: int) -> dict[str, Any]:
-    error, number, strength = solve_presses(taught.model, judged)
+    error, number, strength, squared = solve_presses(taught.model, judged)
     out: dict[str, Any] = {
         "median": float(np.median(error)),
         "p95": float(np.quantile(error, 0.95)),
@@ -136,12 +135,8 @@ def _judged(taught: Taught, judged: Presses, seed: int) -> dict[str, Any]:
     if law is not None and judged.depth_mm is not None:
         depth = law.forces_at(judged.place_mm, strength)
         out["depth_rms"] = float(np.sqrt(np.mean((depth - judged.depth_mm) ** 2)))
-    factor = taught.report["ellipse_factor"]
-    if factor is not None:
-        where, covariance = placed(taught.learned, taught.model.grid, judged.difference)
-        away = where - judged.place_mm
-        squared = np.einsum("ni,nij,nj->n", away, np.linalg.inv(covariance), away)
-        out["covered"] = float(np.mean(squared < CHI2_90 * factor))
+    if taught.model.place_factor > 0:
+        out["covered"] = float(np.mean(squared < CHI2_90))
     out["pairs"] = _pairs(taught.model, judged, seed)
     return out
 
