@@ -4,19 +4,76 @@ there."""
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eitskin.errors import FileError, FrameError
+from eitskin.errors import EitskinError, FileError, FrameError
 from eitskin.fileio import read_bytes, read_mat
-from eitskin.frames.frames import read_npz
 
+MAX_ARRAYS = 10_000
+MAX_UNPACKED_BYTES = 4_000_000_000
+INNOCENT_BYTES = 100_000_000  # so much may be packed as tightly as it likes
+MAX_RATIO = 300  # unpacked to packed: masks of a truth reach 100, zeros 1000
 LISTED = 40
 MAX_BYTES = 1_000_000_000
+
+
+def read_npz(
+    path: str | Path,
+    what: str,
+    wanted: Collection[str] | None = None,
+    most_bytes: int = MAX_UNPACKED_BYTES,
+) -> dict[str, NDArray[Any]]:
+    """All arrays of an .npz, without pickle; ``what`` names its kind in errors. Arrays of objects
+    are left out; those that are not ``wanted`` (None: all are) are not unpacked and come out empty.
+    At most ``most_bytes`` are unpacked.
+
+    Raises:
+        FileError: it cannot be read, is no .npz, or unpacks to far more than an .npz of numbers.
+    """
+    try:
+        with Path(path).open("rb") as stream:
+            archive = np.load(stream, allow_pickle=False)
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise FileError(f"{path}: one bare array (.npy), not an .npz with named arrays")
+            _refuse_inflating(archive, str(path), most_bytes)
+            arrays = {}
+            for name in archive.files:
+                if wanted is not None and name not in wanted:
+                    arrays[name] = np.zeros(0)
+                    continue
+                try:
+                    arrays[name] = np.asarray(archive[name])
+                except ValueError as error:
+                    if "allow_pickle" not in str(error):
+                        raise
+            return arrays
+    except EitskinError:
+        raise
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such {what}; check the path") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot read this {what} ({error.strerror or error})") from None
+    except Exception:  # of a damaged file numpy and zipfile raise whatever their parsers meet
+        raise FileError(
+            f"{path}: not a readable .npz {what}: damaged, cut short, or another kind of file"
+        ) from None
+
+
+def _refuse_inflating(archive: Any, where: str, most_bytes: int) -> None:
+    members = archive.zip.infolist()
+    packed = sum(one.compress_size for one in members)
+    unpacked = sum(one.file_size for one in members)
+    if len(members) > MAX_ARRAYS:
+        raise FileError(f"{where}: {len(members)} arrays, over {MAX_ARRAYS}; keep those needed")
+    if unpacked > most_bytes or (unpacked > INNOCENT_BYTES and unpacked > MAX_RATIO * packed):
+        raise FileError(
+            f"{where}: {packed} bytes would unpack to {unpacked}; split it into smaller files"
+        )
 
 
 def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eitskin.errors import FrameError, UsageError
-from eitskin.frames.arrays import listing, pick, read_arrays
-from eitskin.frames.frames import FORMAT, read_npz
+from eitskin.frames.arrays import listing, pick, read_arrays, read_npz
+from eitskin.frames.frames import FORMAT
 from eitskin.frames.lines import COMMENT, LineFormat
 from eitskin.frames.pairs import PAIRS, Paired, all_magnitudes, paired, refuse_parts, to_complex
 from eitskin.frames.tables import TextTable, chosen, read_table

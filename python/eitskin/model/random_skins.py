@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.constants_table import MAX_RATIO, MAX_ROW_GAIN, RATIO_DEFINED
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.deform import Deformation
 from eitskin.fem.mesh import Mesh
@@ -34,9 +35,6 @@ MAX_TOUCHES = 3
 MARGIN, GAP = 0.04, 0.12  # R: least distance of a disc to the rim, and of two discs' edges
 TRIES = 200
 STEP = 0.1  # of a disc's radius, for its derivatives
-MAX_ROW_GAIN = 3.0  # csrc/src/frame: the same
-MAX_RATIO = 16.0  # csrc/src/frame/fold.c: of log-ratio data
-MIN_RATIO = 1e-6  # rows whose reference is below this part of the rms say nothing as a ratio
 FIELD_LENGTHS = 8
 NUMBERS_AT_ONCE = 2**21
 CELL = 0.15  # of a field's least length
@@ -146,7 +144,7 @@ class RandomSkins:
     def _datum(self, v: FloatArray, v0: FloatArray) -> FloatArray:
         """The folded datum as the core makes it from ``v`` with the reference ``v0`` (k,)."""
         kind, v_ref = self.request.data_kind, self.v_ref
-        weak = np.abs(v0) < MIN_RATIO * np.sqrt(np.mean(v0**2))
+        weak = np.abs(v0) < RATIO_DEFINED * np.sqrt(np.mean(v0**2))
         safe = np.where(weak, 1.0, v0)
         if kind == "normalised":
             return np.where(weak, 0.0, (v - v0) / safe)
@@ -170,7 +168,7 @@ class RandomSkins:
         scale = -self.request.protocol.current_a * self.forward.thickness_m * sign
         columns = products.T * scale[:, None] * (self.request.mesh.areas_mm2[elements] * 1e-6)
         if self.request.data_kind == "normalised":
-            weak = np.abs(self.v_ref) < MIN_RATIO * np.sqrt(np.mean(self.v_ref**2))
+            weak = np.abs(self.v_ref) < RATIO_DEFINED * np.sqrt(np.mean(self.v_ref**2))
             columns = np.where(weak, 0.0, 1 / np.where(weak, 1.0, self.v_ref))[:, None] * columns
         return np.asarray(columns)
 

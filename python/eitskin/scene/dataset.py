@@ -27,7 +27,8 @@ import numpy.typing as npt
 from eitskin.config import load_toml
 from eitskin.errors import ConfigError, EitskinError, FileError, UsageError, missing_extra
 from eitskin.fileio import parse_json, write_bytes
-from eitskin.frames.frames import Frames, read_npz
+from eitskin.frames.arrays import read_npz
+from eitskin.frames.frames import Frames
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.dataset_ranges import Ranges, drawn, ranges_of
 from eitskin.scene.description import Scene

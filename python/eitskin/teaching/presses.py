@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from eitskin.errors import EitskinError, FrameError
 from eitskin.fileio import write_beside
-from eitskin.frames.frames import read_npz
+from eitskin.frames.arrays import read_npz
 from eitskin.skin.protocol import Protocol, table
 
 FloatArray = npt.NDArray[np.float64]

@@ -14,7 +14,8 @@ import pytest
 from eitskin.config import load_toml
 from eitskin.errors import ConfigError, EitskinError, FileError, FrameError
 from eitskin.fileio import read_bytes
-from eitskin.frames.frames import MAX_RATIO, Frames, load_frames, read_npz, save_frames
+from eitskin.frames.arrays import MAX_RATIO, read_npz
+from eitskin.frames.frames import Frames, load_frames, save_frames
 from eitskin.skin.drawing import joined, read_drawing
 from eitskin.skin.drawing_shapes import DrawingReading, DrawnShape
 from eitskin.skin.protocol import adjacent
