@@ -35,15 +35,24 @@ static void start_fast(fw_engine *engine, uint8_t *next)
 {
     const size_t bytes = EITS_ALIGN16(eits_fast_size(&engine->model));
     const size_t frame = EITS_ALIGN16(engine->model.n_rows * sizeof(float));
+    const size_t numbers = EITS_ALIGN16(engine->model.n_rows * sizeof(uint16_t));
     engine->fast = NULL;
     engine->fast_bytes = 0;
-    if (bytes == 0 || next + bytes + frame > engine->saved.core)
+    if (bytes == 0 || next + bytes + frame + numbers > engine->saved.core)
         return;
     engine->aligned = take(&next, frame);
-    if (eits_fast_init(next, bytes, engine->ctx, &engine->fast) != EITS_OK)
+    engine->drive_of = take(&next, numbers);
+    if (eits_fast_init(next, bytes, engine->ctx, &engine->fast) != EITS_OK) {
         engine->fast = NULL;
-    else
-        engine->fast_bytes = bytes + frame;
+        return;
+    }
+    engine->fast_bytes = bytes + frame + numbers;
+    for (uint32_t number = 0; number < eits_fast_drives(engine->fast); ++number) {
+        uint32_t count = 0;
+        const uint16_t *rows = eits_fast_rows(engine->fast, number, &count);
+        for (uint32_t k = 0; k < count; ++k)
+            engine->drive_of[rows[k]] = (uint16_t)number;
+    }
 }
 
 static void lay_out(fw_engine *engine)

@@ -32,7 +32,8 @@ typedef struct fw_engine {
     /* touches after each drive, and a frame brought to one instant; NULL where the model has no
      * fields, or memory is short */
     eits_fast *fast;
-    float *aligned; /* n_rows */
+    float *aligned;     /* n_rows */
+    uint16_t *drive_of; /* n_rows: fast's number of each row's drive */
     size_t fast_bytes;
 } fw_engine;
 

@@ -20,12 +20,12 @@ bool fw_follow_possible(const fw_instrument *instrument)
 /* The drive that begins with this row; fast's number of drives where none has just these rows. */
 static uint32_t number_of(const fw_instrument *instrument, const fw_scan_drive *drive)
 {
-    const eits_fast *fast = instrument->engine.fast;
+    const fw_engine *engine = &instrument->engine;
     const uint32_t row = fw_scan_row_at(&instrument->scan, drive->first);
-    uint32_t number = 0, rows = 0;
-    while (number < eits_fast_drives(fast) && eits_fast_rows(fast, number, &rows)[0] != row)
-        ++number;
-    return rows == drive->count ? number : eits_fast_drives(fast);
+    const uint32_t number = engine->drive_of[row];
+    uint32_t count = 0;
+    const uint16_t *rows = eits_fast_rows(engine->fast, number, &count);
+    return rows[0] == row && count == drive->count ? number : eits_fast_drives(engine->fast);
 }
 
 static void take_volts(const fw_instrument *instrument, const fw_scan_drive *drive,

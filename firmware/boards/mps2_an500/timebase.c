@@ -1,5 +1,6 @@
 /* Board time by timer 0, which stands still while the world does something; and what waits for
  * it. */
+#include "boards/parts/later.h"
 #include "mps2.h"
 
 static volatile bool woken;
@@ -70,21 +71,14 @@ void mps2_wait(void *ctx)
     woken = false;
 }
 
-#define SCB_ICSR  REG32(0xE000ED04u)
 #define SCB_SHPR3 REG32(0xE000ED20u)
-#define PENDSVSET (1u << 28)
 
-static struct {
-    void (*work)(void *user);
-    void *user;
-} waiting;
+static later waiting;
 
 void mps2_later(void *ctx, void (*work)(void *user), void *user)
 {
     (void)ctx;
-    waiting.work = work;
-    waiting.user = user;
-    SCB_ICSR = PENDSVSET;
+    later_wait(&waiting, work, user);
 }
 
 void mps2_later_irq(void)

@@ -294,7 +294,6 @@
 #define SCB_DCIMVAC           REG32(SCB_BASE + 0x25Cu)
 #define SCB_DCISW             REG32(SCB_BASE + 0x260u)
 #define SCB_AIRCR_SYSRESETREQ (0x05FA0000u | (1u << 2)) /* with the key */
-#define SCB_ICSR_PENDSVSET    (1u << 28)
 #define SCB_CCR_DIV_0_TRP     (1u << 4)
 #define SCB_CCR_DC            (1u << 16)
 #define SCB_CCR_IC            (1u << 17)

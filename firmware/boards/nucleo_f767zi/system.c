@@ -1,4 +1,5 @@
 /* Time, sleep, interrupts, the watchdog, lights, and who this processor is. */
+#include "boards/parts/later.h"
 #include "nucleo.h"
 
 enum { LED_GREEN = 0, LED_BLUE = 7, LED_RED = 14 }; /* of port B: LD1, LD2, LD3 (UM1974 6.5) */
@@ -191,17 +192,12 @@ static void set_leds(void *ctx, uint32_t leds)
     GPIO_BSRR(GPIOB_BASE) = on | (all & ~on) << 16;
 }
 
-static struct {
-    void (*work)(void *user);
-    void *user;
-} waiting;
+static later waiting;
 
-static void later(void *ctx, void (*work)(void *user), void *user)
+static void run_later(void *ctx, void (*work)(void *user), void *user)
 {
     (void)ctx;
-    waiting.work = work;
-    waiting.user = user;
-    SCB_ICSR = SCB_ICSR_PENDSVSET;
+    later_wait(&waiting, work, user);
 }
 
 void nucleo_later_irq(void)
@@ -219,4 +215,4 @@ const fw_system_ops nucleo_system_ops = {nucleo_time_us,
                                          stack_used,
                                          set_leds,
                                          button,
-                                         later};
+                                         run_later};

@@ -98,24 +98,10 @@ class CoreEngine:
         return str(self._ffi.string(self._lib.eits_kernels_name(self._context)).decode())
 
     @property
-    def lib(self) -> Any:
-        """The C functions, for what else works on this context."""
-        return self._lib
-
-    @property
-    def ffi(self) -> Any:
-        """cffi's side of them."""
-        return self._ffi
-
-    @property
-    def model(self) -> Any:
-        """The eits_model."""
-        return self._model
-
-    @property
-    def context(self) -> Any:
-        """The eits_context."""
-        return self._context
+    def handles(self) -> tuple[Any, Any, Any, Any]:
+        """The C functions, cffi's side of them, the eits_model and the eits_context, for what else
+        works on this context."""
+        return self._lib, self._ffi, self._model, self._context
 
     def _view(self, pointer: Any, count: int) -> npt.NDArray[Any]:
         """An array over ``count`` reals of the context's memory, not a copy."""

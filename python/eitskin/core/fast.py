@@ -47,8 +47,8 @@ class FastCore:
     """
 
     def __init__(self, engine: CoreEngine) -> None:
-        self._engine, self._lib, self._ffi = engine, engine.lib, engine.ffi
-        self.bytes = int(self._lib.eits_fast_size(engine.model))
+        self._engine, (self._lib, self._ffi, model, context) = engine, engine.handles
+        self.bytes = int(self._lib.eits_fast_size(model))
         if not self.bytes:
             raise UsageError(
                 "fast path: the model has no fields (section FLDS), or a drive over"
@@ -57,7 +57,7 @@ class FastCore:
         self._memory = aligned(self.bytes)
         state = self._ffi.new("eits_fast **")
         memory = self._ffi.from_buffer(self._memory)
-        self._check(self._lib.eits_fast_init(memory, self.bytes, engine.context, state))
+        self._check(self._lib.eits_fast_init(memory, self.bytes, context, state))
         self._state = state[0]
         self._touches = self._ffi.new("eits_fast_touch[]", int(self._lib.EITS_FAST_TOUCHES))
         self._number = self._ffi.new("uint32_t *")

@@ -37,9 +37,10 @@ class Twins(Player):
 
     def tare(self, v0: np.ndarray, sigma: float, rng: np.random.Generator) -> None:
         super().tare(v0, sigma, rng)
-        learned = self.engine.ffi.new("eits_reference_info *")
-        self.engine.lib.eits_get_reference(self.engine.context, learned)
-        v0 = np.array(self.engine.ffi.unpack(learned.v0, len(v0)))
+        lib, ffi, _, context = self.engine.handles
+        learned = ffi.new("eits_reference_info *")
+        lib.eits_get_reference(context, learned)
+        v0 = np.array(ffi.unpack(learned.v0, len(v0)))
         gains = row_gains(self.model, np.isfinite(v0), learned.gain * v0)[0]
         self.path, self.off_mm = FastPath(self.model), 0.0
         self.path.tare(v0, learned.noise_v, learned.gain * gains)
