@@ -7,6 +7,7 @@ from study_pages import fills_its_page
 
 from eitskin_studies.experiments import fast_path
 from eitskin_studies.experiments.experiment import ExperimentSettings, plain, workspace_in
+from eitskin_studies.experiments.fast_path import beyond
 
 
 def test_it_fills_its_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -14,10 +15,17 @@ def test_it_fills_its_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     rows = [row for row in fast_path.rows() if row.name in chosen]
     monkeypatch.setattr(fast_path, "ELEMENTS", 3500)
     monkeypatch.setattr(fast_path, "rows", lambda: rows)
+    others = [row for row in beyond.rows() if row.name.startswith(("half", "contact"))]
+    monkeypatch.setattr(beyond, "rows", lambda: others)
     outcome = fast_path.run(workspace_in(tmp_path, ExperimentSettings(share=0.001), plain))
     found = {one["name"]: one for one in outcome.data["rows"]}
     assert tuple(found) == (chosen[0], chosen[1], chosen[2])
     for one in found.values():
         assert one["scenes"] == 2 and one["missed"] == one["with_false"] == 0
         assert one["frames"]["explained"] < one["frames"]["frames"] <= one["drives"] / 16
+    more = {one["name"]: one for one in outcome.data["beyond"]}
+    assert len(more) == 3 and all(one["missed"] == one["with_false"] == 0 for one in more.values())
+    half, whole = more["half scan, press, rise 0 ms"], found[chosen[0]]
+    assert half["drives"] / half["frames"]["frames"] == 8
+    assert whole["drives"] / whole["frames"]["frames"] == 16
     fills_its_page(outcome, "fast-path", tmp_path)

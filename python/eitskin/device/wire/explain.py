@@ -79,8 +79,8 @@ def reply_text(reply: Reply) -> str:
             "its owner has locked the board: hold the blue button on it and run this again"
         ),
         ReplyStatus.DRIVES: (
-            "touches after each drive need a model with fields whose reference stays, full scans,"
-            " every frame and a board that scans by itself; leave  --report drive  out, or use"
+            "touches after each drive need a model with fields, which a taught one has not, full"
+            " scans, every frame and a board that scans by itself; leave  --report drive  out, or use"
             "  --full  and a model of  eitskin model build"
         ),
         ReplyStatus.TRIPPED: (

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
+from eitskin_studies.experiments.fast_path import beyond
 from eitskin_studies.experiments.fast_path.scans import (
     ROW_S,
     Outcome,
@@ -114,12 +115,23 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             player.tare(v0, sigma, rng)
             outcomes.append(row.make(player, drawn[row.kind], k, rng, sigma))
         found.append({"name": row.name, **_summary(outcomes, row.fault)})
+    more = [
+        {
+            "name": one.name,
+            **_summary(
+                beyond.play(one, settings.count(one.count), settings.seed, number, ELEMENTS),
+                (),
+            ),
+        }
+        for number, one in enumerate(workspace.progress(beyond.rows(), "beyond"))
+    ]
     words = (
         f"Seed {settings.seed}; discs of radius 8 mm, contrast 5, 60 dB unless said; frames from"
         f" {ELEMENTS} elements, contacts spread by 30 %, a tare of 64 frames; 100 us a row, drives"
         " by 7; the prebuilt model."
     )
-    return ExperimentOutcome((_table(found),), {"rows": found}, {}, {"sets": words})
+    tables = (_table("rows", found), _table("beyond", more, 8))
+    return ExperimentOutcome(tables, {"rows": found, "beyond": more}, {}, {"sets": words})
 
 
 # ---- scenes ----
@@ -327,7 +339,8 @@ def _two(values: Iterable[float], digits: int) -> str:
     return ", ".join(f"{each:.{digits}f}" for each in values) or "-"
 
 
-def _table(found: list[dict[str, Any]]) -> Table:
+def _table(name: str, found: list[dict[str, Any]], columns: int = 11) -> Table:
+    """The first ``columns`` of all."""
     lines = []
     for one in found:
         false, frames = share(one["with_false"], one["scenes"]), one["frames"]
@@ -349,4 +362,4 @@ def _table(found: list[dict[str, Any]]) -> Table:
             "first report, ms after contact: median, p95", "error then, mm", "error later, mm",
             "frames explained", "of the same bits", "with a diagnostic",
             "fault named, ms after: median, p95")  # fmt: skip
-    return Table("rows", head, tuple(lines))
+    return Table(name, head[:columns], tuple(line[:columns] for line in lines))

@@ -32,9 +32,9 @@ class Scan:
     frames: int
 
     @classmethod
-    def of(cls, fast: FastCore, lasts_s: float) -> Scan:
-        """Whole frames for at least ``lasts_s``."""
-        once = np.concatenate([fast.rows[d] for d in order(fast)])
+    def of(cls, fast: FastCore, lasts_s: float, drives: Sequence[int] = ()) -> Scan:
+        """Whole frames for at least ``lasts_s``, of ``drives`` or all."""
+        once = np.concatenate([fast.rows[d] for d in drives or order(fast)])
         frames = int(np.ceil(lasts_s / (ROW_S * len(once))))
         return cls(np.tile(once, frames), np.asarray(ROW_S * np.arange(frames * len(once))), frames)
 
@@ -75,6 +75,7 @@ class Player:
     def __init__(self, model: Model, blob: bytes, width: str = "float32") -> None:
         self.model, self.engine = model, CoreEngine(blob, width)
         self.fast = FastCore(self.engine)
+        self.drives = order(self.fast)
 
     def tare(self, v0: FloatArray, sigma: float, rng: np.random.Generator) -> None:
         """Take the reference from noisy frames of ``v0`` (m,) V."""
@@ -101,8 +102,7 @@ class Player:
     def play(self, scan: Scan, volts: FloatArray, truth: Sequence[TrueInTime]) -> Outcome:
         """``volts`` (t,) as ``scan`` measured them."""
         out = Outcome(first=[None] * len(truth), errors=[[] for _ in truth])
-        frame, at = np.full(self.model.protocol.n_rows, np.nan), 0
-        drives = order(self.fast)
+        frame, at, drives = np.full(self.model.protocol.n_rows, np.nan), 0, self.drives
         while at < len(volts):
             for number in drives:
                 rows = self.fast.rows[number]
@@ -121,7 +121,9 @@ class Player:
         aligned = self.aligned(frame)
         out.frames["frames"] += 1
         out.frames["explained"] += aligned.explained
-        out.frames["same"] += np.array_equal(aligned.volts, frame.astype(aligned.volts.dtype))
+        out.frames["same"] += np.array_equal(
+            aligned.volts, frame.astype(aligned.volts.dtype), equal_nan=True
+        )
         if not aligned.trusted:
             return self.fast.touches()
         found = self.engine.reconstruct(aligned.volts)
