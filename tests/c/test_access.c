@@ -193,7 +193,10 @@ static void saved_and_restored(void)
         eits_real frame[SMALL_ROWS];
         small_reference(&c.model, 5, frame);
         CHECK_EQUAL(eits_reference_add(c.ctx, frame, SMALL_ROWS), EITS_OK);
+        c.ctx->solver.warm = 1;
+        c.ctx->tracker.count = 1;
         CHECK_EQUAL(eits_restore(c.ctx, saved, size), EITS_OK);
+        CHECK(c.ctx->solver.warm == 0 && c.ctx->tracker.count == 0);
         CHECK_EQUAL(eits_get_options(c.ctx)->iterations, 33);
         CHECK(eits_is_masked(c.ctx, 5) && !eits_is_masked(c.ctx, 6));
         reconstruct(c.ctx, 3, 0, after);

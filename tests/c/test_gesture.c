@@ -352,6 +352,7 @@ static void a_held_touch_and_a_lost_frame_do_not_end_a_hold(void)
     held.explained = 0;
     frame(&b, &held, 1);
     CHECK_EQUAL(once(&b, EITS_EVENT_UP), 0);
+    CHECK_EQUAL(b.moves, 0); /* where the tracker holds it says nothing of where it is */
     finger(&b, 1, 5, 5, 0, 0, 7);
     none(&b, 1); /* more than a tap was: nothing is told of the false lift but up */
     finger(&b, 1, 5, 5, 0, 0, 12);

@@ -61,6 +61,39 @@ static void what_is_no_precision_is_refused(void)
     CHECK_EQUAL(opened(1, bytes, SIZE), EITS_E_MODEL_VALUE);
 }
 
+/* Of 21 folds 16 directions are made: five may be filled in, of six all would be a guess. */
+static void as_many_are_filled_in_as_are_spare(void)
+{
+    enum { MANY = 16 };
+    uint8_t bytes[SIZE + 4];
+    section_of(bytes, 0.5f);
+    const small_spec spec = {.rank = MANY, .side = 5, .shape = SMALL_IDENTITY};
+    small_model made = with_precision(spec, 1, bytes, SIZE);
+    for (uint32_t out = 0; out <= SMALL_FOLDED - MANY + 1; ++out) {
+        eits_real frame[SMALL_ROWS];
+        uint32_t masked;
+        uint64_t macs;
+        small_context c;
+        small_context_open(&c, &made, 0);
+        CHANGE_OPTIONS(c.ctx, o.project_reference = 0, o.diagnostics = 0,
+                       o.max_masked = SMALL_ROWS);
+        small_reference(&c.model, 1, frame);
+        CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
+        for (uint32_t k = 0; k < out; ++k) {
+            const eits_fold fold = c.model.fold[k];
+            frame[fold.first] = (eits_real)NAN;
+            if (fold.second != EITS_FOLD_NONE)
+                frame[fold.second] = (eits_real)NAN;
+        }
+        CHECK_EQUAL(eits_frame_stage(c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+        CHECK_EQUAL(c.ctx->whitening.form, out > 0 && out <= SMALL_FOLDED - MANY
+                                               ? EITS_WHITENING_TRIANGLE
+                                               : EITS_WHITENING_STORED);
+        small_context_close(&c);
+    }
+    small_model_free(&made);
+}
+
 /* A frame without fold 0, `pivot` the precision of that fold. */
 static void solved(float leaning, float pivot, eits_real wanted_scale, eits_whitening_form form)
 {
@@ -95,6 +128,7 @@ static void solved(float leaning, float pivot, eits_real wanted_scale, eits_whit
 int main(void)
 {
     what_is_no_precision_is_refused();
+    as_many_are_filled_in_as_are_spare();
     /* d_0 = -.5 / 2 d_OTHER, F_00 = sqrt(1 - 1 / 2), y = d_0 / F_00 */
     solved(0.5f, 2.0f, (eits_real)(-0.25 / sqrt(0.5)), EITS_WHITENING_TRIANGLE);
     /* a precision of nothing cannot be divided by: the row is projected out, as without PREC */

@@ -153,7 +153,9 @@ static void what_a_link_may_bring_is_passed_over(void)
 {
     begin(&b);
     give(&b, EITS_EVENT_DOWN, 0, 5, 5);
+    CHECK_EQUAL(b.told, 0);
     give(&b, EITS_EVENT_DOWN, 1, (double)NAN, 5);
+    CHECK_EQUAL(b.told, 0);
     give(&b, EITS_EVENT_DOWN, 1, 5, 1e30);
     give(&b, (eits_event_kind)4000, 1, 5, 5);
     CHECK_EQUAL(b.told, 0);

@@ -224,6 +224,10 @@ static void test_limit(void)
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
     b.board.current_ua = 350;
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(set(EITS_SETTING_SENSE, 1).status, EITS_REPLY_OK); /* the least limit */
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    run_alive(500);
+    CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_TRIPPED);
 }
 
 /* Multiplexers that do not open when the drive is asked for: nothing drives until they do. */
@@ -241,7 +245,7 @@ static void test_lines_that_do_not_open(void)
     b.board.lines_fails = 0;
     run_alive(500);
     CHECK(drives());
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_reply(&b.host, c.request).status, EITS_REPLY_OK); /* it has waited */
     CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_BUS, 0);
 }
 

@@ -123,6 +123,27 @@ static void test_multiplexer_bus(void)
     bench_stop(&b);
 }
 
+/* A bus that fails while a scan starts is told as that, and not as a converter that gives nothing.
+ */
+static void test_bus_at_the_start_of_a_scan(void)
+{
+    eits_command_scan scan = host_default_scan();
+    uint32_t buses = 0;
+    bench_start(&b, &SKIN_ADJACENT);
+    for (uint32_t at = 0; at < 6; ++at) {
+        host_forget(&b.host);
+        b.board.lines_fail_from = b.board.lines_calls + at;
+        b.board.lines_fails = 1;
+        (void)host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
+        buses += told(EITS_FAULT_BUS, true);
+        host_run(&b.host, 700); /* it is tried again */
+        CHECK_EQUAL(told(EITS_FAULT_SCAN_STALLED, true), 0);
+        CHECK_EQUAL(host_info(&b.host).faults, 0);
+    }
+    CHECK(buses >= 3);
+    bench_stop(&b);
+}
+
 /* So many frames with a fault and then without it: when it rises and goes, each electrode by
  * itself; a frame in between begins the count anew. */
 static void test_hysteresis(void)
@@ -192,6 +213,7 @@ int main(void)
     test_cleared_but_there();
     test_generator_bus();
     test_multiplexer_bus();
+    test_bus_at_the_start_of_a_scan();
     test_hysteresis();
     test_watchdog_is_fed();
     return checks_report("faults");

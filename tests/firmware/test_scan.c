@@ -245,6 +245,14 @@ static void test_frame_period(void)
     CHECK_NEAR((double)(raw_head(frames - 1)->time_us - raw_head(0)->time_us),
                33333.0 * (frames - 1), 100);
     CHECK_EQUAL(host_stats(&b.host, 0).deadlines_missed, 0);
+    /* one that is a whole number of slots is kept to the microsecond, from the first frame on */
+    scan.frame_period_us = 30000;
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
+    host_forget(&b.host);
+    host_run(&b.host, 200);
+    for (uint32_t k = 1; k < host_count(&b.host, EITS_PACKET_RAW); ++k)
+        CHECK_EQUAL(raw_head(k)->time_us - raw_head(k - 1)->time_us, 30000);
+    CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 5);
     b.board.clock_cost_ns = 15000000; /* the solver, as it were */
     CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
     host_run(&b.host, 1000);

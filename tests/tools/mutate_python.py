@@ -31,9 +31,9 @@ from typing import Any
 from mutants import ROOT, Mutant
 
 PACKAGE = ROOT / "python"
-FOLDERS = ("solve", "device", "frames", "model")
+FOLDERS = ("solve", "device", "frames", "model", "reference")
 TESTS = ROOT / "tests" / "python"
-TEST_FOLDERS = (*FOLDERS, "bytes")
+TEST_FOLDERS = (*FOLDERS, "bytes", "core", "calibration")
 LIBRARIES = (
     "numpy",
     "scipy.sparse.linalg",

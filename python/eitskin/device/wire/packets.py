@@ -65,7 +65,7 @@ class BoardInfo(InfoPacket):
     def noise_floor_v(self) -> float:
         """The board's own ``noise_floor_v``, to the bit: what its converter's steps alone make of
         noise. Without other noise every period is rounded alike: only different phases average."""
-        if self.frames_given:
+        if self.frames_given or 0 in (self.samples, self.sample_rate_hz):
             return 0.0
         periods = round(self.excitation_millihz * self.samples / (1000 * self.sample_rate_hz))
         phases = np.float32(self.samples // math.gcd(self.samples, periods))
