@@ -80,8 +80,8 @@ def reply_text(reply: Reply) -> str:
         ),
         ReplyStatus.DRIVES: (
             "touches after each drive need a model with fields, which a taught one has not, full"
-            " scans, every frame and a board that scans by itself; leave  --report drive  out, or use"
-            "  --full  and a model of  eitskin model build"
+            " scans, every frame and a board that scans by itself; leave  --report drive  out, or"
+            " use  --full  and a model of  eitskin model build"
         ),
         ReplyStatus.TRIPPED: (
             "the current was above its limit and is off; look for a short or a wrong part, then run"
