@@ -97,6 +97,26 @@ static void an_outlier_in_the_reference(void)
     }
 }
 
+/* Small voltages beside a row that is left out and reads nonsense: outliers are judged by the rows
+ * in use alone, and so is the unit that deviations are summed in. */
+static void an_outlier_beside_an_unused_row(void)
+{
+    eits_context *ctx = set_up(&b, 0);
+    const uint32_t unused = b.c.model.fold[1].first;
+    b.untouched[4][b.c.model.fold[3].first] += R(0.5);
+    CHECK_EQUAL(eits_mask_row(ctx, unused, 1), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+    for (int k = 0; k < UNTOUCHED; ++k) {
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b.untouched[k][i] *= R(1e-4);
+        b.untouched[k][unused] = R(1e20);
+        CHECK_EQUAL(eits_reference_add(ctx, b.untouched[k], SMALL_ROWS), EITS_OK);
+    }
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    CHECK_EQUAL(ctx->reference.outliers, 1);
+    CHECK(ctx->reference.m2_unit == R(0x1p-14)); /* the power of two up to 1e-4 V */
+}
+
 /* More readings of a reference frame than outliers are: it counts as it is. */
 static void reference_frame_of_another_kind(void)
 {
@@ -154,6 +174,7 @@ int main(void)
     one_outlier_is_left_out();
     many_outliers();
     an_outlier_in_the_reference();
+    an_outlier_beside_an_unused_row();
     reference_frame_of_another_kind();
     medians();
     options_and_names();

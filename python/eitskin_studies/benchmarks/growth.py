@@ -10,7 +10,6 @@ little.
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -173,12 +172,12 @@ def run(
     progress: Progress = iter,
 ) -> GrowthTimes:
     """Time ``rounds`` rounds over all ``points``; models are kept in the folder ``cache`` (by
-    default one beside other temporary files).
+    default out/growth).
 
     Raises:
         MissingExtraError: the mesher is not installed.
     """
-    folder = cache or Path(tempfile.gettempdir()) / "eitskin-growth"
+    folder = cache or Path("out") / "growth"
     folder.mkdir(parents=True, exist_ok=True)
     ready = [_ready(point, folder) for point in progress(points)]
     times = np.zeros((len(ready), 2, rounds))
