@@ -28,13 +28,18 @@ def refuse_unwritable(*paths: str | Path | None) -> None:
     for no output.
 
     Raises:
-        FileError: a path's folder does not exist, or the path is a folder itself.
+        FileError: a path's folder does not exist or may not be written, or it is a folder itself.
     """
     for path in (Path(given) for given in paths if given is not None):
         if not path.parent.is_dir():
             raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
-        if path.is_dir():
+        target = followed(path)
+        if target.is_dir():
             raise FileError(f"{path}: this is a folder; name a file in it")
+        if not os.access(
+            target if target.exists() and not target.is_file() else target.parent, os.W_OK
+        ):
+            raise FileError(f"{path}: cannot write there (Permission denied); name another folder")
 
 
 @contextmanager

@@ -342,6 +342,14 @@ def test_a_disk_that_is_full(
     assert line == f"{output}: cannot write it (No space left on device)"
 
 
+def test_a_folder_without_permission_is_refused_before_the_work(
+    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("eitskin.fileio.os.access", lambda path, how: False)
+    line = refused(FILE, "reconstruct", "unread.npz", "-o", tmp_path / "out.npz")
+    assert "cannot write there (Permission denied)" in line
+
+
 def test_standard_output_on_a_full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     said = io.StringIO()
     with Path("/dev/full").open("w") as full:
