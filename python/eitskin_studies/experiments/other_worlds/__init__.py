@@ -10,6 +10,12 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scoring.matching import match
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
+from eitskin_studies.experiments.other_worlds.ellipses import (
+    DISCS,
+    ELLIPSES,
+    ellipses_of,
+    ellipses_table,
+)
 from eitskin_studies.experiments.other_worlds.tables import (
     conditions,
     fails_table,
@@ -67,9 +73,24 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         name: of_set(name, "example", lambda name=name: _first_wrong(finder, scenes(name)))
         for name in SHOWN
     }
+    ellipses = {
+        name: of_set(name, "ellipses", lambda name=name: ellipses_of(finder, scenes(name)))
+        for name in (*ELLIPSES, *DISCS)
+    }
     return ExperimentOutcome(
-        tables=(fails_table(scores), holds_table(scores), headline_table(scores)),
-        data={"scores": scores, "examples": examples, "seed": seed, "scenes": count},
+        tables=(
+            fails_table(scores),
+            ellipses_table(ellipses),
+            holds_table(scores),
+            headline_table(scores),
+        ),
+        data={
+            "scores": scores,
+            "examples": examples,
+            "ellipses": ellipses,
+            "seed": seed,
+            "scenes": count,
+        },
         pictures={
             "shares.png": lambda path: draw_shares(path, scores),
             "examples.png": lambda path: draw_examples(path, examples, model.skin.outline),
