@@ -2,7 +2,8 @@
 
 /eitskin/frame number time_s touches; then for each touch /eitskin/touch id x_mm y_mm radius_mm
 strength force_n confidence (nil where one is not known); /eitskin/event kind x_mm y_mm
-direction_deg value zone touch_ids...; /eitskin/notice kind text.
+direction_deg value zone touch_ids...; /eitskin/notice kind text. After a drive /eitskin/drive frame
+drive time_s touches, then for each /eitskin/moving id x_mm y_mm vx_mm_per_s vy_mm_per_s strength.
 """
 
 from __future__ import annotations
