@@ -116,8 +116,9 @@ def test_the_same_bits_as_the_host(
 
 
 def test_a_reference_that_follows_has_the_hosts_bits(program: Path, tmp_path: Path) -> None:
-    """Between presses on a skin that drifts, and under one that stays while the sheet dries."""
-    model = teach(presses(20), SKIN).model
+    """Between presses on a skin that drifts, and under one that stays while the sheet dries; of
+    places the covariance too."""
+    model = replace(teach(presses(20), SKIN).model, place_factor=4.0)
     some = presses(8, seed=2)
     pattern = np.random.default_rng(4).normal(size=some.protocol.n_rows)
     creep = 3e-4 * np.arange(8)[:, None] * pattern
@@ -134,6 +135,7 @@ def test_a_reference_that_follows_has_the_hosts_bits(program: Path, tmp_path: Pa
     assert crcs[0][0] == crcs[1][0]
     assert all(one != other for one, other in zip(crcs[0][1:16], crcs[1][1:16], strict=True))
     assert crcs[0][-1] != crcs[1][-1]
+    assert all(touch.x_variance_mm2 for expected, _ in both for touch in expected.touches)
 
 
 def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:
