@@ -259,6 +259,12 @@ def test_an_electrode_lost_in_a_frame_is_named() -> None:
     voltage[:, (ROWS[:, :2] == 7).any(axis=1)] *= 1e-3
     finding = only(changed(frames, frames.reference_voltage_v, voltage), "electrode-lost")
     assert finding.evidence["electrode"] == 7 and finding.evidence["frames"] == [0]
+    # and beside a channel of it that is dead in the quiet frames too, so that no part of it is left
+    dead = int(np.flatnonzero((ROWS[:, :2] == 7).any(axis=1))[3])
+    reference = frames.reference_voltage_v.copy()
+    reference[:, dead] = voltage[:, dead] = 0
+    found = report_of(changed(frames, reference, voltage)).findings
+    assert [one.evidence["electrode"] for one in found if one.name == "electrode-lost"] == [7]
 
 
 @pytest.mark.parametrize("quantile", (0.9, 0.99))
