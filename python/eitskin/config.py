@@ -36,18 +36,27 @@ def load_toml(path: str | Path, what: str) -> dict[str, Any]:
     """
     content = read_bytes(path, what, MAX_TOML_BYTES)
     try:
-        text = content.decode("utf-8")
-        if DEEP_KEY.search(text):
-            raise ConfigError(f"{path}: not a {what}: a key of over {MAX_KEY_PARTS} parts")
-        return tomllib.loads(text)
+        return parse_toml(content.decode("utf-8"), what, str(path))
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: not UTF-8 text, so not a {what}") from None
+
+
+def parse_toml(text: str, what: str, where: str) -> dict[str, Any]:
+    """The table in ``text``, a ``what``; ``where`` names it in errors.
+
+    Raises:
+        ConfigError: it is not TOML, or has keys of too many parts.
+    """
+    try:
+        if DEEP_KEY.search(text):
+            raise ConfigError(f"{where}: not a {what}: a key of over {MAX_KEY_PARTS} parts")
+        return tomllib.loads(text)
     except (
         ValueError
     ) as error:  # TOMLDecodeError is one; whole numbers of thousands of digits are another
-        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+        raise ConfigError(f"{where}: not valid TOML: {error}") from None
     except RecursionError:
-        raise ConfigError(f"{path}: not a {what}: nested too deeply") from None
+        raise ConfigError(f"{where}: not a {what}: nested too deeply") from None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

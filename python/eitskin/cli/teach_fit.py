@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import Output, option
-from eitskin.errors import FrameError
+from eitskin.errors import ConfigError, FrameError
 
 if TYPE_CHECKING:
     from eitskin.skin.skin import Skin
@@ -71,21 +71,19 @@ def run(options: argparse.Namespace) -> int:
 def described_skin(presses: Presses, path: Path | None) -> Skin | None:
     """The skin of the file ``path``, else of the presses' own description, else None. Their own
     table of rows stands, whatever protocol the description has."""
-    import tomllib
-
+    from eitskin.config import parse_toml
     from eitskin.skin.skin import load_skin, skin_from_table
 
     if path is not None:
         return load_skin(path)[0]
     if not presses.skin:
         return None
+    where = "the presses' own description"
     try:
-        table = tomllib.loads(presses.skin)
-    except tomllib.TOMLDecodeError as error:
-        raise FrameError(
-            f"presses: their description of the skin is no TOML ({error}); give --skin"
-        ) from None
-    return skin_from_table(table, "the presses' own description")
+        table = parse_toml(presses.skin, "skin", where)
+    except ConfigError as error:
+        raise ConfigError(f"{error}; give --skin") from None
+    return skin_from_table(table, where)
 
 
 def report_lines(report: dict[str, Any]) -> list[str]:

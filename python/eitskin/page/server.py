@@ -247,7 +247,7 @@ class PageServer:
         if not self._host_is_ours(request.headers.get("host", "")):
             return PlainTextResponse("another host's name\n", 403)
         name, kind = FILES[request.url.path]
-        content = files("eitskin.page").joinpath("static", name).read_bytes()
+        content = (files("eitskin.page") / "static" / name).read_bytes()
         host = request.headers["host"]
         headers = {
             "Content-Security-Policy": (

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from build_tools import CSRC, ROOT
 
+from eitskin.config import load_toml
 from eitskin.core.engine import load_core
 from eitskin.core.options_table import CHOICES, OF_MODEL, RANGES, OptionFields
 from eitskin.model.eitm import encode_model
@@ -19,13 +20,8 @@ from eitskin.model.options import default_options
 from eitskin_studies.experiments.registry import EXPERIMENTS
 from small_models import prebuilt
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 WIDTHS = ("float32", "float64")
-CONSTANTS = tomllib.loads((ROOT / "tables" / "constants.toml").read_text(encoding="utf-8"))["room"]
+CONSTANTS = load_toml(ROOT / "tables" / "constants.toml", "table")["room"]
 
 
 def test_what_is_written_from_the_tables_is_up_to_date() -> None:

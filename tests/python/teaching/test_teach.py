@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from eitskin.errors import FrameError
+from eitskin.cli.teach_fit import described_skin
+from eitskin.errors import ConfigError, FrameError
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.left_out import (
@@ -167,3 +168,9 @@ def test_without_a_description_a_stationary_kernel_says_what_is_lost() -> None:
     taught = teach(presses(30), None)
     assert any("give --skin" in note for note in taught.report["notes"])
     assert np.isfinite(leave_one_out(taught.learned, taught.model.grid).error_mm).all()
+
+
+@pytest.mark.parametrize("text", ["a = [", "x = " + 5000 * "[", "a." * 2000 + "b = 1"])
+def test_a_description_that_is_none_is_refused_in_one_line(text: str) -> None:
+    with pytest.raises(ConfigError, match=r"own description: not .*; give --skin"):
+        described_skin(replace(presses(10), skin=text), None)
