@@ -137,6 +137,7 @@ static void numbers_out_of_range(void)
     CHECK_EQUAL(with_number(12, 1001.0f), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_number(16, -0.1f), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_number(16, INFINITY), EITS_E_MODEL_VALUE);
+    CHECK_EQUAL(with_number(16, 1.5e30f), EITS_E_MODEL_VALUE);
     for (uint32_t k = 0; k < 3; ++k) { /* strengths, forces */
         for (uint32_t list = 0; list < 2; ++list) {
             const uint32_t at = HEAD + 12 * list + 4 * k;
