@@ -202,9 +202,9 @@ def open_text(url: str, *, model: bytes | None = None) -> SourceTransport:
         FileError, ConfigError, ProtocolError, FrameError: of the layout.
     """
     rest = url.partition(":")[2]
-    path, _, query = rest.rpartition("?")
+    path, asks, query = rest.rpartition("?")
     named: dict[str, str] = {}
-    for pair in query.split("&"):
+    for pair in query.split("&") if asks else ():
         key, mark, value = pair.partition("=")
         if key not in ("layout", "baud", "wait") or not mark or not value or key in named:
             raise UsageError(f"device {url!r}: {pair!r} after '?'; write  {HELP}")

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eitskin.errors import DeviceError
+from eitskin.device.flash import check_image
 from eitskin.fileio import read_bytes
-
-ELF = b"\x7fELF"
 
 
 def image_bytes(path: Path | None) -> bytes:
@@ -16,13 +14,12 @@ def image_bytes(path: Path | None) -> bytes:
 
     Raises:
         FileError: it cannot be read.
-        DeviceError: it is an .elf.
+        DeviceError: it cannot be this board's firmware.
     """
     if path is None:
         from eitskin.firmware.prebuilt import load_image
 
         return load_image()[0]
     image = read_bytes(path, "firmware image")
-    if image.startswith(ELF):
-        raise DeviceError(f"{path}: this is an .elf; give the .bin that is built beside it")
+    check_image(path, image)
     return image
