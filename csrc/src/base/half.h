@@ -31,4 +31,19 @@ static inline float eits_half_to_float(uint16_t half)
 #endif
 }
 
+/* Two neighbours by one load. */
+static inline void eits_halves_to_floats(const uint16_t *halves, float value[2])
+{
+#if defined(__ARM_ARCH_7EM__) && defined(__ARM_FP)
+    uint32_t both;
+    memcpy(&both, halves, sizeof both);
+    __asm__("vmov %0, %2\n\tvcvtt.f32.f16 %1, %0\n\tvcvtb.f32.f16 %0, %0"
+            : "=&t"(value[0]), "=&t"(value[1])
+            : "r"(both));
+#else
+    value[0] = eits_half_to_float(halves[0]);
+    value[1] = eits_half_to_float(halves[1]);
+#endif
+}
+
 #endif

@@ -124,8 +124,19 @@ static void say_normal(fast_share *share, uint32_t count, eits_real *const answe
     }
 }
 
-/* What one drive says of a fit; 0 where a place is off the skin. */
-static int say_drive(eits_fast *fast, const fast_held *held, const fast_fit *fit, fast_share *share)
+/* A place's whitened answer in a drive and its slopes; 0 where it is off the skin. */
+static int whitened(eits_fast *fast, const fast_held *held, const eits_real *place, eits_real *out)
+{
+    if (!eits_fast_answer(fast, held->drive, place, out))
+        return 0;
+    whiten_ways(held, out, fast->most_rows, fast->drive[held->drive].count);
+    return 1;
+}
+
+/* What one drive says of a fit; 0 where a place is off the skin. `first`: the whitened answer of
+ * the first place, NULL where it is not there. */
+static int say_drive(eits_fast *fast, const fast_held *held, const fast_fit *fit,
+                     const eits_real *first, fast_share *share)
 {
     const uint32_t rows = fast->drive[held->drive].count;
     const size_t stride = fast->most_rows;
@@ -133,9 +144,10 @@ static int say_drive(eits_fast *fast, const fast_held *held, const fast_fit *fit
     const eits_real *g[2] = {answer[0], answer[1]};
     eits_real *rest = fast->spare;
     for (uint32_t i = 0; i < fit->count; ++i) {
-        if (!eits_fast_answer(fast, held->drive, fit->place[i], answer[i]))
+        if (i == 0 && first != NULL)
+            eits_copy(answer[0], first, FAST_WAYS * fast->most_rows);
+        else if (!whitened(fast, held, fit->place[i], answer[i]))
             return 0;
-        whiten_ways(held, answer[i], stride, rows);
     }
     solve_strengths(fast, g, fit->count, held->white, rows, share->strength);
     eits_copy(rest, held->white, rows);
@@ -181,10 +193,14 @@ static void add_share(fast_fit *fit, const fast_share *share)
     }
 }
 
-int eits_fast_fit_at(eits_fast *fast, uint32_t from, uint32_t known, fast_fit *fit)
+/* `first`: whitened answers of the first place in these drives, NULL where they are not there. */
+static int fit_beside(eits_fast *fast, uint32_t from, uint32_t known, const eits_real *first,
+                      fast_fit *fit)
 {
+    const size_t stride = FAST_WAYS * (size_t)fast->most_rows;
     for (uint32_t n = from; n < fast->held_count; ++n) {
-        if ((known >> n & 1u) == 0 && !say_drive(fast, &fast->held[n], fit, &fit->share[n]))
+        const eits_real *here = first == NULL ? NULL : first + stride * (n - from);
+        if ((known >> n & 1u) == 0 && !say_drive(fast, &fast->held[n], fit, here, &fit->share[n]))
             return 0;
     }
     fit->left_all = fit->score = fit->own[0] = fit->own[1] = 0;
@@ -193,6 +209,25 @@ int eits_fast_fit_at(eits_fast *fast, uint32_t from, uint32_t known, fast_fit *f
     for (uint32_t n = from; n < fast->held_count; ++n)
         add_share(fit, &fit->share[n]);
     return 1;
+}
+
+int eits_fast_fit_at(eits_fast *fast, uint32_t from, uint32_t known, fast_fit *fit)
+{
+    return fit_beside(fast, from, known, NULL, fit);
+}
+
+/* Else the next search had to look at all drives that came without news, or while another search
+ * ran. Its places are on the skin. */
+void eits_fast_keep_up(eits_fast *fast)
+{
+    fast_held *newest = &fast->held[fast->held_count - 1];
+    fast_fit *fit = &fast->trial;
+    fit->count = 1;
+    for (uint32_t k = 0; k < fast->last_count; ++k) {
+        eits_copy(fit->place[0], fast->last[k], 2);
+        (void)say_drive(fast, newest, fit, NULL, &newest->share[k]);
+        newest->said |= (uint8_t)(1u << k);
+    }
 }
 
 /* The step that the normal equations ask for, at most EITS_FAST_MAX_STEP_MM along an axis; its
@@ -220,11 +255,12 @@ static eits_real damped_step(const fast_fit *fit, eits_real shorter, eits_real *
 }
 
 /* Damped Gauss-Newton steps from fit->place, of which drives in the bits of `known` have said what
- * they do; 0 where it is off the skin. */
-static int refine(eits_fast *fast, uint32_t from, uint32_t steps, uint32_t known, fast_fit *fit)
+ * they do; `beside` as `first` above. 0 where it is off the skin. */
+static int refine(eits_fast *fast, uint32_t from, uint32_t steps, uint32_t known,
+                  const eits_real *beside, fast_fit *fit)
 {
     eits_real shorter = 1, step[4];
-    if (!eits_fast_fit_at(fast, from, known, fit))
+    if (!fit_beside(fast, from, known, beside, fit))
         return 0;
     for (; steps > 0; --steps) {
         const eits_real length = damped_step(fit, shorter, step);
@@ -260,37 +296,6 @@ static uint32_t steps_of(const eits_fast *fast, uint32_t from, uint32_t touches,
     return steps < EITS_FAST_STEPS ? steps : EITS_FAST_STEPS;
 }
 
-/* The pixel's centre, mm. */
-static void centre(const eits_fast *fast, uint32_t pixel, eits_real *place)
-{
-    const eits_model *m = fast->model;
-    const eits_real side = (eits_real)m->pixel_mm;
-    place[0] = (eits_real)m->origin_x_mm + ((eits_real)m->pixel[pixel].ix + R(0.5)) * side;
-    place[1] = (eits_real)m->origin_y_mm + ((eits_real)m->pixel[pixel].iy + R(0.5)) * side;
-}
-
-/* The greatest cell of `score` apart from the `count` places; 0 where nothing is above zero. */
-static int peak(const eits_fast *fast, const eits_real *score, const eits_real (*places)[2],
-                uint32_t count, eits_real *place)
-{
-    /* One pass without sorting: a map has hundreds of cells and at most two peaks are wanted. */
-    eits_real greatest = 0;
-    for (uint32_t n = 0; n < fast->cells; ++n) {
-        eits_real here[2];
-        if (!(score[n] > greatest))
-            continue;
-        centre(fast, fast->cell[n], here);
-        int free = 1;
-        for (uint32_t k = 0; k < count; ++k)
-            free &= fast_apart(here, places[k]);
-        if (free) {
-            greatest = score[n];
-            eits_copy(place, here, 2);
-        }
-    }
-    return greatest > 0;
-}
-
 /* Where the last search from about there has come to, with what drives said of it then: their bits
  * in `known`. 0 where there is none. */
 static int go_on(const eits_fast *fast, fast_fit *fit, uint32_t *known)
@@ -323,12 +328,26 @@ static void keep(eits_fast *fast, uint32_t from, const fast_fit *const fits[], u
     }
 }
 
+/* Whitened answers of a place on the skin in the drives from `from` on, once for all starts beside
+ * it. They stand where the update's numbers do, which a drive with news does not need. */
+static const eits_real *answers_of(eits_fast *fast, uint32_t from, const eits_real *place)
+{
+    _Static_assert(EITS_FAST_PAIR_HELD * FAST_WAYS <= FAST_NUMBERS, "room");
+    eits_real *next = fast->moved;
+    for (uint32_t n = from; n < fast->held_count; ++n) {
+        (void)whitened(fast, &fast->held[n], place, next);
+        next += FAST_WAYS * (size_t)fast->most_rows;
+    }
+    return fast->moved;
+}
+
 /* Fits from the greatest cells of a map, in their order; how many. */
 static uint32_t fits_from(eits_fast *fast, uint32_t from, const eits_real *first, fast_fit *fit)
 {
     eits_real taken[1 + EITS_FAST_STARTS][2];
     const eits_real *score = first == NULL ? fast->score : fast->pair_score;
     const uint32_t touches = first == NULL ? 1 : 2;
+    const eits_real *beside = first == NULL ? NULL : answers_of(fast, from, first);
     uint32_t found = 0, places = 0;
     if (first != NULL)
         eits_copy(taken[places++], first, 2);
@@ -336,7 +355,7 @@ static uint32_t fits_from(eits_fast *fast, uint32_t from, const eits_real *first
         eits_real *place = taken[places];
         uint32_t known = 0;
         int is_new = 0;
-        if (!peak(fast, score, (const eits_real(*)[2])taken, places, place))
+        if (!eits_fast_peak(fast, score, (const eits_real(*)[2])taken, places, place))
             break;
         ++places;
         fit[found].count = touches;
@@ -346,7 +365,7 @@ static uint32_t fits_from(eits_fast *fast, uint32_t from, const eits_real *first
         else
             eits_copy(fit[found].place[0], first, 2);
         found += (uint32_t)refine(fast, from, steps_of(fast, from, touches, start, is_new), known,
-                                  &fit[found]);
+                                  beside, &fit[found]);
     }
     fast->turn ^= 1;
     return found;

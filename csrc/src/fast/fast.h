@@ -186,6 +186,9 @@ void eits_fast_forget(eits_fast *fast, uint32_t k);
 void eits_fast_map(eits_fast *fast, const fast_held *held);
 /* The map beside a first touch, of the newest drives that wait. */
 void eits_fast_map_beside(eits_fast *fast, const eits_real *first);
+/* The greatest cell of `score` apart from the `count` places; 0 where nothing is above zero. */
+int eits_fast_peak(const eits_fast *fast, const eits_real *score, const eits_real (*places)[2],
+                   uint32_t count, eits_real *place);
 
 /* ---- births.c ---- */
 
@@ -194,6 +197,8 @@ int eits_fast_invert(const eits_real h[4][4], uint32_t n, eits_real inverse[4][4
 /* How `fit->place` explains the drives held from `from` on; its shares of those in the bits of
  * `known` are there. 0 where a place is off the skin. */
 int eits_fast_fit_at(eits_fast *fast, uint32_t from, uint32_t known, fast_fit *fit);
+/* The newest drive says what it does at the places that the last search came to. */
+void eits_fast_keep_up(eits_fast *fast);
 /* Looks for one touch in them, or by the map beside it for a second at `first`; the best, with its
  * lead over the next best elsewhere; NULL where there is none. It is the room's until the next
  * search. */

@@ -15,6 +15,8 @@ typedef struct sight {
     eits_real energy;                      /* of that touch; 0: none is known */
     eits_real weight[EITS_FAST_MAX_ROWS];  /* of a row's square */
     const uint8_t *measured[EITS_FAST_MAX_ROWS];
+    eits_real f[EITS_MAX_ELECTRODES];           /* of the cell at hand */
+    const eits_real *of[EITS_FAST_MAX_ROWS][2]; /* a row's two of them */
 } sight;
 
 /* D'u of the drive's rows, by electrode. */
@@ -22,7 +24,7 @@ static void over_electrodes(const eits_fast *fast, const sight *s, const eits_re
                             eits_real *out)
 {
     const eits_real volts = -(eits_real)fast->model->fields.volts;
-    eits_zero(out, fast->model->n_electrodes);
+    eits_zero(out, (fast->model->n_electrodes + 1) & ~1u);
     for (uint32_t i = 0; i < s->rows; ++i) {
         out[s->measured[i][0]] += volts * u[i];
         out[s->measured[i][1]] -= volts * u[i];
@@ -54,6 +56,8 @@ static void look_at(eits_fast *fast, const fast_held *held, const eits_real *kno
         const eits_real per = 1 / fast_line(held->factor, i)[i];
         s->weight[i] = fast_square(volts * per);
         s->measured[i] = eits_row(fast->ctx, fast->row[d->first + i]) + 2;
+        s->of[i][0] = s->f + s->measured[i][0];
+        s->of[i][1] = s->f + s->measured[i][1];
         own[i] = known == NULL ? 0 : known[i] * per * per;
     }
     if (known != NULL) {
@@ -70,22 +74,26 @@ static void look_at(eits_fast *fast, const fast_held *held, const eits_real *kno
     over_electrodes(fast, s, left, s->toward);
 }
 
-static eits_real explained(const eits_fast *fast, const sight *s, uint32_t pixel)
+static eits_real explained(const eits_fast *fast, sight *s, uint32_t pixel)
 {
     const uint32_t electrodes = fast->model->n_electrodes;
     const uint16_t *x = fast_column(fast, pixel), *y = x + electrodes;
     const eits_real along_x = fast_number(x[s->plus]) - fast_number(x[s->minus]);
     const eits_real along_y = fast_number(y[s->plus]) - fast_number(y[s->minus]);
-    eits_real f[EITS_MAX_ELECTRODES], own = 0, along = 0;
-    for (uint32_t e = 0; e < electrodes; ++e) {
-        f[e] = along_x * fast_number(x[e]) + along_y * fast_number(y[e]);
+    eits_real *f = s->f, own = 0, along = 0, of_x[2], of_y[2];
+    for (uint32_t e = 0; e < electrodes; e += 2) {
+        fast_two(x, e, of_x);
+        fast_two(y, e, of_y);
+        f[e] = along_x * of_x[0] + along_y * of_y[0];
+        f[e + 1] = along_x * of_x[1] + along_y * of_y[1];
         along += f[e] * s->toward[e];
+        along += f[e + 1] * s->toward[e + 1];
     }
     along *= fast->sign;
     if (!(along > 0))
         return 0;
     for (uint32_t i = 0; i < s->rows; ++i)
-        own += s->weight[i] * fast_square(f[s->measured[i][0]] - f[s->measured[i][1]]);
+        own += s->weight[i] * fast_square(*s->of[i][0] - *s->of[i][1]);
     if (s->energy > 0)
         own -= fast_square(fast_dot(f, s->shared, electrodes)) / s->energy;
     return own > 0 ? along * along / own : 0;
@@ -114,4 +122,34 @@ void eits_fast_map_beside(eits_fast *fast, const eits_real *first)
         (void)eits_fast_answer(fast, fast->held[n].drive, first, fast->answer);
         add_cells(fast, &fast->held[n], fast->answer, fast->pair_score);
     }
+}
+
+/* The pixel's centre, mm. */
+static void centre(const eits_fast *fast, uint32_t pixel, eits_real *place)
+{
+    const eits_model *m = fast->model;
+    const eits_real side = (eits_real)m->pixel_mm;
+    place[0] = (eits_real)m->origin_x_mm + ((eits_real)m->pixel[pixel].ix + R(0.5)) * side;
+    place[1] = (eits_real)m->origin_y_mm + ((eits_real)m->pixel[pixel].iy + R(0.5)) * side;
+}
+
+int eits_fast_peak(const eits_fast *fast, const eits_real *score, const eits_real (*places)[2],
+                   uint32_t count, eits_real *place)
+{
+    /* One pass without sorting: a map has hundreds of cells and at most two peaks are wanted. */
+    eits_real greatest = 0;
+    for (uint32_t n = 0; n < fast->cells; ++n) {
+        eits_real here[2];
+        if (!(score[n] > greatest))
+            continue;
+        centre(fast, fast->cell[n], here);
+        int free = 1;
+        for (uint32_t k = 0; k < count; ++k)
+            free &= fast_apart(here, places[k]);
+        if (free) {
+            greatest = score[n];
+            eits_copy(place, here, 2);
+        }
+    }
+    return greatest > 0;
 }

@@ -119,10 +119,16 @@ eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
                     diagonal += sum + error;
             }
         }
-        factor_row(fast, i, diagonal);
+        if (n > 0)
+            factor_row(fast, i, diagonal);
+        else /* the noise alone: the triangle is a diagonal */
+            line[i] = eits_sqrt(diagonal);
     }
     eits_copy(fast->white, fast->e, rows);
-    fast_whiten(fast->factor, fast->white, rows);
+    for (uint32_t i = 0; i < rows && n == 0; ++i)
+        fast->white[i] /= fast_line(fast->factor, i)[i];
+    if (n > 0)
+        fast_whiten(fast->factor, fast->white, rows);
     return fast_dot(fast->white, fast->white, rows);
 }
 

@@ -201,6 +201,7 @@ int eits_fast_find_births(eits_fast *fast)
     if (fast->stage == FAST_TWO)
         return find_two(fast);
     eits_fast_map_beside(fast, fast->first);
+    eits_fast_keep_up(fast);
     fast->stage = FAST_TWO;
     return 0;
 }

@@ -15,7 +15,7 @@ from eitskin_studies.harness.emulated_steps import Choose, Drives, Load, TareSte
 
 # one finger, then none, then two at once, light ones that are long in doubt
 SCENES = {"quiet": (0, 0), "one": (0, 1, 1, 1, 0, 0), "two": (0, 2, 2, 2), "light": (0, 2, 2, 2)}
-MOST = {"quiet": 10_000, "one": 280_000, "two": 340_000, "light": 340_000}
+MOST = {"quiet": 6_000, "one": 280_000, "two": 280_000, "light": 280_000}
 ONE_TOUCH = 40_000
 
 

@@ -240,12 +240,12 @@ class FastPath:
         own = seen.e**2 / summed(seen.factor**2, axis=1)
         worst = int(np.argmax(own))
         if own[worst] > FAST_GLITCH and not self._glitched:
-            without = used.copy()
-            without[worst] = False
-            rest = self.tracks.innovation(z, without, self._sigma, answers)
-            if rest.chi2 < FAST_NEWS:
-                self._glitched = True
-                return rest
+            unit = lower_solve(seen.factor, np.eye(len(z))[worst])
+            left = seen.white - dot(unit, seen.white) / dot(unit, unit) * unit
+            if dot(left, left) < FAST_NEWS:
+                without, self._glitched = used.copy(), True
+                without[worst] = False
+                return self.tracks.innovation(z, without, self._sigma, answers)
         self._glitched = False
         drift = lower_solve(seen.factor, along)
         energy = dot(drift, drift)
