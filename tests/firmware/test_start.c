@@ -102,6 +102,8 @@ static void test_starts_and_ends(void)
     b.board.ended = true;
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &b.board.board), 0);
     eits_command_plain reset = {77};
+    for (int k = 0; k < 60; ++k) /* more than one piece: it ends once all is read */
+        host_send(&b.host, EITS_PACKET_GET_INFO, &reset, sizeof reset);
     host_send(&b.host, EITS_PACKET_RESET, &reset, sizeof reset);
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &b.board.board), 2);
     CHECK_EQUAL(b.board.resets, 1);
