@@ -122,7 +122,7 @@ def test_the_page_is_filled_and_has_its_rows(
     """The fixture's page is a copy of ours; what no command writes stays."""
     written, ours = page.read_text(), PAGE.read_text()
     assert "`eitskin bench diagnostics --scenes 4 " in written
-    assert "--scenes 640 --crowds 24 --imperfect 40 --seed 4001" in ours  # nothing was chosen on it
+    assert "--scenes 320 --crowds 24 --imperfect 40 --seed 4001" in ours  # nothing was chosen on it
     assert written.split("<!-- run -->")[0] == ours.split("<!-- run -->")[0]
     assert written.rsplit("<!-- end", 1)[1] == ours.rsplit("<!-- end", 1)[1]
     names, shown = [fault.name for fault in FAULTS], FIRST_CELL.findall(ours)
