@@ -291,10 +291,10 @@ static void parameters_fit_the_data(void)
     const uint32_t expected[] = {8, 8, 8, 4, 4, 4, 0};
     for (uint32_t count = 0; count < 7; ++count)
         CHECK_EQUAL(eits_shape_parameters(ctx, count), expected[count]);
-    b.b.c.model.fields.at.stride = RANK * STRIDE + 8;
+    b.b.c.model.fields.at.stride = b.b.c.model.n_pixels + 8;
     CHECK_EQUAL(eits_shape_parameters(ctx, 1), 6);
     CHECK_EQUAL(eits_shape_parameters(ctx, 3), 6);
-    b.b.c.model.fields.at.stride = RANK * STRIDE;
+    b.b.c.model.fields.at.stride = b.b.c.model.n_pixels;
     CHECK_EQUAL(eits_shape_parameters(ctx, 1), 8);
     b.b.c.model.data_kind = EITS_DATA_NORMALISED;
     CHECK_EQUAL(eits_shape_parameters(ctx, 1), 6);

@@ -36,7 +36,11 @@
 
 /* of Gauss and Newton, for each simpler answer [steps]. larger: costs; smaller: an answer is judged
  * before it is fitted */
-#define EITS_REFIT_STEPS 3
+#define EITS_REFIT_STEPS 5
+
+/* what F of a disc costs without slopes, against test_columns [columns]. larger: less is tried;
+ * smaller: a frame costs more than test_columns says */
+#define EITS_TRIAL_COLUMNS 2
 
 /* ---- Chosen: on the tuning family of the worlds (seed 1, 40 scenes a set): true touches of discs
  * rise by at least 26 thresholds, false ones elsewhere by up to 36, where the excess is above 2.
@@ -180,6 +184,10 @@
 /* below which the linearisation is to have F of two after the first steps; else they are given up
  * [of F of one]. larger: costs; smaller: two fingers stay one touch */
 #define EITS_SPLIT_HOPE R(2.0)
+
+/* of test_columns, up to which touches are tried as two: beyond, it is mostly in vain [columns].
+ * larger: costs; smaller: two fingers stay one touch */
+#define EITS_SPLIT_COLUMNS 120
 
 /* from the middle at which the two start [of the radius]. further from it: the fit may end
  * elsewhere */

@@ -51,15 +51,21 @@ static void drop_linearly(eits_context *ctx, const eits_scratch *scratch, const 
     add_shapes(ctx, rest, likelihood);
 }
 
-/* The best of the answers with one disc less: without the weakest, or with a near pair as one. */
+/* The best of the answers with one disc less: without the weakest, unless that is clear, or with a
+ * near pair as one. Where the linearisation alone has judged the discs, they are fitted only if
+ * that may decide. */
 static int take_simpler(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
                         uint32_t weakest, eits_likelihood *likelihood, uint64_t *macs)
 {
-    const eits_real threshold = eits_needed_rise(ctx, v), enough = v->answer.misfit + threshold;
+    const eits_real threshold = eits_needed_rise(ctx, v), enough = v->answer.misfit + threshold,
+                    here = likelihood->here;
     eits_answer best = v->answer;
-    *macs += eits_linear_drop(ctx, scratch, &best, likelihood, weakest);
-    add_shapes(ctx, &best, likelihood);
-    *macs += eits_refit(ctx, scratch, &best, likelihood, enough);
+    best.misfit = R(INFINITY);
+    if (!(v->rise[weakest] > EITS_CLEAR * threshold)) {
+        *macs += eits_linear_drop(ctx, scratch, &best, likelihood, weakest);
+        add_shapes(ctx, &best, likelihood);
+        *macs += eits_refit(ctx, scratch, &best, likelihood, enough, R(INFINITY));
+    }
     for (uint32_t j = 1; j < v->answer.count; ++j) {
         for (uint32_t i = 0; i < j; ++i) {
             if (best.misfit < enough || !eits_may_be_one(v, i, j, threshold) ||
@@ -69,15 +75,22 @@ static int take_simpler(eits_context *ctx, const eits_scratch *scratch, eits_ver
             merge(ctx, &one, i, j);
             add_shapes(ctx, &one, likelihood);
             likelihood->at_hand = 0;
-            *macs += eits_refit(ctx, scratch, &one, likelihood, enough);
+            *macs += eits_refit(ctx, scratch, &one, likelihood, enough, enough);
             if (one.misfit < best.misfit)
                 best = one;
             else
                 likelihood->at_hand = 0;
         }
     }
-    if (!(best.misfit - v->answer.misfit < threshold))
+    if (!v->fitted && !(best.misfit < enough) && best.misfit < here + threshold) {
+        likelihood->at_hand = 0;
+        *macs += eits_refit(ctx, scratch, &v->answer, likelihood, 0, R(INFINITY));
+        likelihood->at_hand = 0;
+        v->fitted = 1;
+    }
+    if (!(best.misfit - v->answer.misfit < eits_needed_rise(ctx, v)))
         return 0;
+    v->fitted = 1;
     v->answer = best;
     v->changed = 1;
     return 1;
@@ -102,7 +115,7 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
         eits_answer rest = v->answer;
         drop_linearly(ctx, scratch, v, weakest, &rest, &now, macs);
         if (rest.count < v->answer.count) {
-            *macs += eits_refit(ctx, scratch, &rest, &now, 0);
+            *macs += eits_refit(ctx, scratch, &rest, &now, 0, R(INFINITY));
             if (!(rest.misfit < R(INFINITY)))
                 return 1;
             v->answer = rest;
@@ -111,21 +124,21 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
         }
         if (!eits_may_make(ctx, 2 * eits_columns_of(&v->answer)))
             return 1;
-        const int was_fitted = v->fitted;
-        if (!was_fitted)
-            *macs += eits_refit(ctx, scratch, &v->answer, &now, 0);
-        v->fitted = 1;
-        if (!now.at_hand)
-            *macs += eits_linearise(ctx, scratch, &v->answer, &now);
-        if (!was_fitted)
+        if (!v->fitted && (!(v->rise[weakest] > EITS_CLEAR * eits_needed_rise(ctx, v)) ||
+                           eits_excess(ctx, now.here, v->answer.count) > EITS_FITS)) {
+            *macs += eits_refit(ctx, scratch, &v->answer, &now, 0, R(INFINITY));
+            v->fitted = 1;
+            if (!now.at_hand)
+                *macs += eits_linearise(ctx, scratch, &v->answer, &now);
             weakest = eits_look(ctx, scratch, v, &now);
+        }
         if (!to_the_end && !eits_fits(ctx, v))
             return 0;
         if (!take_simpler(ctx, scratch, v, weakest, &now, macs))
             return 1;
     }
     v->fitted = 1;
-    *macs += eits_refit(ctx, scratch, &v->answer, &now, 0);
+    *macs += eits_refit(ctx, scratch, &v->answer, &now, 0, R(INFINITY));
     if (v->answer.count == 0)
         return 1;
     /* on an instrument that is far from the model one stays */

@@ -54,6 +54,11 @@ eits_real eits_shape_part(const eits_answer *answer, uint32_t k, uint32_t parame
 uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
                             const eits_answer *answer, uint32_t k);
 
+/* left (stride numbers) = what the answer's discs, with their shapes, leave of the data. Uses
+ * scratch->row[2] and [3]; what a linearisation made stays. */
+uint64_t eits_shape_residual(eits_context *ctx, const eits_scratch *scratch,
+                             const eits_answer *answer, eits_real *left);
+
 /* The answer without disc k, the others as they are. */
 void eits_leave_out(eits_answer *answer, uint32_t k);
 
@@ -87,11 +92,12 @@ eits_real eits_linear_rise(const eits_scratch *scratch, const eits_answer *answe
 uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
                           eits_likelihood *likelihood, uint32_t k);
 
-/* Gauss and Newton's steps, a few at most, until F is `enough` or hardly falls; sets
+/* Gauss and Newton's steps, a few at most, until F is `enough` or hardly falls, or a linearisation
+ * says that it will not come below `hopeless`; sets
  * answer->misfit. `likelihood` is made unless it is at hand; afterwards it is, or it may be made.
  * Where not even the first may be, the misfit is beyond all others. */
 uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
-                    eits_likelihood *likelihood, eits_real enough);
+                    eits_likelihood *likelihood, eits_real enough, eits_real hopeless);
 
 /* touch_test.c */
 

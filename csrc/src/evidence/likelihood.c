@@ -103,7 +103,7 @@ static void invert(const eits_context *ctx, const eits_scratch *scratch, uint32_
 
 int eits_may_make(eits_context *ctx, uint32_t columns)
 {
-    const uint32_t most = ctx->options.test_columns;
+    const uint32_t most = ctx->evidence.columns_most;
     const int may = most == 0 || (ctx->evidence.columns_made <= most &&
                                   columns <= most - ctx->evidence.columns_made);
     ctx->evidence.spent |= !may;
@@ -233,41 +233,66 @@ uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, eits_a
     return (uint64_t)p * (n * (n + p) + 2u * rank);
 }
 
-static eits_real bounded(eits_real v, eits_real low, eits_real high)
+/* By how much a step is longer than the linearisation holds; at least 1. */
+static eits_real too_long(const eits_context *ctx, const eits_answer *from, const eits_real *step)
 {
-    return eits_clamp(v, low, high);
+    const eits_real radius = EITS_MAX_RADIUS_MOVE * (eits_real)ctx->model->pixel_mm;
+    eits_real over = 1;
+    for (uint32_t k = 0; k < from->count; ++k) {
+        const eits_real *s = step + k * from->parameters,
+                        part[] = {s[0] / EITS_LEAST_CHANGE, s[0] / EITS_MOST_CHANGE,
+                                  eits_fabs(s[1]) / EITS_MAX_MOVE, eits_fabs(s[2]) / EITS_MAX_MOVE,
+                                  eits_fabs(from->radius_mm[k] * s[3]) / radius};
+        for (size_t i = 0; i < sizeof part / sizeof part[0]; ++i)
+            over = part[i] > over ? part[i] : over;
+    }
+    return over;
 }
 
-/* Bounded, since the linearisation holds within a fraction of a radius: a full step of a weak disc
- * would leave the skin, or turn its sign. A place off the skin is refused, strength and shape still
- * move. */
+/* Shortened as a whole where it is too long, since near discs give and take: bounded one by one,
+ * parts of a step no longer make up for each other. A place off the skin is refused, strength and
+ * shape still move. */
 static eits_answer moved(const eits_context *ctx, const eits_answer *from, const eits_real *step,
                          eits_real fraction)
 {
     const eits_options *o = &ctx->options;
-    const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
+                    part = fraction / too_long(ctx, from, step);
     eits_answer to = *from;
     for (uint32_t k = 0; k < to.count; ++k) {
         const eits_real *s = step + k * to.parameters;
         eits_disc *disc = &to.disc[k];
-        disc->change *= eits_fma(fraction, bounded(s[0], EITS_LEAST_CHANGE, EITS_MOST_CHANGE), 1);
+        disc->change *= eits_fma(part, s[0], 1);
         eits_disc there = *disc;
-        there.x_mm += fraction * pixel * bounded(s[1], -EITS_MAX_MOVE, EITS_MAX_MOVE);
-        there.y_mm += fraction * pixel * bounded(s[2], -EITS_MAX_MOVE, EITS_MAX_MOVE);
-        const eits_real grow = to.radius_mm[k] * s[3], most = EITS_MAX_RADIUS_MOVE * pixel;
-        there.radius_mm = bounded(disc->radius_mm + fraction * bounded(grow, -most, most),
-                                  o->touch_min_radius_mm, o->touch_max_radius_mm);
+        there.x_mm += part * pixel * s[1];
+        there.y_mm += part * pixel * s[2];
+        there.radius_mm = eits_clamp(disc->radius_mm + part * to.radius_mm[k] * s[3],
+                                     o->touch_min_radius_mm, o->touch_max_radius_mm);
         if (eits_disc_on_skin(ctx, &there))
             *disc = there;
         for (uint32_t p = EITS_PLACE_PARAMETERS; p < to.parameters; ++p)
-            to.shape[k][p - EITS_PLACE_PARAMETERS] += fraction * bounded(s[p], -1, 1);
+            to.shape[k][p - EITS_PLACE_PARAMETERS] += part * s[p];
     }
     return to;
 }
 
-uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
-                    eits_likelihood *likelihood, eits_real enough)
+/* F of an answer alone, without slopes. */
+static uint64_t misfit_of(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
+                          eits_real *misfit)
 {
+    const uint32_t rank = ctx->model->rank;
+    eits_real *left = scratch->row[4];
+    const uint64_t macs = eits_shape_residual(ctx, scratch, answer, left);
+    ctx->evidence.columns_made += EITS_TRIAL_COLUMNS * answer->count;
+    *misfit = eits_dot(ctx->kernels, left, left, rank) + prior_of(answer);
+    return macs + rank;
+}
+
+uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
+                    eits_likelihood *likelihood, eits_real enough, eits_real hopeless)
+{
+    const uint32_t columns = answer->count * answer->parameters,
+                   trial_columns = EITS_TRIAL_COLUMNS * answer->count;
     uint64_t macs = 0;
     if (answer->count == 0) {
         likelihood->at_hand = 0;
@@ -275,7 +300,6 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
             eits_dot(ctx->kernels, ctx->evidence.data, ctx->evidence.data, ctx->model->rank);
         return ctx->model->rank;
     }
-    const uint32_t columns = answer->count * answer->parameters;
     if (!likelihood->at_hand && !eits_may_make(ctx, columns)) {
         answer->misfit = R(INFINITY);
         return 0;
@@ -283,22 +307,27 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
     if (!likelihood->at_hand)
         macs += eits_linearise(ctx, scratch, answer, likelihood);
     eits_real fraction = 1;
-    for (int step = 0; step < EITS_REFIT_STEPS; ++step) {
-        if (likelihood->here <= enough ||
-            likelihood->here - likelihood->least < EITS_SETTLED_MISFIT ||
-            !eits_may_make(ctx, 2 * columns)) /* where it fails, what stands is made again */
+    for (int step = 0; step < EITS_REFIT_STEPS && likelihood->here > enough; ++step) {
+        /* what stands is linearised by whom it concerns, if need be: that is left over */
+        const uint32_t again = likelihood->at_hand ? 0 : columns;
+        if (!eits_may_make(ctx, again + trial_columns + columns))
             break;
-        eits_likelihood next;
+        if (!likelihood->at_hand)
+            macs += eits_linearise(ctx, scratch, answer, likelihood);
+        if (likelihood->here - likelihood->least < EITS_SETTLED_MISFIT ||
+            likelihood->least > hopeless)
+            break;
         const eits_answer trial = moved(ctx, answer, likelihood->step, fraction);
-        macs += eits_linearise(ctx, scratch, &trial, &next);
+        eits_real misfit;
+        macs += misfit_of(ctx, scratch, &trial, &misfit);
         /* Only what is better is taken, so that no refit makes an answer worse; a shorter step from
          * the same linearisation is tried else. */
-        if (next.here < likelihood->here) {
+        if (misfit < likelihood->here) {
             *answer = trial;
-            *likelihood = next;
+            likelihood->here = misfit;
+            likelihood->at_hand = 0;
             fraction = 1;
         } else {
-            likelihood->at_hand = 0;
             fraction *= EITS_SHORTER;
         }
     }

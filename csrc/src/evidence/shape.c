@@ -7,7 +7,8 @@
  * are made of the same and of a radius that is not known.
  *
  * Costs of one disc: six products over its covered pixels, its fields, two products with P, and
- * eight with R'^-1. */
+ * eight with R'^-1. What all leave of the data needs one product of each for a disc, and one with
+ * R'^-1 for all: a fifth of that. */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
@@ -23,9 +24,9 @@ uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count)
     const uint32_t room =
         ctx->model->rank < EITS_EVIDENCE_COLUMNS ? ctx->model->rank : EITS_EVIDENCE_COLUMNS;
     const eits_matrix *fields = &ctx->model->fields.at;
-    /* a disc's fields are kept in scratch->square */
+    /* a disc's fields are kept in scratch->pixel[0] */
     const int dipoles = fields->data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE &&
-                        fields->stride <= ctx->model->rank * EITS_STRIDE(ctx->model->rank);
+                        fields->stride <= ctx->model->n_pixels;
     const uint32_t all = dipoles ? EITS_SHAPE_PARAMETERS : EITS_EDGE_PARAMETERS;
     if (count * all <= room && count * all <= EITS_SHAPE_COLUMNS)
         return all;
@@ -47,30 +48,27 @@ void eits_leave_out(eits_answer *answer, uint32_t k)
     memmove(&answer->shape[k], &answer->shape[k + 1u], after * sizeof answer->shape[k]);
 }
 
-/* Re and Im of what the disc answers as a dipole that turns: `out`, two columns. */
-static uint64_t dipoles(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
-                        eits_real *const out[2])
+/* What the disc answers as a dipole that turns: so much of Re and of Im. Its fields are in
+ * scratch->pixel[0]. */
+static uint64_t dipole(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
+                       const eits_real part[2], eits_real *out)
 {
     const uint32_t electrodes = ctx->model->n_electrodes, folds = ctx->model->n_folded;
-    eits_real *field = scratch->square;
-    uint64_t macs = eits_disc_field(ctx, scratch, disc, field);
-    const eits_real factor = -((eits_real)ctx->model->fields.volts * eits_disc_moment(ctx, disc));
-    for (int part = 0; part < 2; ++part) {
-        uint32_t count = 0;
-        for (uint32_t k = 0; k < folds; ++k) {
-            const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
-            const eits_real x = field[row[0]] - field[row[1]],
-                            y = field[electrodes + row[0]] - field[electrodes + row[1]];
-            const eits_real u = field[row[2]] - field[row[3]],
-                            v = field[electrodes + row[2]] - field[electrodes + row[3]];
-            scratch->index[count] = k;
-            scratch->value[count] =
-                factor * (part == 0 ? eits_fma(x, u, -(y * v)) : eits_fma(x, v, y * u));
-            count += ctx->frame.sides[k] != EITS_SIDE_NONE;
-        }
-        macs += 4u * folds + eits_reduce(ctx, scratch, count, out[part]);
+    const eits_real *field = scratch->pixel[0],
+                    factor = -((eits_real)ctx->model->fields.volts * eits_disc_moment(ctx, disc)),
+                    re = factor * part[0], im = factor * part[1];
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < folds; ++k) {
+        const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
+        const eits_real x = field[row[0]] - field[row[1]],
+                        y = field[electrodes + row[0]] - field[electrodes + row[1]];
+        const eits_real u = field[row[2]] - field[row[3]],
+                        v = field[electrodes + row[2]] - field[electrodes + row[3]];
+        scratch->index[count] = k;
+        scratch->value[count] = eits_fma(re, eits_fma(x, u, -(y * v)), im * eits_fma(x, v, y * u));
+        count += ctx->frame.sides[k] != EITS_SIDE_NONE;
     }
-    return macs;
+    return 6u * folds + eits_reduce(ctx, scratch, count, out);
 }
 
 uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
@@ -96,12 +94,42 @@ uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
         for (uint32_t i = 0; i < rank; ++i)
             column[p][i] *= unit[p];
     }
-    if (parameters == EITS_SHAPE_PARAMETERS)
-        macs += dipoles(ctx, scratch, disc, &column[6]);
+    if (parameters == EITS_SHAPE_PARAMETERS) {
+        static const eits_real re[2] = {1, 0}, im[2] = {0, 1};
+        macs += eits_disc_field(ctx, scratch, disc, scratch->pixel[0]);
+        macs += dipole(ctx, scratch, disc, re, column[6]);
+        macs += dipole(ctx, scratch, disc, im, column[7]);
+    }
     for (uint32_t p = 0; p < parameters; ++p) {
         macs += eits_whiten_errors(ctx, column[p]);
         eits_axpy(ctx->kernels, ctx->evidence.left, -eits_shape_part(answer, k, p), column[p],
                   rank);
     }
     return macs + (uint64_t)parameters * rank;
+}
+
+uint64_t eits_shape_residual(eits_context *ctx, const eits_scratch *scratch,
+                             const eits_answer *answer, eits_real *left)
+{
+    const uint32_t rank = ctx->model->rank;
+    const size_t stride = EITS_STRIDE(rank);
+    eits_real *whole = scratch->row[2], *one = scratch->row[3];
+    uint64_t macs = 0;
+    eits_zero(whole, stride);
+    for (uint32_t k = 0; k < answer->count; ++k) {
+        const eits_disc *disc = &answer->disc[k];
+        const eits_real *shape = answer->shape[k],
+                        edge_mm[2] = {disc->radius_mm * shape[0], disc->radius_mm * shape[1]};
+        macs += eits_disc_ellipse(ctx, scratch, disc, edge_mm, one);
+        eits_axpy(ctx->kernels, whole, disc->change, one, rank);
+        if (answer->parameters < EITS_SHAPE_PARAMETERS || (shape[2] == 0 && shape[3] == 0))
+            continue;
+        macs += eits_disc_field(ctx, scratch, disc, scratch->pixel[0]);
+        macs += dipole(ctx, scratch, disc, &shape[2], one);
+        eits_axpy(ctx->kernels, whole, 1, one, rank);
+    }
+    macs += eits_whiten_errors(ctx, whole);
+    eits_copy(left, ctx->evidence.data, stride);
+    eits_axpy(ctx->kernels, left, -1, whole, rank);
+    return macs + 3u * (uint64_t)rank * answer->count;
 }

@@ -76,6 +76,13 @@ static eits_real needed_fall(const eits_context *ctx, const eits_verdict *v, uin
     return least * EITS_TOUCH_EVIDENCE * eits_excess(ctx, misfit, count);
 }
 
+/* Whether F may fall enough where two leave `misfit`: before the one is fitted, which only lowers
+ * its own. */
+static int may_fall(const eits_context *ctx, const eits_verdict *v, uint32_t k, eits_real misfit)
+{
+    return v->here - misfit > needed_fall(ctx, v, k, misfit, v->answer.count + 1u);
+}
+
 /* Disc k as two, where F falls enough; 1 if they are taken. Twice the usual steps: one disc and two
  * are compared at their best. Two that are far from it after the first are given up. */
 static int take_split(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v, uint32_t k,
@@ -83,17 +90,19 @@ static int take_split(eits_context *ctx, const eits_scratch *scratch, eits_verdi
 {
     eits_likelihood now = {.at_hand = 0}, of_one = {.at_hand = 0};
     eits_answer one = v->answer, two;
-    if (!eits_split_disc(ctx, &v->answer, k, v->line[k], &two))
+    if (!may_fall(ctx, v, k, 0) || !eits_split_disc(ctx, &v->answer, k, v->line[k], &two))
         return 0;
-    *macs += eits_refit(ctx, scratch, &two, &now, 0);
-    const eits_real may_be = now.at_hand ? now.least : two.misfit;
-    if (!(may_be < EITS_SPLIT_HOPE * one.misfit))
+    *macs += eits_refit(ctx, scratch, &two, &now, 0, R(INFINITY));
+    if (!(two.misfit < R(INFINITY)) || !(now.least < EITS_SPLIT_HOPE * one.misfit) ||
+        !may_fall(ctx, v, k, now.least))
         return 0;
-    *macs += eits_refit(ctx, scratch, &two, &now, 0);
+    *macs += eits_refit(ctx, scratch, &two, &now, 0, R(INFINITY));
     eits_likelihood of_two = now;
+    if (!may_fall(ctx, v, k, two.misfit))
+        return 0;
     if (!v->fitted) {
         for (int times = 0; times < 2; ++times)
-            *macs += eits_refit(ctx, scratch, &one, &of_one, 0);
+            *macs += eits_refit(ctx, scratch, &one, &of_one, 0, R(INFINITY));
         of_two.at_hand = 0;
     }
     if (!(one.misfit < R(INFINITY)) ||
@@ -115,7 +124,10 @@ static void split(eits_context *ctx, const eits_scratch *scratch, const eits_fit
     uint32_t k = likeliest_pair(ctx, v);
     if (k == v->answer.count)
         return;
+    const uint32_t all = ctx->options.test_columns,
+                   most = all == 0 || all > EITS_SPLIT_COLUMNS ? EITS_SPLIT_COLUMNS : all;
     (void)take_errors(ctx, scratch, f, v, v->drift, macs); /* as before */
+    ctx->evidence.columns_most = most;
     while (k < v->answer.count && take_split(ctx, scratch, v, k, macs))
         k = likeliest_pair(ctx, v);
 }
@@ -147,6 +159,7 @@ static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, ei
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     ctx->evidence.columns_made = ctx->evidence.spent = 0;
+    ctx->evidence.columns_most = ctx->options.test_columns;
     if (f->count == 0)
         return;
     eits_verdict v = {.changed = 0};

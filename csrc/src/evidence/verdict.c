@@ -90,6 +90,7 @@ uint32_t eits_look(const eits_context *ctx, const eits_scratch *scratch, eits_ve
 {
     if (!v->fitted)
         v->answer.misfit = likelihood->least;
+    v->here = likelihood->here;
     places_of(ctx, scratch, likelihood, v);
     return eits_weakest(scratch, &v->answer, likelihood, v->rise);
 }

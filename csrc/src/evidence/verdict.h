@@ -8,6 +8,7 @@
 typedef struct verdict {
     eits_answer answer;
     eits_real log_determinant; /* of Sigma */
+    eits_real here;            /* F of the discs as they are */
     eits_real rise[EITS_MAX_TOUCHES];
     eits_real place_mm2[EITS_MAX_TOUCHES][3];
     eits_real best_mm[EITS_MAX_TOUCHES][2]; /* where the linearisation has the disc */

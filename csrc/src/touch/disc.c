@@ -155,6 +155,20 @@ uint64_t eits_disc_shape(eits_context *ctx, const eits_scratch *scratch, const e
     return macs;
 }
 
+uint64_t eits_disc_ellipse(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
+                           const eits_real edge_mm[2], eits_real *atom)
+{
+    covered c = cover(ctx, scratch, disc);
+    weigh(ctx, &c);
+    for (uint32_t k = 0; k < c.count; ++k) {
+        const eits_real x = c.toward_x[k], y = c.toward_y[k],
+                        out = eits_fma(edge_mm[0], eits_fma(x, x, -(y * y)),
+                                       edge_mm[1] * (2 * x * y));
+        c.cover[k] = eits_fma(c.ramp[k], out, c.cover[k]);
+    }
+    return respond(ctx, &c, c.cover, atom);
+}
+
 uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
                         eits_real *atom, eits_real *const *slope)
 {

@@ -26,6 +26,11 @@ uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const ei
 uint64_t eits_disc_shape(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
                          eits_real *atom, eits_real *const *slope, eits_real *const *edge);
 
+/* Q F S w of the disc with its rim so much further out (mm): an ellipse's answer to a change of
+ * 1 S/m, in one product. */
+uint64_t eits_disc_ellipse(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
+                           const eits_real edge_mm[2], eits_real *atom);
+
 /* The model's fields (eits_fields), averaged over the disc's covers: `field` has fields.at.stride
  * numbers, zeros where no pixel is covered.
  * Returns the multiply-accumulates. */

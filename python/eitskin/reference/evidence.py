@@ -33,12 +33,14 @@ from eitskin.core.constants_table import (
     SHAPE_PRECISION,
     SHORTER,
     SPLIT_APART,
+    SPLIT_COLUMNS,
     SPLIT_HOPE,
     SPLIT_MIN_RISE,
     SPLIT_ODDS,
     SPLIT_RISE,
     SPLIT_RISE_OF_ODDS,
     TOUCH_EVIDENCE,
+    TRIAL_COLUMNS,
 )
 from eitskin.reference.disc_fit import Disc, Fit
 from eitskin.reference.ellipse import long_axis
@@ -148,7 +150,7 @@ class Answer:
 class Likelihood:
     """F linearised about an answer: F ``here``, the ``least`` at the minimum, the ``step`` to it
     (n,), the ``inverse`` of its matrix (n, n), the ``columns`` (n, r), and what the answer ``left``
-    of the data (r,)."""
+    of the data (r,). Not ``at_hand``: of the answer before its last step, but for ``here``."""
 
     here: float
     least: float
@@ -156,6 +158,7 @@ class Likelihood:
     inverse: FloatArray
     columns: FloatArray
     left: FloatArray
+    at_hand: bool = True
 
     def hold(self, answer: Answer, k: int) -> tuple[slice, FloatArray, FloatArray]:
         """Disc k's own rows of the inverse, the Cholesky factor L of their block, and w = L^-1 q, q
@@ -235,6 +238,7 @@ class Hypothesis:
         self.rise, self.place_mm2 = np.zeros(count), np.zeros((count, 3))
         self.best_mm, self.pair = np.zeros((count, 2)), np.zeros(count)
         self.axis, self.line = np.zeros((count, 2)), np.zeros((count, 2))
+        self.here = 0.0
 
     @property
     def evidence(self) -> float:
@@ -268,20 +272,30 @@ class Hypothesis:
         step = inverse @ gradient
         return Likelihood(here, here - float(gradient @ step), step, inverse, columns, left)
 
+    def misfit_of(self, answer: Answer) -> float:
+        """F of ``answer`` alone, without slopes."""
+        columns = np.vstack([self.columns(answer, k) for k in range(len(answer.discs))])
+        self.budget.made += TRIAL_COLUMNS * len(answer.discs)
+        left = self.data - answer.parts().ravel() @ columns
+        return float(left @ left) + answer.prior()
+
+    def about(self, now: Likelihood | None) -> Likelihood:
+        """F about the answer: ``now``, if it is at hand."""
+        return now if now is not None and now.at_hand else self.linearise(self.answer)
+
     def moved(self, answer: Answer, step: FloatArray, fraction: float) -> Answer:
-        """``answer`` a ``fraction`` of ``step`` (n,) further."""
+        """``answer`` a ``fraction`` of ``step`` (n,) further, or as far as the linearisation
+        holds."""
         o, pixel, discs = self.fit.options, self.fit.model.grid.pixel_mm, list(answer.discs)
         steps = step.reshape(len(discs), answer.parameters)
+        change = np.maximum(steps[:, 0] / LEAST_CHANGE, steps[:, 0] / MOST_CHANGE)
+        radius = np.abs(answer.radius_mm * steps[:, 3]) / (MAX_RADIUS_MOVE * pixel)
+        over = max(1.0, change.max(), np.abs(steps[:, 1:3]).max() / MAX_MOVE, radius.max())
+        fraction = fraction / float(over)
         for k, (disc, s) in enumerate(zip(discs, steps, strict=True)):
-            grown = np.clip(
-                answer.radius_mm[k] * s[3], -MAX_RADIUS_MOVE * pixel, MAX_RADIUS_MOVE * pixel
-            )
-            x, y = fraction * pixel * np.clip(s[1:3], -MAX_MOVE, MAX_MOVE)
-            disc = replace(
-                disc,
-                change=disc.change
-                * (1 + fraction * float(np.clip(s[0], LEAST_CHANGE, MOST_CHANGE))),
-            )
+            grown = float(answer.radius_mm[k] * s[3])
+            x, y = fraction * pixel * s[1:3]
+            disc = replace(disc, change=disc.change * (1 + fraction * float(s[0])))
             there = replace(
                 disc,
                 x_mm=disc.x_mm + float(x),
@@ -296,33 +310,42 @@ class Hypothesis:
             )
             discs[k] = there if self.fit.on_skin(there) else disc
         shape = answer.shape.copy()
-        shape[:, : answer.parameters - PLACE] += fraction * np.clip(steps[:, PLACE:], -1, 1)
+        shape[:, : answer.parameters - PLACE] += fraction * steps[:, PLACE:]
         return replace(answer, discs=discs, shape=shape)
 
     def refit(
-        self, answer: Answer, now: Likelihood | None = None, enough: float = 0.0
+        self,
+        answer: Answer,
+        now: Likelihood | None = None,
+        enough: float = 0.0,
+        hopeless: float = np.inf,
     ) -> tuple[Answer, Likelihood | None]:
-        """Gauss and Newton's steps, a few at most, until F is ``enough`` or hardly falls; sets its
-        misfit. ``now``: F about ``answer``, if it is at hand; so is what is returned beside it.
-        Where not even that may be made, the misfit is beyond all others."""
+        """Gauss and Newton's steps, a few at most, until F is ``enough`` or hardly falls, or a
+        linearisation has its least above ``hopeless``; sets its misfit. ``now``: F about
+        ``answer``, if it is at hand; beside it, the last that was made. Where not even one may be,
+        the misfit is beyond all others."""
         if not answer.discs:
             return replace(answer, misfit=float(self.data @ self.data)), None
-        if now is None and not self.budget.allows(answer.columns):
-            return replace(answer, misfit=np.inf), None
-        last = now = now or self.linearise(answer)
-        fraction = 1.0
+        if now is None or not now.at_hand:
+            if not self.budget.allows(answer.columns):
+                return replace(answer, misfit=np.inf), None
+            now = self.linearise(answer)
+        fraction, trials = 1.0, TRIAL_COLUMNS * len(answer.discs)
         for _ in range(REFIT_STEPS):
-            if now.here <= enough or now.here - now.least < SETTLED_MISFIT:
+            again = 0 if now.at_hand else answer.columns
+            if now.here <= enough or not self.budget.allows(again + trials + answer.columns):
                 break
-            if not self.budget.allows(2 * answer.columns):
+            if not now.at_hand:
+                now = self.linearise(answer)
+            if now.here - now.least < SETTLED_MISFIT or now.least > hopeless:
                 break
             trial = self.moved(answer, now.step, fraction)
-            last = self.linearise(trial)
-            if last.here < now.here:
-                answer, now, fraction = trial, last, 1.0
+            misfit = self.misfit_of(trial)
+            if misfit < now.here:
+                answer, now, fraction = trial, replace(now, here=misfit, at_hand=False), 1.0
             else:
                 fraction *= SHORTER
-        return replace(answer, misfit=now.here), now if last is now else None
+        return replace(answer, misfit=now.here), now
 
     # ---- simpler answers ----
 
@@ -370,7 +393,7 @@ class Hypothesis:
 
     def look(self, now: Likelihood) -> int:
         """Set what is known of each disc by F about them; returns the weakest."""
-        answer = self.answer
+        answer, self.here = self.answer, now.here
         if not self.fitted:
             self.answer = answer = replace(answer, misfit=now.least)
         count, p = len(answer.discs), answer.parameters
@@ -412,19 +435,27 @@ class Hypothesis:
         return shaped, about if shaped.parameters == rest.parameters else None
 
     def take_simpler(self, now: Likelihood, weakest: int) -> tuple[bool, Likelihood | None]:
-        """Take the best of the answers with one disc less: without the weakest, or with a near pair
-        as one. What is at hand of the best is told, if it was tried last."""
-        enough = self.answer.misfit + self.needed()
-        best, about = self.refit(*self.one_less(self.answer, now, weakest), enough)
+        """Take the best of the answers with one disc less: without the weakest, unless that is
+        clear, or with a near pair as one. Where the linearisation alone has judged the discs, they
+        are fitted only if that may decide. What is at hand of the best is told, if it was tried
+        last."""
+        needed = self.needed()
+        enough = self.answer.misfit + needed
+        best, about = replace(self.answer, misfit=np.inf), None
+        if not self.rise[weakest] > CLEAR * needed:
+            best, about = self.refit(*self.one_less(self.answer, now, weakest), enough)
         for i, j in self.near_pairs():
             if best.misfit < enough or not self.budget.allows(2 * best.columns):
                 break
-            one, of_one = self.refit(self.as_one(self.answer, i, j), None, enough)
+            one, of_one = self.refit(self.as_one(self.answer, i, j), None, enough, enough)
             better = one.misfit < best.misfit
             best, about = (one, of_one) if better else (best, None)
+        if not self.fitted and enough <= best.misfit < now.here + needed:
+            self.answer, about = self.refit(self.answer)[0], None
+            self.fitted = True
         if not best.misfit - self.answer.misfit < self.needed():
-            return False, about
-        self.answer, self.changed = best, True
+            return False, None
+        self.answer, self.changed, self.fitted = best, True, True
         return True, about
 
     def fits(self) -> bool:
@@ -467,27 +498,37 @@ class Hypothesis:
         rise = max(SPLIT_RISE - SPLIT_RISE_OF_ODDS * self.pair[k], SPLIT_MIN_RISE)
         return float(rise * TOUCH_EVIDENCE * self.excess(misfit, count))
 
+    def may_fall(self, k: int, misfit: float) -> bool:
+        """Whether F may fall enough where two in the place of disc k leave ``misfit``: before the
+        one is fitted, which only lowers its own."""
+        return self.here - misfit > self.needed_fall(k, misfit, len(self.answer.discs) + 1)
+
     def take_split(self) -> bool:
         """Take the likeliest pair as two where F falls enough. Twice the usual steps: one disc and
-        two are compared at their best. Two that are far from it after the first are given up."""
+        two are compared at their best. Two that are far from it after the first are given up, and
+        so are those that fall too little from one that is not fitted yet."""
         count = len(self.answer.discs)
         k = int(np.argmax(self.pair[:count])) if count else 0
         if not (0 < count < self.fit.options.max_touches and self.pair[k] > SPLIT_ODDS):
             return False
         one, two = self.answer, self.as_two(k)
-        if two is None:
+        if two is None or not self.may_fall(k, 0.0):
             return False
         two, now = self.refit(two)
-        if not (two.misfit if now is None else now.least) < SPLIT_HOPE * one.misfit:
+        if now is None or not now.least < SPLIT_HOPE * one.misfit:
+            return False
+        if not self.may_fall(k, now.least):
             return False
         two, now = self.refit(two, now)
+        if not self.may_fall(k, two.misfit):
+            return False
         if not self.fitted:
             one = self.refit(*self.refit(one))[0]
         fall = one.misfit - two.misfit
         if one.misfit == np.inf or not fall > self.needed_fall(k, two.misfit, count + 1):
             return False
         self.answer, self.changed, self.fitted = two, True, True
-        self.look(now or self.linearise(two))
+        self.look(self.about(now))
         return True
 
     def eliminate(self, now: Likelihood | None = None, *, to_the_end: bool) -> bool:
@@ -497,7 +538,7 @@ class Hypothesis:
         if now is None and not self.budget.allows(self.answer.columns):
             return True
         while len(self.answer.discs) > self.errors.kept:
-            now = now or self.linearise(self.answer)
+            now = self.about(now)
             weakest = self.look(now)
             if self.rise[weakest] > CLEAR * self.needed() and not self.near_pairs():
                 return True
@@ -513,12 +554,12 @@ class Hypothesis:
                 continue
             if not self.budget.allows(2 * self.answer.columns):
                 return True
-            if not self.fitted:
+            unclear = not self.rise[weakest] > CLEAR * self.needed()
+            if not self.fitted and (
+                unclear or self.excess(now.here, len(self.answer.discs)) > FITS
+            ):
                 self.answer, now = self.refit(self.answer, now)
-            if now is None:
-                now = self.linearise(self.answer)
-            if not self.fitted:
-                self.fitted = True
+                self.fitted, now = True, self.about(now)
                 weakest = self.look(now)
             if not to_the_end and not self.fits():
                 return False
@@ -528,7 +569,7 @@ class Hypothesis:
         self.fitted = True
         self.answer, now = self.refit(self.answer, now)
         if self.answer.discs:  # on an instrument that is far from the model one stays
-            self.look(now or self.linearise(self.answer))
+            self.look(self.about(now))
         return True
 
     def is_clear(self) -> Likelihood | None:
@@ -566,6 +607,7 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
                 whole = best.eliminate(to_the_end=True)
             if not whole or drifted.evidence < best.evidence:
                 best = drifted
+    budget.most = min(budget.most or SPLIT_COLUMNS, SPLIT_COLUMNS)
     while best.take_split():
         pass
     count = len(best.answer.discs)
