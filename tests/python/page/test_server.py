@@ -270,7 +270,7 @@ def test_the_command_says_where_and_ends_by_the_keyboard(scene: Path, tmp_path: 
                 pass
             process.send_signal(signal.SIGINT)
             _, errors = process.communicate(timeout=20)
-    assert process.returncode == 130
+    assert process.returncode == 130, errors
     assert "Traceback" not in errors
     assert errors.splitlines()[-1] == "eitskin: stopped"
     assert len((tmp_path / "t.csv").read_text().splitlines()) > 1

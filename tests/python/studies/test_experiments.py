@@ -100,7 +100,7 @@ def test_the_command_lists_runs_and_goes_on(
         (["levers", "--share", "0"], "--share 0 is out of range"),
         (["levers", "--seed", "-1"], "--seed -1 must be 0 or above"),
         (["levers", "-o", "FILE"], "this is a file; name a folder"),
-        (["levers", "--page", "no/such/page.md"], "does not exist"),
+        (["levers", "--page", "no/such/page.md"], "no such page"),
         (["tank", "--data", "no/such"], "no such folder"),
     ],
 )
