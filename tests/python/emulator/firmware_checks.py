@@ -26,7 +26,7 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.skin.protocol import Protocol
 from emulated import clean, power_up
 
-BOOT_S, ANSWER_S, SCAN_S = 0.3, 0.15, 0.075  # the first boot also writes the option bytes
+BOOT_S, ANSWER_S, SCAN_S = 0.4, 0.15, 0.075  # the board solves the model's golden frames first
 SETTLING_S = 0.045  # two frames that the board drops
 MAX_INTERRUPTS = 10_000  # of a session; a sound image takes about 3,000
 EXCITATION_HZ, SETTLE_US = 50_000.0, 16
