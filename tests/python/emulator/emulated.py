@@ -8,6 +8,7 @@ from eitskin.core.results import Reconstruction
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, board_options
+from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.recordings.host_check import HostCheck, HostTwin
 from eitskin.device.transport import Transport
@@ -94,12 +95,14 @@ def twin_check(
     for item in taken:
         if isinstance(item, RawFrame) and item.quiet:
             twin.take(LiveFrame(item.frame, 0, item.time_us, raw=item))
-    seen = [
-        item
-        for item in put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING)
-        if isinstance(item, LiveFrame)
-    ]
-    return twin.check, seen, [twin.take(frame) for frame in seen]
+    seen, results = [], []
+    for item in put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING):
+        if isinstance(item, LinkEvent):
+            twin.lost()  # the line does not carry all at full rate
+        elif isinstance(item, LiveFrame):
+            seen.append(item)
+            results.append(twin.take(item))
+    return twin.check, seen, results
 
 
 def clean(board: EmulatedBoard) -> None:

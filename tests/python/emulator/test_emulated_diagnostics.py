@@ -41,7 +41,7 @@ def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
     without it; gone after eight frames with it; every bit, and all that was found, as the host
     finds it."""
     model, blob = load_prebuilt()
-    wobble = {"detached": {"electrodes": [5], "from_s": 0.05, "until_s": 0.12}}
+    wobble = {"detached": {"electrodes": [5], "from_s": 0.01, "until_s": 0.07}}
     device = device_before(image, skin_of(scene(wobble), model.protocol))
     told: list[Fault] = []
     device.record(lambda packet: told.extend(_faults(packet)))
