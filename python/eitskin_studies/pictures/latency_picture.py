@@ -1,4 +1,4 @@
-"""When presses are told of: how many of them by what time after the contact."""
+"""When presses are reported: how many of them by what time after the contact."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def draw_latency(path: Path, result: Latency) -> None:
     rises = sorted({one.rise_ms for one in result.judged})
     methods = list(dict.fromkeys(one.method for one in result.judged))
     with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(7.5, 4.2), layout="constrained")
+        figure = matplotlib.figure.Figure(figsize=(9.5, 4.2), layout="constrained")
         axes = figure.subplots()
         for one in result.judged:
             share = 100 * np.arange(len(one.scan_ms) + 1) / one.presses
@@ -39,11 +39,11 @@ def draw_latency(path: Path, result: Latency) -> None:
                 linestyle=LINES[methods.index(one.method) % len(LINES)],
                 label=label or f"{one.rise_ms} ms, {one.method}",
             )
-        axes.set_xlabel("from the contact to the end of the scan that tells of it, ms")
-        axes.set_ylabel("presses told of, %")
+        axes.set_xlabel("from the contact to the end of the scan or drive that reports it, ms")
+        axes.set_ylabel("presses reported, %")
         axes.set_xlim(left=0)
         axes.set_ylim(0, 102)
         axes.grid(linewidth=0.4, alpha=0.5)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(frameon=False, labelcolor=INK, fontsize=8)
+        figure.legend(frameon=False, labelcolor=INK, fontsize=8, loc="outside right upper")
         save_picture(figure, path)
