@@ -253,7 +253,12 @@ def test_every_kind_is_asked_for(server: PageServer) -> None:
 
 
 def test_the_command_says_where_and_ends_by_the_keyboard(scene: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "eitskin", "view", "--device", f"sim:{scene}?loop=1"]
+    # a shell's background job has the signal off, and what it starts too
+    listening = (
+        "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+        " runpy.run_module('eitskin', run_name='__main__')"
+    )
+    command = [sys.executable, "-c", listening, "view", "--device", f"sim:{scene}?loop=1"]
     command += ["--port", "0", "--token", "a-word-for-tests", "--to", f"csv:{tmp_path}/t.csv"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
