@@ -73,13 +73,13 @@ static void place_by_slopes(eits_context *ctx, const eits_scratch *scratch, eits
 
 void eits_place_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
+    if (f->tested || !(ctx->model->place_factor > 0))
+        return;
     const uint32_t rank = ctx->model->rank;
     const eits_real data = (eits_real)rank - (eits_real)(EITS_PLACE_PARAMETERS * f->count),
                     unit = (eits_real)ctx->model->place_factor * eits_fit_left(ctx, f) /
                            (data > EITS_MIN_FREEDOM ? data : EITS_MIN_FREEDOM);
     uint32_t known = 0;
-    if (f->tested || !(ctx->model->place_factor > 0))
-        return;
     for (uint32_t k = 0; k < f->count && known < rank; ++k) {
         eits_copy(scratch->square + EITS_STRIDE(rank) * known, eits_atom(ctx, k),
                   EITS_STRIDE(rank));

@@ -11,14 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.emulator.board_parts import BoardParts
 from eitskin.emulator.clocktime import TICKS_PER_S
 from eitskin.emulator.cpu import CpuStop
 from eitskin.emulator.memory import BANK_BYTES, BANKS, FLASH
 from eitskin.emulator.peripherals import scb
 from eitskin.emulator.peripherals.nvic import BUS_FAULT, MEMORY_FAULT, SVCALL, USAGE_FAULT
-from eitskin.emulator.peripherals.rcc import HSE_HZ
 from eitskin.emulator.report import BoardReport
 from eitskin.errors import DeviceError
 
@@ -30,17 +28,10 @@ BUTTON_PIN = 13
 class EmulatedBoard(BoardParts):
     """:class:`BoardParts` that run; power is on when it is made."""
 
-    def __init__(
-        self,
-        image: bytes,
-        skin: AnalogSkin,
-        banks: tuple[bytes, ...] = (),
-        hse_hz: int | None = HSE_HZ,
-    ) -> None:
-        super().__init__(image, skin, banks, hse_hz)
-        self.strict = True  # what the monitor finds is an error
-        self._asleep = self.locked_up = False
-        self._masked = 0  # slices since an interrupt waits behind a mask
+    strict = True  # what the monitor finds is an error
+    locked_up = False
+    _asleep = False
+    _masked = 0  # slices since an interrupt waits behind a mask
 
     @property
     def now_s(self) -> float:

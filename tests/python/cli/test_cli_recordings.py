@@ -20,7 +20,7 @@ from eitskin.cli.main import main
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import PacketType
 from eitskin.model.prebuilt import load_prebuilt
-from fresh_python import MAIN, run_python, without
+from fresh_python import INTERRUPTIBLE, MAIN, run_python, without
 
 Done = Callable[..., str]
 Change = Callable[[Packet], bytes | None]
@@ -289,12 +289,10 @@ def test_ctrl_c_stops_the_board_and_sums_up(scene: Path) -> None:
     board = board_of(scene)
     with behind_a_port(board) as port:
         source = str(Path(eitskin.__file__).parents[1])
-        # a shell's background job has the signal off, and what it starts too
-        listening = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
         command = [
             sys.executable,
             "-c",
-            listening + MAIN,
+            INTERRUPTIBLE,
             "stream",
             "--device",
             f"serial:{port}",

@@ -24,6 +24,7 @@ from eitskin.cli.main import main
 from eitskin.page.facts import HEAD, MAGIC
 from eitskin.page.hub import IN_FLIGHT, Hub, Outgoing, PageClient
 from eitskin.page.server import NO_TOKEN, PageServer
+from fresh_python import INTERRUPTIBLE
 
 
 @pytest.fixture(scope="module")
@@ -253,12 +254,7 @@ def test_every_kind_is_asked_for(server: PageServer) -> None:
 
 
 def test_the_command_says_where_and_ends_by_the_keyboard(scene: Path, tmp_path: Path) -> None:
-    # a shell's background job has the signal off, and what it starts too
-    listening = (
-        "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
-        " runpy.run_module('eitskin', run_name='__main__')"
-    )
-    command = [sys.executable, "-c", listening, "view", "--device", f"sim:{scene}?loop=1"]
+    command = [sys.executable, "-c", INTERRUPTIBLE, "view", "--device", f"sim:{scene}?loop=1"]
     command += ["--port", "0", "--token", "a-word-for-tests", "--to", f"csv:{tmp_path}/t.csv"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
