@@ -1,5 +1,5 @@
-/* A few words to test with: each failed CHECK says where (the first MAX_SHOWN of them); main
- * returns checks_report(). */
+/* A few words to test with: a TEST runs by RUN_TESTS or run_tests(), in the order of the file; each
+ * failed CHECK says where (the first MAX_SHOWN of them). */
 #ifndef EITSKIN_TEST_CHECK_H
 #define EITSKIN_TEST_CHECK_H
 
@@ -65,5 +65,33 @@ static inline int checks_report(const char *name)
            checks_failed);
     return checks_failed == 0 && checks_made > 0 ? 0 : 1;
 }
+
+enum { MAX_TESTS = 64 };
+static void (*checks_tests[MAX_TESTS])(void);
+static int checks_tests_known = 0;
+
+/* A test: the body follows. It puts itself on the list before main. */
+#define TEST(name)                                              \
+    static void name(void);                                     \
+    __attribute__((constructor)) static void name##_known(void) \
+    {                                                           \
+        checks_tests[checks_tests_known++] = name;              \
+    }                                                           \
+    static void name(void)
+
+static inline void run_tests(void)
+{
+    for (int k = 0; k < checks_tests_known; ++k)
+        checks_tests[k]();
+}
+
+/* A main that runs the tests, then what is given as a last step. */
+#define RUN_TESTS(name, ...)        \
+    int main(void)                  \
+    {                               \
+        run_tests();                \
+        __VA_ARGS__;                \
+        return checks_report(name); \
+    }
 
 #endif

@@ -46,7 +46,7 @@ static void reconstruct(eits_context *ctx, uint64_t state, uint32_t unknown, eit
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, image, NULL), EITS_OK);
 }
 
-static void accessors_give_what_calls_give(void)
+TEST(accessors_give_what_calls_give)
 {
     small_model made = small_model_make(WHITENED);
     small_context c;
@@ -86,7 +86,7 @@ static void accessors_give_what_calls_give(void)
 }
 
 /* Frames between, of other rows, change neither image nor touches of those that are solved. */
-static void examined_frames_leave_no_trace(void)
+TEST(examined_frames_leave_no_trace)
 {
     small_model made = small_model_make(WHITENED);
     small_context c[2];
@@ -124,7 +124,7 @@ static void examined_frames_leave_no_trace(void)
 
 /* A frame that is refused after it was folded leaves a basis that fits no frame: the next one, of
  * the same rows, must not take it. */
-static void a_refused_frame_leaves_no_basis(void)
+TEST(a_refused_frame_leaves_no_basis)
 {
     small_model made = small_model_make(WHITENED);
     small_context c[2];
@@ -151,7 +151,7 @@ static void a_refused_frame_leaves_no_basis(void)
     small_model_free(&made);
 }
 
-static void saved_and_restored(void)
+TEST(saved_and_restored)
 {
     small_model made = small_model_make(WHITENED);
     small_context c;
@@ -209,11 +209,4 @@ static void saved_and_restored(void)
     small_model_free(&made);
 }
 
-int main(void)
-{
-    accessors_give_what_calls_give();
-    examined_frames_leave_no_trace();
-    a_refused_frame_leaves_no_basis();
-    saved_and_restored();
-    return checks_report("access");
-}
+RUN_TESTS("access")

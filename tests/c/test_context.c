@@ -15,7 +15,7 @@
 /* The size is a constant expression: this compiles only if it is. */
 static uint8_t constant[EITS_WORKSPACE_SIZE(40, 21, 12, 36, 36, 1)];
 
-static void sizes_agree(void)
+TEST(sizes_agree)
 {
     static const uint32_t ranks[] = {1, 3, 8, 12, 20}, sides[] = {3, 4, 6, 13};
     CHECK_EQUAL(eits_workspace_size(NULL, 0), 0);
@@ -62,7 +62,7 @@ static void sizes_agree(void)
     CHECK(sizeof constant > 0 && sizeof constant % 16 == 0);
 }
 
-static void refused_workspaces(void)
+TEST(refused_workspaces)
 {
     small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
     eits_model m;
@@ -118,7 +118,7 @@ static void exercise(eits_context *ctx, uint64_t *state)
     }
 }
 
-static void nothing_is_written_beside_the_workspace(void)
+TEST(nothing_is_written_beside_the_workspace)
 {
     enum { GUARD = 64 };
     for (int prepared = 0; prepared < 2; ++prepared) {
@@ -149,7 +149,7 @@ static void nothing_is_written_beside_the_workspace(void)
 
 /* Two contexts on one model, used in turn, give what each gives alone; whatever the workspace held
  * before. */
-static void contexts_are_independent(void)
+TEST(contexts_are_independent)
 {
     small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
     eits_real alone[2][36], image[36], frames[2][SMALL_ROWS], references[2][SMALL_ROWS];
@@ -182,7 +182,7 @@ static void contexts_are_independent(void)
     small_model_free(&made);
 }
 
-static void default_options(void)
+TEST(default_options)
 {
     small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
     /* more touches than a context holds */
@@ -233,7 +233,7 @@ static void default_options(void)
     REAL(field, NAN), REAL(field, INFINITY), REAL(field, -INFINITY), REAL(field, -1e-3), \
         REAL(field, 1.1e30)
 
-static void options_out_of_range(void)
+TEST(options_out_of_range)
 {
     static const struct {
         size_t offset;
@@ -311,7 +311,7 @@ static void options_out_of_range(void)
 
 /* A golden image that is what this build gives: no difference. One pixel changed: just that
  * difference is reported. */
-static void self_test(void)
+TEST(self_test)
 {
     small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
     small_context c;
@@ -367,7 +367,7 @@ static void self_test(void)
 
 /* Checksums of the set: as they are, nothing is said; one of another core, and the image is right
  * all the same: refused; another revision's are not looked at. No float64 core has any. */
-static void self_test_sums(void)
+TEST(self_test_sums)
 {
     small_model plain =
         small_model_make((small_spec){.rank = 12, .side = 6, .shape = SMALL_WHITENED, .fields = 1});
@@ -429,15 +429,4 @@ static void self_test_sums(void)
     small_model_free(&plain);
 }
 
-int main(void)
-{
-    sizes_agree();
-    refused_workspaces();
-    nothing_is_written_beside_the_workspace();
-    contexts_are_independent();
-    default_options();
-    options_out_of_range();
-    self_test();
-    self_test_sums();
-    return checks_report("context");
-}
+RUN_TESTS("context")

@@ -68,7 +68,7 @@ static void solve_lower(double l[RANK][RANK], double *v)
 
 /* With and without drift, with and without a direction that is ignored, with the model's
  * regularisation and a raised one. */
-static void the_covariance_is_noise_and_model_errors(void)
+TEST(the_covariance_is_noise_and_model_errors)
 {
     for (int way = 0; way < 8; ++way) {
         const int drift = way & 1, project = way >> 1 & 1, noisy = way >> 2;
@@ -111,7 +111,7 @@ static void the_covariance_is_noise_and_model_errors(void)
 
 /* A frame that is drift of the gain alone has no energy that a touch could have: rounding of either
  * sign is none. */
-static void a_frame_of_drift_alone_has_errors_of_noise(void)
+TEST(a_frame_of_drift_alone_has_errors_of_noise)
 {
     eits_context *ctx = set_up(&b, 1);
     eits_real log_determinant, noise_alone;
@@ -155,7 +155,7 @@ static void shaped_answer(const bench *b, const eits_disc *disc, int parameter, 
 /* Rows left out: the errors go through F, and white noise of each row in use through the reduction
  * of the rest, written out row by row. What the factor adds lest a lost direction be singular is a
  * hundredth of the regularisation. */
-static void the_covariance_of_the_rows_left_is_theirs(void)
+TEST(the_covariance_of_the_rows_left_is_theirs)
 {
     eits_context *ctx = set_up(&b, 0);
     CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[4].first, 1), EITS_OK);
@@ -238,7 +238,7 @@ static void dipole_answer(const bench *b, const eits_disc *disc, int part, doubl
 }
 
 /* All in Sigma's metric. */
-static void shapes_move_the_data_as_ellipses_do(void)
+TEST(shapes_move_the_data_as_ellipses_do)
 {
     eits_context *ctx = set_up(&b, 0);
     eits_real log_determinant;
@@ -285,7 +285,7 @@ static void shapes_move_the_data_as_ellipses_do(void)
 
 /* Eight parameters a disc where there is room, then four, then none; dipoles where there are fields
  * and room to keep a disc's. */
-static void parameters_fit_the_data(void)
+TEST(parameters_fit_the_data)
 {
     eits_context *ctx = set_up(&b, 0);
     const uint32_t expected[] = {8, 8, 8, 4, 4, 4, 0};
@@ -300,13 +300,4 @@ static void parameters_fit_the_data(void)
     CHECK_EQUAL(eits_shape_parameters(ctx, 1), 6);
 }
 
-int main(void)
-{
-    the_covariance_is_noise_and_model_errors();
-    the_covariance_of_the_rows_left_is_theirs();
-    a_frame_of_drift_alone_has_errors_of_noise();
-    shapes_move_the_data_as_ellipses_do();
-    parameters_fit_the_data();
-    dense_bench_close(&b.b);
-    return checks_report("covariance");
-}
+RUN_TESTS("covariance", dense_bench_close(&b.b))

@@ -53,7 +53,7 @@ static void check_result(const dense_bench *b, double max)
 }
 
 /* Another solver's coefficients to start from, and less and less to spend. */
-static void every_limit_beside_columns_that_depend(void)
+TEST(every_limit_beside_columns_that_depend)
 {
     static const double offs[] = {0, 1e-7, 1e-4, 3e-3};
     for (int way = 0; way < 16; ++way) {
@@ -89,7 +89,7 @@ static void every_limit_beside_columns_that_depend(void)
 
 /* A start whose great coefficients cancel, on columns that are alike: without those that depend it
  * is far worse than zero. */
-static void starts_that_cancel(void)
+TEST(starts_that_cancel)
 {
     eits_context *ctx = set_up(&b, 0);
     const uint32_t one = 9 + 1, other = 9 + 2; /* of a group of three */
@@ -156,7 +156,7 @@ static void dense_sweeps(const dense *d, const double *square, double *r, double
 }
 
 /* A few sweeps, beside no direction that is ignored, and one. */
-static void sweeps_as_written_apart(void)
+TEST(sweeps_as_written_apart)
 {
     enum { RANK_HERE = 12, SWEEPS = 3 };
     for (uint32_t ignored = 0; ignored < 2; ++ignored) {
@@ -192,7 +192,7 @@ static void sweeps_as_written_apart(void)
 }
 
 /* The optimum to rounding, in few rounds. */
-static void the_active_set_ends_soon(void)
+TEST(the_active_set_ends_soon)
 {
     enum { RANK_HERE = 12, ROUNDS = 25 };
     static const double lambdas[] = {0.003, 0.03, 0.3};
@@ -220,7 +220,7 @@ static void the_active_set_ends_soon(void)
 
 /* Columns of which a row left out hides all but rounding are not taken in, and no reason to go on
  * for ever. */
-static void hidden_columns(void)
+TEST(hidden_columns)
 {
     dense_bench b = {0};
     b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
@@ -255,13 +255,4 @@ static void hidden_columns(void)
     small_model_free(&b.made);
 }
 
-int main(void)
-{
-    the_active_set_ends_soon();
-    sweeps_as_written_apart();
-    starts_that_cancel();
-    every_limit_beside_columns_that_depend();
-    hidden_columns();
-    dense_bench_close(&b);
-    return checks_report("exact solvers at their edges");
-}
+RUN_TESTS("exact solvers at their edges", dense_bench_close(&b))

@@ -56,7 +56,7 @@ static void said_as(eits_context *ctx, const eits_touch *touches, uint32_t count
     CHECK_EQUAL(crowded(ctx, touches, count), expected);
 }
 
-static void crowds_on_both_sides_of_the_limit(void)
+TEST(crowds_on_both_sides_of_the_limit)
 {
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     CHANGE_OPTIONS(ctx, o.max_touches = 4, o.touch_seed_radius_mm = 9);
@@ -108,7 +108,7 @@ static void crowds_on_both_sides_of_the_limit(void)
 
 /* ---- a reference that is another skin's ---- */
 
-static void a_reference_unlike_the_model_is_named_where_that_is_asked_for(void)
+TEST(a_reference_unlike_the_model_is_named_where_that_is_asked_for)
 {
     static dense_bench bench;
     eits_context *ctx =
@@ -125,7 +125,7 @@ static void a_reference_unlike_the_model_is_named_where_that_is_asked_for(void)
 
 /* ---- a stale reference ---- */
 
-static void stale_references_on_both_sides_of_the_limit(void)
+TEST(stale_references_on_both_sides_of_the_limit)
 {
     static const struct {
         eits_sign sign;
@@ -176,7 +176,7 @@ static int model_mismatch(eits_context *ctx, double off)
     return eits_check_model_mismatch(ctx, &ctx->scratch, &macs);
 }
 
-static void mismatches_on_both_sides_of_the_limits(void)
+TEST(mismatches_on_both_sides_of_the_limits)
 {
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     CHECK(ctx->range.known);
@@ -206,7 +206,7 @@ static void mismatches_on_both_sides_of_the_limits(void)
 
 /* Two norms of the folds' data and one of the reduced: where the gain is not ignored nothing is
  * learned of its drift. */
-static void a_gain_that_counts_costs_nothing(void)
+TEST(a_gain_that_counts_costs_nothing)
 {
     uint64_t macs = 0;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
@@ -219,7 +219,7 @@ static void a_gain_that_counts_costs_nothing(void)
 
 /* Two measurements of a fold have half the variance of one; a copy is none. Ratios have that of the
  * voltage over the reference. */
-static void noise_of_the_data(void)
+TEST(noise_of_the_data)
 {
     for (int kind = 0; kind < 2; ++kind) {
         eits_context *ctx = set_up(&b, kind ? EITS_DATA_NORMALISED : EITS_DATA_DIFFERENCE);
@@ -257,7 +257,7 @@ static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_
 
 /* All rows change by 0.04, each pair alike but for 0.1 %: then a reading is odd beyond 12 robust
  * deviations and 5 % of its own. */
-static void odd_readings_on_both_sides_of_the_limit(void)
+TEST(odd_readings_on_both_sides_of_the_limit)
 {
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     eits_real older[SMALL_ROWS], newer[SMALL_ROWS], spoilt[SMALL_ROWS];
@@ -292,7 +292,7 @@ static void odd_readings_on_both_sides_of_the_limit(void)
 }
 
 /* Rows that are not in use are neither volts nor a change. */
-static void rows_out_of_use(void)
+TEST(rows_out_of_use)
 {
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     const uint32_t rows[2] = {ctx->model->fold[4].first, ctx->model->fold[4].second};
@@ -314,7 +314,7 @@ static void rows_out_of_use(void)
 
 /* The noise of voltages of any size, whose squares are out of range; and what lambda makes of it.
  */
-static void noise_of_any_size(void)
+TEST(noise_of_any_size)
 {
     static const double sizes[] = {1, BOTH_WIDTHS(1e-24, 1e-170), BOTH_WIDTHS(1e24, 1e170)};
     enum { FRAMES = 8 };
@@ -357,17 +357,4 @@ static void noise_of_any_size(void)
     CHECK(eits_get_info(ctx)->lambda == R(0.125) && eits_get_info(ctx)->lambda_noise == R(0.25));
 }
 
-int main(void)
-{
-    crowds_on_both_sides_of_the_limit();
-    a_reference_unlike_the_model_is_named_where_that_is_asked_for();
-    stale_references_on_both_sides_of_the_limit();
-    mismatches_on_both_sides_of_the_limits();
-    a_gain_that_counts_costs_nothing();
-    noise_of_the_data();
-    odd_readings_on_both_sides_of_the_limit();
-    rows_out_of_use();
-    noise_of_any_size();
-    dense_bench_close(&b);
-    return checks_report("diagnostic limits");
-}
+RUN_TESTS("diagnostic limits", dense_bench_close(&b))

@@ -56,7 +56,7 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
 
 /* What a touch's strength is made of: the covers' sum at its very place; averaged over places, pi
  * (radius^2 + pixel^2 / 12). */
-static void the_area_is_that_of_the_covers(void)
+TEST(the_area_is_that_of_the_covers)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
     const double pixel = (double)b.c.model.pixel_mm, span = SIDE * pixel;
@@ -99,7 +99,7 @@ static eits_disc random_disc(uint64_t *state)
     return disc;
 }
 
-static void responses_are_sums_over_the_covers(void)
+TEST(responses_are_sums_over_the_covers)
 {
     uint64_t state = 81;
     for (int storage = 0; storage < 4; ++storage) {
@@ -124,7 +124,7 @@ static void responses_are_sums_over_the_covers(void)
     }
 }
 
-static void far_away_there_is_nothing(void)
+TEST(far_away_there_is_nothing)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
     static const double places[] = {200, -200, 1e6, -1e6, 1e30, -1e30};
@@ -164,7 +164,7 @@ static int smooth_around(const bench *b, const eits_disc *disc, double step)
     return 1;
 }
 
-static void derivatives_agree_with_differences(void)
+TEST(derivatives_agree_with_differences)
 {
     uint64_t state = 82;
     const double step = 1e-4;
@@ -215,7 +215,7 @@ static void derivatives_agree_with_differences(void)
 }
 
 /* Places on the skin are those in a kept cell or one beside it. */
-static void on_the_skin(void)
+TEST(on_the_skin)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
     const double pixel = (double)ctx->model->pixel_mm;
@@ -258,13 +258,4 @@ static void on_the_skin(void)
     CHECK(!eits_disc_on_skin(ctx, &none));
 }
 
-int main(void)
-{
-    responses_are_sums_over_the_covers();
-    the_area_is_that_of_the_covers();
-    far_away_there_is_nothing();
-    derivatives_agree_with_differences();
-    on_the_skin();
-    dense_bench_close(&b);
-    return checks_report("disc");
-}
+RUN_TESTS("disc", dense_bench_close(&b))

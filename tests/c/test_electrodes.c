@@ -3,7 +3,7 @@
 
 /* Zero, NaN or saturated: all rows of an electrode tell that it is open, and are left out; one that
  * lives, and it is not. */
-static void open_electrodes_are_named_and_left_out(void)
+TEST(open_electrodes_are_named_and_left_out)
 {
     for (int kind = 0; kind < 3; ++kind) {
         for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
@@ -44,7 +44,7 @@ static void open_electrodes_are_named_and_left_out(void)
 }
 
 /* Nothing on any row is no matter of electrodes. */
-static void all_dead_is_a_dead_front_end(void)
+TEST(all_dead_is_a_dead_front_end)
 {
     eits_context *ctx = set_up(&b, 1);
     memset(b.frame, 0, sizeof b.frame);
@@ -57,7 +57,7 @@ static void all_dead_is_a_dead_front_end(void)
 }
 
 /* Nor is nothing but noise: a dead front end, which blames no electrode. */
-static void noise_alone(void)
+TEST(noise_alone)
 {
     for (int open = 0; open < 2; ++open) {
         eits_context *ctx = set_up(&b, 1);
@@ -76,7 +76,7 @@ static void noise_alone(void)
 
 /* Dead below 2 % of the reference or 5 times the noise; a row whose reference is small tells
  * nothing either way. */
-static void what_a_dead_row_is(void)
+TEST(what_a_dead_row_is)
 {
     for (int way = 0; way < 6; ++way) {
         eits_context *ctx = set_up(&b, 0);
@@ -101,7 +101,7 @@ static void what_a_dead_row_is(void)
 }
 
 /* Refused, and still named. */
-static void refused_by_name(void)
+TEST(refused_by_name)
 {
     eits_context *ctx = set_up(&b, 1);
     CHANGE_OPTIONS(ctx, o.max_masked = 10);
@@ -112,7 +112,7 @@ static void refused_by_name(void)
     CHECK_EQUAL(eits_get_info(ctx)->open_electrodes, 1u << 3);
 }
 
-static void bridged_pairs_are_named_and_left_out(void)
+TEST(bridged_pairs_are_named_and_left_out)
 {
     for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
         eits_context *ctx = set_up(&b, 1);
@@ -133,7 +133,7 @@ static void bridged_pairs_are_named_and_left_out(void)
 }
 
 /* One row across the pair that lives, whichever, and there is no bridge. */
-static void living_pairs_are_not_bridged(void)
+TEST(living_pairs_are_not_bridged)
 {
     for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
         eits_context *ctx = set_up(&b, 1);
@@ -168,7 +168,7 @@ static void living_pairs_are_not_bridged(void)
 
 /* Rows that the user masked are no sign of an open electrode, nor saturated; and a frame's
  * diagnostics end with it. */
-static void masked_and_forgotten(void)
+TEST(masked_and_forgotten)
 {
     eits_context *ctx = set_up(&b, 1);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
@@ -202,7 +202,7 @@ static void masked_and_forgotten(void)
 
 /* A row whose reference is next to nothing has not grown before it is eight times 5 % of the rms.
  */
-static void small_rows(void)
+TEST(small_rows)
 {
     eits_context *ctx = set_up(&b, 0);
     const eits_fold fold = b.c.model.fold[4];
@@ -219,7 +219,7 @@ static void small_rows(void)
 
 /* A sign that turned, and a row that grew eightfold, are no touch's doing; three turned ones are
  * another order of the channels. */
-static void impossible_rows(void)
+TEST(impossible_rows)
 {
     eits_context *ctx = set_up(&b, 1);
     const eits_real good = b.frame[9];
@@ -240,18 +240,4 @@ static void impossible_rows(void)
     CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
 }
 
-int main(void)
-{
-    open_electrodes_are_named_and_left_out();
-    all_dead_is_a_dead_front_end();
-    noise_alone();
-    what_a_dead_row_is();
-    refused_by_name();
-    bridged_pairs_are_named_and_left_out();
-    living_pairs_are_not_bridged();
-    masked_and_forgotten();
-    small_rows();
-    impossible_rows();
-    tear_down(&b);
-    return checks_report("electrodes");
-}
+RUN_TESTS("electrodes", tear_down(&b))

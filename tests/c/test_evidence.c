@@ -86,7 +86,7 @@ static double least_without(const square *q, const eits_answer *answer, const in
 /* Three discs of four parameters and two of eight: the step is where F is least, its matrix's
  * inverse is that, and leaving discs out, one after another, gives what solving again without them
  * gives. */
-static void leaving_out_is_solving_again_without(void)
+TEST(leaving_out_is_solving_again_without)
 {
     static const eits_disc third = {2, 19, 11, R(0.01), 1};
     const eits_disc discs[] = {ONE, OTHER, third};
@@ -158,7 +158,7 @@ static void leaving_out_is_solving_again_without(void)
 /* From a place and a strength that are off: F falls, and the disc ends nearer; from far off no step
  * is longer than a pixel, a radius stays in its range, a strength keeps its sign. Without discs F
  * is that of the data. */
-static void refitting_lowers_the_misfit_by_limited_steps(void)
+TEST(refitting_lowers_the_misfit_by_limited_steps)
 {
     eits_context *ctx = set_up(&b, 1);
     eits_real log_determinant;
@@ -253,7 +253,7 @@ static void check_what_stays(eits_context *ctx, const eits_fit *f)
 
 /* The same two discs: where nothing is wrong with the model both are touches, and stay bit for bit;
  * where it errs in just the way of the weaker one, that goes. */
-static void what_model_errors_could_have_made_goes(void)
+TEST(what_model_errors_could_have_made_goes)
 {
     for (int errs = 0; errs < 2; ++errs) {
         eits_context *ctx = set_up(&b, 1);
@@ -273,7 +273,7 @@ static void what_model_errors_could_have_made_goes(void)
     }
 }
 
-static void halves_of_a_touch_become_one(void)
+TEST(halves_of_a_touch_become_one)
 {
     eits_context *ctx = set_up(&b, 1);
     eits_disc halves[2] = {ONE, ONE};
@@ -292,7 +292,7 @@ static void halves_of_a_touch_become_one(void)
 /* Data that no discs explain and a drift of the sheet does: the discs that were found in it go, the
  * true one stays; where the sheet cannot drift so, the data fit badly, and a touch is worth less.
  */
-static void discs_found_in_a_drift_go(void)
+TEST(discs_found_in_a_drift_go)
 {
     eits_real rise[2];
     for (int drifts = 0; drifts < 2; ++drifts) {
@@ -326,7 +326,7 @@ static void discs_found_in_a_drift_go(void)
 }
 
 /* A frame with rows left out is tested like any other. */
-static void rows_left_out_do_not_stop_the_test(void)
+TEST(rows_left_out_do_not_stop_the_test)
 {
     eits_context *ctx = set_up(&b, 1);
     const eits_disc discs[2] = {ONE, OTHER};
@@ -341,7 +341,7 @@ static void rows_left_out_do_not_stop_the_test(void)
 }
 
 /* No such section, not asked for, numbers out of range: discs stay as they are. */
-static void what_cannot_be_tested_is_left_alone(void)
+TEST(what_cannot_be_tested_is_left_alone)
 {
     for (int way = 0; way < 6; ++way) {
         eits_context *ctx = set_up(&b, 1);
@@ -376,7 +376,7 @@ static void what_cannot_be_tested_is_left_alone(void)
 
 /* Nothing to explain, or nothing that is a number: the test comes to an end, and discs with data of
  * nothing go. */
-static void zeros_and_nan_come_to_an_end(void)
+TEST(zeros_and_nan_come_to_an_end)
 {
     for (int way = 0; way < 3; ++way) {
         eits_context *ctx = set_up(&b, way == 1);
@@ -398,7 +398,7 @@ static void zeros_and_nan_come_to_an_end(void)
 /* Two touches, and up to three discs beside them at random, under errors of several sizes: what
  * stays is some of it, the two among it where the model is not wrong by much; on an instrument that
  * is far from the model one stays whatever its errors could have made. */
-static void ghosts_beside_touches_go(void)
+TEST(ghosts_beside_touches_go)
 {
     uint64_t state = 41;
     for (int round = 0; round < 48; ++round) {
@@ -437,7 +437,7 @@ static void ghosts_beside_touches_go(void)
 /* Beyond a first look no more columns are made than options.test_columns, whatever it is; what is
  * reported then is known as after a whole test, and a count is said to be uncertain where a step
  * was left out, and only there. */
-static void no_more_columns_are_made_than_allowed(void)
+TEST(no_more_columns_are_made_than_allowed)
 {
     int cut = 0, whole = 0;
     for (int round = 0; round < 6; ++round) {
@@ -482,7 +482,7 @@ static void no_more_columns_are_made_than_allowed(void)
 
 /* One wide disc for two at random, side by side: where two are found they lie by the true ones. One
  * for one stays one; so does what is as many as may be. */
-static void two_side_by_side_are_split(void)
+TEST(two_side_by_side_are_split)
 {
     uint64_t state = 5;
     int split = 0, left = 0;
@@ -522,19 +522,4 @@ static void two_side_by_side_are_split(void)
     CHECK(left > 0);
 }
 
-int main(void)
-{
-    two_side_by_side_are_split();
-    leaving_out_is_solving_again_without();
-    refitting_lowers_the_misfit_by_limited_steps();
-    what_model_errors_could_have_made_goes();
-    halves_of_a_touch_become_one();
-    discs_found_in_a_drift_go();
-    rows_left_out_do_not_stop_the_test();
-    what_cannot_be_tested_is_left_alone();
-    zeros_and_nan_come_to_an_end();
-    ghosts_beside_touches_go();
-    no_more_columns_are_made_than_allowed();
-    dense_bench_close(&b.b);
-    return checks_report("evidence");
-}
+RUN_TESTS("evidence", dense_bench_close(&b.b))

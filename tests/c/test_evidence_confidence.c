@@ -25,7 +25,7 @@ static eits_fit rated(double rise, uint32_t tested, const eits_real *place_mm2, 
 
 static const eits_real PLACE[3] = {R(0.5), R(-0.25), R(0.75)};
 
-static void probability_is_logistic_in_the_logarithm_of_the_rise(void)
+TEST(probability_is_logistic_in_the_logarithm_of_the_rise)
 {
     const double half = (double)EITS_CONFIDENCE_HALF;
     double before = -1;
@@ -41,7 +41,7 @@ static void probability_is_logistic_in_the_logarithm_of_the_rise(void)
     CHECK(rated(1e38, 1, PLACE, 0, 0).confidence[0] <= 1);
 }
 
-static void places_get_factor_floor_distance_and_what_the_test_would_move(void)
+TEST(places_get_factor_floor_distance_and_what_the_test_would_move)
 {
     const double reach = (double)EITS_MAX_MOVE * (double)ctx->model->pixel_mm;
     const double apart[][2] = {{0, 0}, {0.5, -1}, {1e6, 0.25}};
@@ -61,7 +61,7 @@ static void places_get_factor_floor_distance_and_what_the_test_would_move(void)
     ctx->reference.distance = 0;
 }
 
-static void what_is_not_known_is_zero(void)
+TEST(what_is_not_known_is_zero)
 {
     const eits_fit not_tested = rated(100, 0, PLACE, 0, 0);
     CHECK(not_tested.confidence[0] == 0 && not_tested.place_mm2[0][0] == 0);
@@ -82,7 +82,7 @@ static uint32_t said(const eits_fit *f)
     return ctx->info.diagnostics;
 }
 
-static void crowded_where_one_may_be_two_or_none(void)
+TEST(crowded_where_one_may_be_two_or_none)
 {
     eits_fit f = {.count = 2, .tested = 1, .confidence = {R(0.99), R(0.99)}, .pair = {-3, -3}};
     CHECK_EQUAL(said(&f), 0);
@@ -100,7 +100,7 @@ static void crowded_where_one_may_be_two_or_none(void)
 }
 
 /* The score of pair.c by hand: a bulge along x, and a dipole along it or across. */
-static void pairs_bulge_where_their_dipole_does_not(void)
+TEST(pairs_bulge_where_their_dipole_does_not)
 {
     enum { N = EITS_SHAPE_PARAMETERS };
     eits_answer answer = {.count = 1, .parameters = N};
@@ -129,7 +129,7 @@ static void pairs_bulge_where_their_dipole_does_not(void)
 
 /* The line of a bulge at some angle, and two discs on it, of the area and strength of the one; none
  * where they would lie off the skin, or there is no shape. */
-static void two_lie_on_the_line_of_the_bulge(void)
+TEST(two_lie_on_the_line_of_the_bulge)
 {
     eits_likelihood likelihood = {.count = 2 * EITS_SHAPE_PARAMETERS};
     eits_answer one = {.count = 2, .parameters = EITS_SHAPE_PARAMETERS}, two;
@@ -170,7 +170,7 @@ static void two_lie_on_the_line_of_the_bulge(void)
 
 /* An axis at some angle, told by its dipole's evidence: its direction, and its length by hand; an
  * insulating touch lies across. */
-static void an_ellipse_lies_along_its_dipole(void)
+TEST(an_ellipse_lies_along_its_dipole)
 {
     enum { N = EITS_SHAPE_PARAMETERS };
     eits_likelihood likelihood = {.count = N};
@@ -215,13 +215,7 @@ int main(void)
 {
     static dense_bench bench;
     ctx = dense_bench_open(&bench, (small_spec){.rank = 13, .side = 6, .shape = SMALL_WHITENED}, 0);
-    probability_is_logistic_in_the_logarithm_of_the_rise();
-    places_get_factor_floor_distance_and_what_the_test_would_move();
-    what_is_not_known_is_zero();
-    pairs_bulge_where_their_dipole_does_not();
-    two_lie_on_the_line_of_the_bulge();
-    an_ellipse_lies_along_its_dipole();
-    crowded_where_one_may_be_two_or_none();
+    run_tests();
     dense_bench_close(&bench);
     return checks_report("evidence_confidence");
 }

@@ -55,7 +55,7 @@ static void check_gap(const eits_context *ctx, double max_rel)
     free(x), free(y);
 }
 
-static void both_solvers_reach_the_optimum(void)
+TEST(both_solvers_reach_the_optimum)
 {
     static const double lambdas[] = {1e-3, 0.03, 0.5, 0.999};
     for (int s = 0; s < 2; ++s) {
@@ -77,7 +77,7 @@ static void both_solvers_reach_the_optimum(void)
     }
 }
 
-static void a_gap_that_is_asked_for(void)
+TEST(a_gap_that_is_asked_for)
 {
     for (int s = 0; s < 2; ++s) {
         eits_context *ctx = set_up(&b, RANDOM, 1);
@@ -89,7 +89,7 @@ static void a_gap_that_is_asked_for(void)
 }
 
 /* lambda 0: without a sign rule the support fills the rank and the residual is zero. */
-static void the_support_reaches_the_rank(void)
+TEST(the_support_reaches_the_rank)
 {
     for (int s = 0; s < 2; ++s) {
         for (int sign = 0; sign < 3; ++sign) {
@@ -108,7 +108,7 @@ static void the_support_reaches_the_rank(void)
 
 /* Every third column the one before, every seventh zero; and columns that nearly depend on their
  * neighbours. */
-static void columns_that_depend(void)
+TEST(columns_that_depend)
 {
     for (int s = 0; s < 2; ++s) {
         for (int near = 0; near < 2; ++near) {
@@ -148,7 +148,7 @@ static void columns_that_depend(void)
 }
 
 /* More directions than pixels, and one pixel. */
-static void few_pixels(void)
+TEST(few_pixels)
 {
     for (int s = 0; s < 2; ++s) {
         for (uint32_t side = 1; side <= 3; ++side) {
@@ -160,7 +160,7 @@ static void few_pixels(void)
     }
 }
 
-static void same_bits_in_every_layout(void)
+TEST(same_bits_in_every_layout)
 {
     for (int s = 0; s < 2; ++s) {
         for (int storage = 0; storage < 4; ++storage) {
@@ -185,7 +185,7 @@ static void same_bits_in_every_layout(void)
 
 /* From FISTA's many coefficients, from other data's, from the optimum, each solver comes to the
  * same one. */
-static void warm_starts(void)
+TEST(warm_starts)
 {
     for (int s = 0; s < 2; ++s) {
         for (int sign = 0; sign < 3; ++sign) {
@@ -215,7 +215,7 @@ static void warm_starts(void)
 }
 
 /* The optimum of the same data is the start: the active set has next to nothing to do. */
-static void from_the_optimum(void)
+TEST(from_the_optimum)
 {
     for (int sign = 0; sign < 3; ++sign) {
         eits_context *ctx = set_up(&b, RANDOM, sign % 2);
@@ -238,7 +238,7 @@ static double objective(const eits_context *ctx)
 }
 
 /* Each further round or sweep lowers the objective. */
-static void it_never_rises(void)
+TEST(it_never_rises)
 {
     for (int s = 0; s < 2; ++s) {
         double before = INFINITY;
@@ -254,7 +254,7 @@ static void it_never_rises(void)
 }
 
 /* One direction, several, all but one ignored. */
-static void beside_a_basis(void)
+TEST(beside_a_basis)
 {
     static const int lost[] = {0, 1, 4, RANK - 2};
     for (int s = 0; s < 2; ++s) {
@@ -284,7 +284,7 @@ static void beside_a_basis(void)
     }
 }
 
-static void numbers_that_cannot_be(void)
+TEST(numbers_that_cannot_be)
 {
     static const double wild[] = {NAN, INFINITY, BOTH_WIDTHS(1e25, 1e200),
                                   BOTH_WIDTHS(1e-25, 1e-200), 0};
@@ -309,19 +309,4 @@ static void numbers_that_cannot_be(void)
     }
 }
 
-int main(void)
-{
-    both_solvers_reach_the_optimum();
-    a_gap_that_is_asked_for();
-    the_support_reaches_the_rank();
-    columns_that_depend();
-    few_pixels();
-    same_bits_in_every_layout();
-    warm_starts();
-    from_the_optimum();
-    it_never_rises();
-    beside_a_basis();
-    numbers_that_cannot_be();
-    dense_bench_close(&b);
-    return checks_report("exact solvers");
-}
+RUN_TESTS("exact solvers", dense_bench_close(&b))

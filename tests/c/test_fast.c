@@ -212,7 +212,7 @@ static void confirm(bench *b, const double (*places)[2], uint32_t count)
     find(b, places, count);
 }
 
-static void test_nothing_touches(void)
+TEST(test_nothing_touches)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     eits_real aligned[SMALL_ROWS];
@@ -275,7 +275,7 @@ static void test_a_finger(eits_sign sign)
     bench_close(b);
 }
 
-static void test_two_at_once(void)
+TEST(test_two_at_once)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     drives(b, 8);
@@ -286,7 +286,7 @@ static void test_two_at_once(void)
     bench_close(b);
 }
 
-static void test_several_fingers(void)
+TEST(test_several_fingers)
 {
     static const double places[][2] = {{22, 38}, {-40, -24}, {34, -18}, {-5, -44}, {-30, 20}};
     bench *b = bench_open(EITS_SIGN_INCREASE);
@@ -362,7 +362,7 @@ static void spoil_drift(bench *b)
     b->gain_drift = fmin(b->gain_drift + 2e-6, 4e-4);
 }
 
-static void test_other_things_than_touches(void)
+TEST(test_other_things_than_touches)
 {
     void (*const spoils[])(bench *) = {spoil_glitch, spoil_missing, spoil_dead, spoil_open,
                                        spoil_drift};
@@ -385,7 +385,7 @@ static void test_other_things_than_touches(void)
 }
 
 /* Noise that no touch explains: little is told, none for long, and nothing breaks. */
-static void test_rows_without_sense(void)
+TEST(test_rows_without_sense)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     eits_fast_touch touches[EITS_FAST_TOUCHES];
@@ -402,7 +402,7 @@ static void test_rows_without_sense(void)
     bench_close(b);
 }
 
-static void test_frames_begin_and_end_touches(void)
+TEST(test_frames_begin_and_end_touches)
 {
     static const double far[][2] = {{-40, 0}, {40, 0},  {0, 40},  {0, -40},
                                     {0, 0},   {28, 28}, {-28, 28}};
@@ -433,7 +433,7 @@ static void test_frames_begin_and_end_touches(void)
 
 /* Drives come while a frame is solved: what is found in it is where touches were then, and says
  * nothing of one that came since. */
-static void test_touches_that_move_on(void)
+TEST(test_touches_that_move_on)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     eits_fast_touch touch[EITS_FAST_TOUCHES];
@@ -459,7 +459,7 @@ static void test_touches_that_move_on(void)
 }
 
 /* Rows of an electrode that a frame named are left out, until none is named. */
-static void test_named_electrodes(void)
+TEST(test_named_electrodes)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     uint8_t *states = b->skin.ctx->rows.electrode;
@@ -495,7 +495,7 @@ static uint32_t named(bench *b, uint32_t found)
     return info.diagnostics;
 }
 
-static void test_what_is_named(void)
+TEST(test_what_is_named)
 {
     enum {
         FAULTS = EITS_DIAGNOSTIC_ELECTRODE_OPEN | EITS_DIAGNOSTIC_BRIDGED |
@@ -555,7 +555,7 @@ static void test_what_is_named(void)
     bench_close(b);
 }
 
-static void test_a_clock_that_stands_or_goes_back(void)
+TEST(test_a_clock_that_stands_or_goes_back)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     put(b, 0, -14, 8, 1);
@@ -573,7 +573,7 @@ static void test_a_clock_that_stands_or_goes_back(void)
     bench_close(b);
 }
 
-static void test_a_touch_that_leaves_the_skin(void)
+TEST(test_a_touch_that_leaves_the_skin)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     put(b, 0, 40, 0, 1);
@@ -596,7 +596,7 @@ static void test_a_touch_that_leaves_the_skin(void)
     bench_close(b);
 }
 
-static void test_answers_and_their_slopes(void)
+TEST(test_answers_and_their_slopes)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     const uint32_t stride = b->fast->most_rows;
@@ -627,7 +627,7 @@ static void test_answers_and_their_slopes(void)
     bench_close(b);
 }
 
-static void test_what_is_refused(void)
+TEST(test_what_is_refused)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     eits_fast *made = NULL;
@@ -693,20 +693,8 @@ static void test_what_is_refused(void)
 
 int main(void)
 {
-    test_answers_and_their_slopes();
-    test_nothing_touches();
+    run_tests();
     test_a_finger(EITS_SIGN_INCREASE);
     test_a_finger(EITS_SIGN_DECREASE);
-    test_two_at_once();
-    test_several_fingers();
-    test_other_things_than_touches();
-    test_rows_without_sense();
-    test_frames_begin_and_end_touches();
-    test_touches_that_move_on();
-    test_named_electrodes();
-    test_what_is_named();
-    test_a_clock_that_stands_or_goes_back();
-    test_a_touch_that_leaves_the_skin();
-    test_what_is_refused();
     return checks_report("fast");
 }

@@ -92,7 +92,7 @@ static double gone(const bench *b, uint32_t i)
     return (double)((b->c.ctx->reference.v0[i] - b->quiet[i]) / (b->frame[i] - b->quiet[i]));
 }
 
-static void it_goes_a_part_of_the_way_after_as_large_a_part_of_its_time(void)
+TEST(it_goes_a_part_of_the_way_after_as_large_a_part_of_its_time)
 {
     static const struct {
         uint32_t frames;
@@ -120,7 +120,7 @@ static void it_goes_a_part_of_the_way_after_as_large_a_part_of_its_time(void)
     }
 }
 
-static void a_touch_lets_go_what_came_before_and_as_much_behind_it(void)
+TEST(a_touch_lets_go_what_came_before_and_as_much_behind_it)
 {
     bench b;
     (void)set_up(&b, FRAMES);
@@ -153,7 +153,7 @@ static double as_much(const bench *b, uint32_t k)
 }
 
 /* One pixel's data alone, or two pixels': the best column gives all, or half. */
-static void what_looks_like_a_touch_is_not_followed(void)
+TEST(what_looks_like_a_touch_is_not_followed)
 {
     for (int k = 0; k < 4; ++k) {
         const uint32_t folds = 1 + (uint32_t)k % 2;
@@ -171,7 +171,7 @@ static void what_looks_like_a_touch_is_not_followed(void)
 
 /* Two frames of one pixel each: their mean is what counts. What untouched skin shows is learned
  * from the first. */
-static void frames_are_averaged_before_they_are_compared(void)
+TEST(frames_are_averaged_before_they_are_compared)
 {
     bench b;
     eits_context *ctx = set_up(&b, FRAMES);
@@ -189,7 +189,7 @@ static void frames_are_averaged_before_they_are_compared(void)
     tear_down(&b);
 }
 
-static void a_row_that_one_frame_lacks_stays(void)
+TEST(a_row_that_one_frame_lacks_stays)
 {
     bench b;
     eits_context *ctx = set_up(&b, FRAMES);
@@ -206,7 +206,7 @@ static void a_row_that_one_frame_lacks_stays(void)
 
 /* After N / 4 frames the reference is as large as the frame beside the touch, which may press as it
  * will. */
-static void under_a_touch_only_its_size_follows(void)
+TEST(under_a_touch_only_its_size_follows)
 {
     static const struct {
         double all;    /* change of all rows from the second mean on */
@@ -241,7 +241,7 @@ static void under_a_touch_only_its_size_follows(void)
 
 /* Beside so many touches there is nothing to tell the size by; beside one pixel's, wherever the
  * places beyond the skin's edge are, there is. */
-static void where_touches_may_give_all_it_stays(void)
+TEST(where_touches_may_give_all_it_stays)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
@@ -266,7 +266,7 @@ static void where_touches_may_give_all_it_stays(void)
 }
 
 /* A touch on the edge of two pixels is of both: rounding does not choose one. */
-static void on_the_edge_of_pixels_rounding_decides_nothing(void)
+TEST(on_the_edge_of_pixels_rounding_decides_nothing)
 {
     double goes[2];
     for (int side = 0; side < 2; ++side) {
@@ -290,7 +290,7 @@ static void on_the_edge_of_pixels_rounding_decides_nothing(void)
 }
 
 /* A round skin has no pixel in the corner where the touch is; ratios know no size. */
-static void the_size_of_differences_follows_on_any_outline(void)
+TEST(the_size_of_differences_follows_on_any_outline)
 {
     static const struct {
         small_spec spec;
@@ -307,7 +307,7 @@ static void the_size_of_differences_follows_on_any_outline(void)
 }
 
 /* As many touches as before are no hand that rests, where they are others. */
-static void the_size_follows_under_the_same_touches_alone(void)
+TEST(the_size_follows_under_the_same_touches_alone)
 {
     for (uint32_t apart = 0; apart <= 3; apart += 3) {
         bench b;
@@ -332,7 +332,7 @@ static void the_size_follows_under_the_same_touches_alone(void)
     }
 }
 
-static void a_frame_of_no_use_is_not_followed(void)
+TEST(a_frame_of_no_use_is_not_followed)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
@@ -358,7 +358,7 @@ static small_model taught(void)
     return made;
 }
 
-static void touches_that_explain_little_are_drift(void)
+TEST(touches_that_explain_little_are_drift)
 {
     static const struct {
         double unexplained, lambda_max, noise, level;
@@ -401,7 +401,7 @@ static void touches_that_explain_little_are_drift(void)
 }
 
 /* By the public functions: drift while nothing is touched, a touch, a batch, and put by. */
-static void as_a_caller_sees_it(void)
+TEST(as_a_caller_sees_it)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
@@ -441,20 +441,4 @@ static void as_a_caller_sees_it(void)
     tear_down(&b);
 }
 
-int main(void)
-{
-    it_goes_a_part_of_the_way_after_as_large_a_part_of_its_time();
-    a_touch_lets_go_what_came_before_and_as_much_behind_it();
-    what_looks_like_a_touch_is_not_followed();
-    frames_are_averaged_before_they_are_compared();
-    a_row_that_one_frame_lacks_stays();
-    under_a_touch_only_its_size_follows();
-    where_touches_may_give_all_it_stays();
-    on_the_edge_of_pixels_rounding_decides_nothing();
-    the_size_of_differences_follows_on_any_outline();
-    the_size_follows_under_the_same_touches_alone();
-    a_frame_of_no_use_is_not_followed();
-    touches_that_explain_little_are_drift();
-    as_a_caller_sees_it();
-    return checks_report("follow");
-}
+RUN_TESTS("follow")

@@ -71,7 +71,7 @@ static double gain_by_hand(const float *c, uint32_t order, double u, double v)
     return fmin(fmax(gain, 0.25), 4.0);
 }
 
-static void forces_are_those_of_the_table(void)
+TEST(forces_are_those_of_the_table)
 {
     for (uint32_t order = 0; order <= EITS_MAX_FORCE_ORDER; ++order) {
         uint8_t bytes[MAX];
@@ -100,7 +100,7 @@ static void forces_are_those_of_the_table(void)
     }
 }
 
-static void no_calibration_no_force(void)
+TEST(no_calibration_no_force)
 {
     small_model made = small_model_make(TINY);
     eits_model model;
@@ -109,7 +109,7 @@ static void no_calibration_no_force(void)
     small_model_free(&made);
 }
 
-static void sections_of_another_size(void)
+TEST(sections_of_another_size)
 {
     uint8_t bytes[MAX];
     for (uint32_t order = 0; order <= EITS_MAX_FORCE_ORDER; ++order) {
@@ -123,7 +123,7 @@ static void sections_of_another_size(void)
     CHECK_EQUAL(refused(bytes, HEAD), EITS_E_MODEL_SECTION);
 }
 
-static void numbers_out_of_range(void)
+TEST(numbers_out_of_range)
 {
     const uint32_t counts[] = {0, 1, 65, 0x40000003u, 0xFFFFFFFFu};
     for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k)
@@ -156,7 +156,7 @@ static void numbers_out_of_range(void)
 }
 
 /* Touches carry the force of their own place and strength. */
-static void touches_have_forces(void)
+TEST(touches_have_forces)
 {
     uint8_t bytes[MAX];
     const small_spec spec = {.rank = 24, .side = 12, .shape = SMALL_WAVES};
@@ -188,12 +188,4 @@ static void touches_have_forces(void)
     small_model_free(&bare);
 }
 
-int main(void)
-{
-    forces_are_those_of_the_table();
-    no_calibration_no_force();
-    sections_of_another_size();
-    numbers_out_of_range();
-    touches_have_forces();
-    return checks_report("force");
-}
+RUN_TESTS("force")

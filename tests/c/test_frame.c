@@ -89,7 +89,7 @@ static void check_stage(bench *b, uint32_t masked_expected)
     free(v0);
 }
 
-static void data_of_each_kind(void)
+TEST(data_of_each_kind)
 {
     for (int kind = 0; kind < 3; ++kind) {
         for (int project = 0; project < 2; ++project) {
@@ -127,7 +127,7 @@ static void data_of_each_kind(void)
     }
 }
 
-static void drift_of_the_gain(void)
+TEST(drift_of_the_gain)
 {
     static const double drifts[] = {1e-3, 0.05, -0.3, 0.8};
     for (int kind = 0; kind < 3; ++kind) {
@@ -150,7 +150,7 @@ static void drift_of_the_gain(void)
 }
 
 /* What is no number or saturated is left out, counted, and does not reach the data. */
-static void unusable_channels(void)
+TEST(unusable_channels)
 {
     for (int kind = 0; kind < 3; ++kind) {
         for (int project = 0; project < 2; ++project) {
@@ -189,7 +189,7 @@ static void unusable_channels(void)
 }
 
 /* The mask changes from frame to frame in all ways: y is always what a fresh context gives. */
-static void changing_masks(void)
+TEST(changing_masks)
 {
     for (int kind = 0; kind < 3; ++kind) {
         eits_context *ctx = set_up(&b, (eits_data_kind)kind, -1.5, 1);
@@ -212,7 +212,7 @@ static void changing_masks(void)
 
 /* Rows left out on both sides: the answer does not depend on their values, and is the one that
  * minimises over them. */
-static void left_out_is_minimised_over(void)
+TEST(left_out_is_minimised_over)
 {
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 0);
     const uint32_t k = 5, first = b.c.model.fold[k].first, second = b.c.model.fold[k].second;
@@ -242,7 +242,7 @@ static void left_out_is_minimised_over(void)
 }
 
 /* So many rows left out that no direction is left: nothing is seen, not the rounding of nothing. */
-static void nothing_left(void)
+TEST(nothing_left)
 {
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
     CHANGE_OPTIONS(ctx, o.max_masked = SMALL_ROWS);
@@ -262,7 +262,7 @@ static void nothing_left(void)
     CHECK_EQUAL(eits_get_info(ctx)->masked, SMALL_ROWS);
 }
 
-static void refused_frames_clear_the_image(void)
+TEST(refused_frames_clear_the_image)
 {
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
     eits_real image[SIDE * SIDE], again[SIDE * SIDE], good[SMALL_ROWS];
@@ -314,7 +314,7 @@ static void refused_frames_clear_the_image(void)
     CHECK_EQUAL(eits_frame_stage(ctx, good, SMALL_ROWS, &masked, NULL), EITS_E_ARGUMENT);
 }
 
-static void masked_rows(void)
+TEST(masked_rows)
 {
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
     eits_real image[SIDE * SIDE], again[SIDE * SIDE];
@@ -333,7 +333,7 @@ static void masked_rows(void)
 
 /* A row that was left out while the reference was taken has none: it stays out until the next
  * reference. */
-static void row_without_reference(void)
+TEST(row_without_reference)
 {
     for (int learned = 0; learned < 2; ++learned) {
         eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
@@ -358,7 +358,7 @@ static void row_without_reference(void)
 }
 
 /* Ratios need a reference that is not all but zero, and are bounded. */
-static void ratios_at_their_limits(void)
+TEST(ratios_at_their_limits)
 {
     for (int kind = EITS_DATA_NORMALISED; kind <= EITS_DATA_LOG_RATIO; ++kind) {
         eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1, 0);
@@ -384,7 +384,7 @@ static void ratios_at_their_limits(void)
 }
 
 /* Directions of rows left out that nearly agree are orthogonal all the same. */
-static void directions_that_nearly_agree(void)
+TEST(directions_that_nearly_agree)
 {
     small_model made = small_model_make((small_spec){.rank = RANK, .side = 4});
     uint8_t *p = small_model_section(&made, "REDU", NULL);
@@ -423,7 +423,7 @@ static void directions_that_nearly_agree(void)
 }
 
 /* What the two rows of a fold differ by; by less than rounding of their references: nothing. */
-static void reciprocals_that_agree(void)
+TEST(reciprocals_that_agree)
 {
     for (int kind = 0; kind < 2; ++kind) {
         eits_context *ctx = set_up(&b, (eits_data_kind)kind, 2, 0);
@@ -443,20 +443,4 @@ static void reciprocals_that_agree(void)
     }
 }
 
-int main(void)
-{
-    data_of_each_kind();
-    drift_of_the_gain();
-    unusable_channels();
-    changing_masks();
-    left_out_is_minimised_over();
-    nothing_left();
-    refused_frames_clear_the_image();
-    masked_rows();
-    row_without_reference();
-    ratios_at_their_limits();
-    directions_that_nearly_agree();
-    reciprocals_that_agree();
-    tear_down(&b);
-    return checks_report("frame");
-}
+RUN_TESTS("frame", tear_down(&b))

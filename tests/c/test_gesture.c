@@ -115,7 +115,7 @@ static const eits_event *last(const bench *b, eits_event_kind kind)
 
 /* ---- one finger ---- */
 
-static void a_tap_is_told_in_the_first_frame_without_it(void)
+TEST(a_tap_is_told_in_the_first_frame_without_it)
 {
     begin(&b);
     none(&b, 2);
@@ -132,7 +132,7 @@ static void a_tap_is_told_in_the_first_frame_without_it(void)
     CHECK_EQUAL(gestures(&b), 1);
 }
 
-static void two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first(void)
+TEST(two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first)
 {
     begin(&b);
     b.now_us = 10000000; /* what counts is the time between them */
@@ -154,7 +154,7 @@ static void two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first(void)
     CHECK_EQUAL(once(&b, EITS_EVENT_DOUBLE_TAP), 0);
 }
 
-static void a_long_press_is_a_hold_once_and_no_tap(void)
+TEST(a_long_press_is_a_hold_once_and_no_tap)
 {
     begin(&b);
     finger(&b, 1, 5, 5, 0, 0, 24);
@@ -171,7 +171,7 @@ static void a_long_press_is_a_hold_once_and_no_tap(void)
     CHECK_EQUAL(gestures(&b), 0);
 }
 
-static void a_swipe_says_where_it_goes(void)
+TEST(a_swipe_says_where_it_goes)
 {
     for (int side = 0; side < 8; ++side) {
         const double angle = 3.14159265358979 * side / 4;
@@ -185,7 +185,7 @@ static void a_swipe_says_where_it_goes(void)
     }
 }
 
-static void what_ends_at_rest_or_comes_back_is_no_swipe(void)
+TEST(what_ends_at_rest_or_comes_back_is_no_swipe)
 {
     begin(&b);
     finger(&b, 1, 0, 0, 6, 0, 10);
@@ -208,7 +208,7 @@ static void what_ends_at_rest_or_comes_back_is_no_swipe(void)
 
 /* ---- two fingers ---- */
 
-static void two_fingers_pinch_and_the_end_says_by_how_much(void)
+TEST(two_fingers_pinch_and_the_end_says_by_how_much)
 {
     begin(&b);
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 20);
@@ -226,7 +226,7 @@ static void two_fingers_pinch_and_the_end_says_by_how_much(void)
     CHECK_NEAR(end->x_mm, 0, 1e-5);
 }
 
-static void a_pinch_that_opens_again_becomes_a_spread(void)
+TEST(a_pinch_that_opens_again_becomes_a_spread)
 {
     begin(&b);
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 16);
@@ -245,7 +245,7 @@ static void a_pinch_that_opens_again_becomes_a_spread(void)
     CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_END), 1);
 }
 
-static void two_fingers_turn_either_way(void)
+TEST(two_fingers_turn_either_way)
 {
     for (int way = -1; way <= 1; way += 2) {
         begin(&b);
@@ -264,7 +264,7 @@ static void two_fingers_turn_either_way(void)
 }
 
 /* A change is told for each so much of way, not for each frame: 0.6 mm here, of 72. */
-static void a_slow_turn_is_told_by_its_way(void)
+TEST(a_slow_turn_is_told_by_its_way)
 {
     begin(&b);
     for (int k = 0; k < 120; ++k) {
@@ -277,7 +277,7 @@ static void a_slow_turn_is_told_by_its_way(void)
     CHECK(count_of(&b, EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) < 80);
 }
 
-static void fingers_that_rest_or_are_three_do_nothing_together(void)
+TEST(fingers_that_rest_or_are_three_do_nothing_together)
 {
     begin(&b);
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){0, 0, 0, 0}, 40);
@@ -297,7 +297,7 @@ static void fingers_that_rest_or_are_three_do_nothing_together(void)
 
 /* ---- real frames ---- */
 
-static void a_scan_that_a_finger_lands_in_invents_nothing(void)
+TEST(a_scan_that_a_finger_lands_in_invents_nothing)
 {
     begin(&b);
     const eits_touch two[] = {touch(1, -8, 3), touch(2, -37, -9)};
@@ -309,7 +309,7 @@ static void a_scan_that_a_finger_lands_in_invents_nothing(void)
     CHECK_NEAR(last(&b, EITS_EVENT_TAP)->x_mm, -30, 1e-6);
 }
 
-static void a_scan_that_a_finger_lifts_in_does_not_move_it(void)
+TEST(a_scan_that_a_finger_lifts_in_does_not_move_it)
 {
     begin(&b);
     finger(&b, 1, 40, 59, 0, 0, 12);
@@ -330,7 +330,7 @@ static void a_scan_that_a_finger_lifts_in_does_not_move_it(void)
     CHECK_EQUAL(gestures(&b), 1);
 }
 
-static void a_lighter_press_is_followed_on(void)
+TEST(a_lighter_press_is_followed_on)
 {
     begin(&b);
     finger(&b, 1, 0, 0, 0, 0, 4);
@@ -344,7 +344,7 @@ static void a_lighter_press_is_followed_on(void)
     CHECK_EQUAL(once(&b, EITS_EVENT_SWIPE), 1);
 }
 
-static void a_held_touch_and_a_lost_frame_do_not_end_a_hold(void)
+TEST(a_held_touch_and_a_lost_frame_do_not_end_a_hold)
 {
     begin(&b);
     finger(&b, 1, 5, 5, 0, 0, 8);
@@ -364,7 +364,7 @@ static void a_held_touch_and_a_lost_frame_do_not_end_a_hold(void)
     CHECK_EQUAL(gestures(&b), 1);
 }
 
-static void a_tap_that_is_found_again_is_told_once(void)
+TEST(a_tap_that_is_found_again_is_told_once)
 {
     begin(&b);
     finger(&b, 1, 5, 5, 0, 0, 4);
@@ -381,7 +381,7 @@ static void a_tap_that_is_found_again_is_told_once(void)
     CHECK_EQUAL(once(&b, EITS_EVENT_SWIPE), 1);
 }
 
-static void another_id_is_the_same_finger(void)
+TEST(another_id_is_the_same_finger)
 {
     begin(&b);
     finger(&b, 1, 0, 0, 6, 0, 5);
@@ -401,7 +401,7 @@ static void another_id_is_the_same_finger(void)
     CHECK_EQUAL(once(&b, EITS_EVENT_SWIPE), 1);
 }
 
-static void half_of_a_touch_is_no_finger_until_it_has_lasted(void)
+TEST(half_of_a_touch_is_no_finger_until_it_has_lasted)
 {
     begin(&b);
     finger(&b, 1, 0, 0, 0, 0, 6);
@@ -427,7 +427,7 @@ static void half_of_a_touch_is_no_finger_until_it_has_lasted(void)
 }
 
 /* The tracker calls what it lands as by another id, a while later. */
-static void a_landing_that_is_renamed_holds_where_it_rests(void)
+TEST(a_landing_that_is_renamed_holds_where_it_rests)
 {
     begin(&b);
     finger(&b, 1, 20, 57, 0, 0, 1);
@@ -448,7 +448,7 @@ static void a_landing_that_is_renamed_holds_where_it_rests(void)
     CHECK_EQUAL(gestures(&b), 0);
 }
 
-static void a_swipe_of_two_frames_counts_the_one_it_lifts_in(void)
+TEST(a_swipe_of_two_frames_counts_the_one_it_lifts_in)
 {
     begin(&b);
     finger(&b, 1, 0, 0, 10, 0, 2);
@@ -474,7 +474,7 @@ static void a_swipe_of_two_frames_counts_the_one_it_lifts_in(void)
     CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 0);
 }
 
-static void fingers_that_merge_end_their_pinch(void)
+TEST(fingers_that_merge_end_their_pinch)
 {
     begin(&b);
     fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 20);
@@ -484,7 +484,7 @@ static void fingers_that_merge_end_their_pinch(void)
     CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_END), 1);
 }
 
-static void a_pair_that_is_not_found_for_a_frame_goes_on(void)
+TEST(a_pair_that_is_not_found_for_a_frame_goes_on)
 {
     begin(&b);
     b.g.options.lost_us = 30000;
@@ -497,7 +497,7 @@ static void a_pair_that_is_not_found_for_a_frame_goes_on(void)
 
 /* ---- limits and hostile numbers ---- */
 
-static void events_without_room_are_counted(void)
+TEST(events_without_room_are_counted)
 {
     eits_event few[2];
     uint32_t told;
@@ -516,7 +516,7 @@ static void events_without_room_are_counted(void)
     CHECK_EQUAL(b.g.dropped, 2 * EITS_MAX_TOUCHES - 2);
 }
 
-static void more_fingers_than_can_be_followed_are_counted(void)
+TEST(more_fingers_than_can_be_followed_are_counted)
 {
     eits_touch many[EITS_MAX_TOUCHES];
     begin(&b);
@@ -534,7 +534,7 @@ static void more_fingers_than_can_be_followed_are_counted(void)
     CHECK_EQUAL(b.g.dropped, 2 * EITS_MAX_TOUCHES);
 }
 
-static void the_place_of_what_lifted_first_is_taken(void)
+TEST(the_place_of_what_lifted_first_is_taken)
 {
     eits_touch many[EITS_MAX_TOUCHES];
     begin(&b);
@@ -550,7 +550,7 @@ static void the_place_of_what_lifted_first_is_taken(void)
     CHECK_EQUAL(once(&b, EITS_EVENT_UP), 4 * EITS_MAX_TOUCHES);
 }
 
-static void what_is_no_number_is_passed_over(void)
+TEST(what_is_no_number_is_passed_over)
 {
     begin(&b);
     for (int k = 0; k < 6; ++k) {
@@ -575,7 +575,7 @@ static void what_is_no_number_is_passed_over(void)
     CHECK_EQUAL(count_of(&b, EITS_EVENT_SPREAD, EITS_PHASE_END), 1);
 }
 
-static void time_that_stands_goes_back_or_leaps(void)
+TEST(time_that_stands_goes_back_or_leaps)
 {
     begin(&b);
     finger(&b, 1, 0, 0, 0, 0, 4);
@@ -594,7 +594,7 @@ static void time_that_stands_goes_back_or_leaps(void)
     CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_END), 1);
 }
 
-static void wrong_arguments_are_refused(void)
+TEST(wrong_arguments_are_refused)
 {
     eits_event events[1];
     eits_gesture_options options;
@@ -617,34 +617,4 @@ static void wrong_arguments_are_refused(void)
     CHECK_EQUAL(eits_gestures_update(&b.g, &t, 1, 0, events, 1, NULL), EITS_E_ARGUMENT);
 }
 
-int main(void)
-{
-    a_tap_is_told_in_the_first_frame_without_it();
-    two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first();
-    a_long_press_is_a_hold_once_and_no_tap();
-    a_swipe_says_where_it_goes();
-    what_ends_at_rest_or_comes_back_is_no_swipe();
-    two_fingers_pinch_and_the_end_says_by_how_much();
-    a_pinch_that_opens_again_becomes_a_spread();
-    two_fingers_turn_either_way();
-    a_slow_turn_is_told_by_its_way();
-    fingers_that_rest_or_are_three_do_nothing_together();
-    a_scan_that_a_finger_lands_in_invents_nothing();
-    a_scan_that_a_finger_lifts_in_does_not_move_it();
-    a_lighter_press_is_followed_on();
-    a_held_touch_and_a_lost_frame_do_not_end_a_hold();
-    a_tap_that_is_found_again_is_told_once();
-    another_id_is_the_same_finger();
-    half_of_a_touch_is_no_finger_until_it_has_lasted();
-    a_landing_that_is_renamed_holds_where_it_rests();
-    a_swipe_of_two_frames_counts_the_one_it_lifts_in();
-    fingers_that_merge_end_their_pinch();
-    a_pair_that_is_not_found_for_a_frame_goes_on();
-    events_without_room_are_counted();
-    more_fingers_than_can_be_followed_are_counted();
-    the_place_of_what_lifted_first_is_taken();
-    what_is_no_number_is_passed_over();
-    time_that_stands_goes_back_or_leaps();
-    wrong_arguments_are_refused();
-    return checks_report("gesture");
-}
+RUN_TESTS("gesture")

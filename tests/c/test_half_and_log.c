@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-static void halves(void)
+TEST(halves)
 {
     for (uint32_t half = 0; half < 65536; ++half) {
         const uint16_t bits = (uint16_t)half;
@@ -48,7 +48,7 @@ static double log_error(eits_real q)
 
 /* Four roundings of half a unit each, of numbers up to twice as large relative to their last place:
  * 3 units hold; over all 67 million floats from 1/16 to 16 the worst is 2.85, near 1.13. */
-static void logarithm_is_accurate(void)
+TEST(logarithm_is_accurate)
 {
     const double max = 3;
     double worst = log_error(R(1.13179791));
@@ -69,7 +69,7 @@ static void logarithm_is_accurate(void)
     CHECK_NEAR(eits_log(R(1.0 / 16)), -2.77258872223978123767, 2 * EPS);
 }
 
-static void logarithm_rises(void)
+TEST(logarithm_rises)
 {
     /* across the sweep, in steps far above rounding */
     eits_real before = eits_log(R(1.0 / 16));
@@ -117,8 +117,6 @@ int main(void)
 {
     the_greatest(&eits_kernels_portable);
     the_greatest(eits_kernels_best());
-    halves();
-    logarithm_is_accurate();
-    logarithm_rises();
+    run_tests();
     return checks_report("numbers");
 }

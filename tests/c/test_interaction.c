@@ -145,7 +145,7 @@ static double size_of(const double *a)
     return sqrt(dense_dot(a, a, RANK));
 }
 
-static void as_computed_densely(void)
+TEST(as_computed_densely)
 {
     for (int left_out = -1; left_out < 12; left_out += 4) {
         eits_real frame[SMALL_ROWS];
@@ -167,7 +167,7 @@ static void as_computed_densely(void)
 
 /* Products counted one by one: fields over covers, what bends them, what answers, P of the folds in
  * use, two norms. */
-static void work_is_counted(void)
+TEST(work_is_counted)
 {
     eits_real frame[SMALL_ROWS], field[SMALL_FIELDS_STRIDE];
     double added[RANK];
@@ -182,7 +182,7 @@ static void work_is_counted(void)
 }
 
 /* Driven and measured pairs exchanged: the same datum, to what halves make of the mirror. */
-static void reciprocals_give_the_same(void)
+TEST(reciprocals_give_the_same)
 {
     dense_bench b = {0}, turned = {0};
     eits_real frame[SMALL_ROWS];
@@ -214,7 +214,7 @@ static void reciprocals_give_the_same(void)
 
 /* A field that is the same everywhere, and no mirror: 1 / r^2 beyond touching, nothing more within,
  * nothing at all in one place. */
-static void distance_and_overlap(void)
+TEST(distance_and_overlap)
 {
     eits_real frame[SMALL_ROWS];
     double near[RANK], added[RANK];
@@ -258,7 +258,7 @@ static int left_alone(eits_context *ctx, const eits_disc *disc, uint32_t count)
     return memcmp(data, ctx->frame.y, ctx->model->rank * sizeof *data) == 0;
 }
 
-static void when_it_is_left_alone(void)
+TEST(when_it_is_left_alone)
 {
     eits_real frame[SMALL_ROWS];
     eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
@@ -305,7 +305,7 @@ static void when_it_is_left_alone(void)
 
 /* The linear data of a model of differences are the data of the same matrices' model of log
  * ratios. */
-static void log_data(void)
+TEST(log_data)
 {
     for (int left_out = -1; left_out < 9; left_out += 3) {
         dense_bench b = {0}, log_bench = {0};
@@ -332,7 +332,7 @@ static void log_data(void)
 
 /* Where the reference is all but zero there is no ratio: differences stay, halved over both sides.
  */
-static void log_data_without_a_ratio(void)
+TEST(log_data_without_a_ratio)
 {
     eits_real frame[SMALL_ROWS], y[RANK];
     uint32_t masked;
@@ -351,15 +351,4 @@ static void log_data_without_a_ratio(void)
         CHECK_NEAR(ctx->frame.y_log[i], y[i], 4 * EPS * fabs((double)y[i]));
 }
 
-int main(void)
-{
-    as_computed_densely();
-    work_is_counted();
-    reciprocals_give_the_same();
-    distance_and_overlap();
-    when_it_is_left_alone();
-    log_data();
-    log_data_without_a_ratio();
-    dense_bench_close(&b);
-    return checks_report("coupling");
-}
+RUN_TESTS("coupling", dense_bench_close(&b))

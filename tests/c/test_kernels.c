@@ -19,7 +19,7 @@ extern const eits_kernels eits_kernels_avx2;
 static const eits_kernels *builds[2];
 static int build_count = 0;
 
-static void find_builds(void)
+TEST(find_builds)
 {
     const eits_kernels *best = eits_kernels_best();
     builds[build_count++] = &eits_kernels_portable;
@@ -257,7 +257,7 @@ static void check_unpack(const sample *s)
     free(out);
 }
 
-static void products_of_all_storages_and_sizes(void)
+TEST(products_of_all_storages_and_sizes)
 {
     static const uint32_t rows[] = {1, 3, 7, 8, 9, 13, 24, 33},
                           cols[] = {1, 2, 3, 4, 5, 7, 31, 32, 33, 64, 99};
@@ -276,7 +276,7 @@ static void products_of_all_storages_and_sizes(void)
     }
 }
 
-static void dots_and_axpys(void)
+TEST(dots_and_axpys)
 {
     uint64_t state = 12;
     for (size_t count = 0; count <= 70; ++count) {
@@ -308,7 +308,7 @@ static void dots_and_axpys(void)
     }
 }
 
-static void products_with_few_rows(void)
+TEST(products_with_few_rows)
 {
     enum { STRIDE = 40 };
     uint64_t state = 15;
@@ -337,7 +337,7 @@ static void products_with_few_rows(void)
     }
 }
 
-static void the_greatest(void)
+TEST(the_greatest)
 {
     uint64_t state = 16;
     for (size_t count = 0; count <= 70; ++count) {
@@ -364,7 +364,7 @@ static void the_greatest(void)
 }
 
 /* Every pattern of eight, and a few more behind; nothing is written behind the last place. */
-static void places_of_nonzeros(void)
+TEST(places_of_nonzeros)
 {
     for (uint32_t pattern = 0; pattern < 256; ++pattern) {
         for (uint32_t count = 8; count < 12; ++count) {
@@ -388,7 +388,7 @@ static void places_of_nonzeros(void)
     }
 }
 
-static void proximal_steps(void)
+TEST(proximal_steps)
 {
     uint64_t state = 13;
     const double step = 0.7, threshold = 0.3, beta = 0.4;
@@ -423,7 +423,7 @@ static void proximal_steps(void)
 }
 
 /* A number that is none comes out as none, wherever it stands: not as a coefficient at rest. */
-static void steps_that_are_not_finite(void)
+TEST(steps_that_are_not_finite)
 {
     enum { COUNT = 19 };
     const double wild[] = {NAN, INFINITY, -INFINITY};
@@ -442,7 +442,7 @@ static void steps_that_are_not_finite(void)
     }
 }
 
-static void zeros_are_skipped(void)
+TEST(zeros_are_skipped)
 {
     uint64_t state = 14;
     sample s = make_sample(EITS_STORAGE_F32, 5, 9, &state);
@@ -464,7 +464,7 @@ static void zeros_are_skipped(void)
     free_sample(&s);
 }
 
-static void choice_of_kernels(void)
+TEST(choice_of_kernels)
 {
     small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
     small_context c;
@@ -480,17 +480,4 @@ static void choice_of_kernels(void)
     small_model_free(&made);
 }
 
-int main(void)
-{
-    find_builds();
-    products_of_all_storages_and_sizes();
-    dots_and_axpys();
-    products_with_few_rows();
-    places_of_nonzeros();
-    the_greatest();
-    proximal_steps();
-    steps_that_are_not_finite();
-    zeros_are_skipped();
-    choice_of_kernels();
-    return checks_report("kernels");
-}
+RUN_TESTS("kernels")

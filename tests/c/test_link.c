@@ -121,7 +121,7 @@ static void one_round_trip(size_t size, size_t head_size)
     CHECK_EQUAL(errors(&d), 0);
 }
 
-static void round_trips(void)
+TEST(round_trips)
 {
     for (size_t size = 0; size <= 2000; ++size) {
         for (int kind = 0; kind < 4; ++kind) {
@@ -137,7 +137,7 @@ static void round_trips(void)
     }
 }
 
-static void limits_of_room(void)
+TEST(limits_of_room)
 {
     fill((size_t)MAX, 1);
     CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, payload, (size_t)MAX, payload, 1), 0);
@@ -157,7 +157,7 @@ static void limits_of_room(void)
     }
 }
 
-static void bad_decoders(void)
+TEST(bad_decoders)
 {
     eits_link_decoder d;
     CHECK_EQUAL(eits_link_decoder_init(NULL, buffer, sizeof buffer), EITS_E_ARGUMENT);
@@ -180,7 +180,7 @@ static void one_damage(const uint8_t *damaged, size_t size, const uint8_t *good,
     CHECK_EQUAL(d.packets, 1);
 }
 
-static void every_byte_damaged(void)
+TEST(every_byte_damaged)
 {
     static uint8_t damaged[ROOM], good[64];
     const size_t good_size = eits_link_encode(good, sizeof good, 0x77, 9, "next", 4, NULL, 0);
@@ -230,7 +230,7 @@ static void delimiters(void)
     CHECK_EQUAL(errors(&d), 1);
 }
 
-static void finds_its_way_back(void)
+TEST(finds_its_way_back)
 {
     eits_link_decoder d = fresh();
     eits_link_packet packet = {.type = 0};
@@ -252,7 +252,7 @@ static void finds_its_way_back(void)
     CHECK(errors(&d) > 1000);
 }
 
-static void longer_than_the_buffer(void)
+TEST(longer_than_the_buffer)
 {
     static _Alignas(8) uint8_t small[8 + 4 + 32];
     eits_link_decoder d;
@@ -276,7 +276,7 @@ static void longer_than_the_buffer(void)
     CHECK_EQUAL(feed_all(&d, wire, made, &packet), 1);
 }
 
-static void other_versions(void)
+TEST(other_versions)
 {
     eits_link_decoder d = fresh();
     eits_link_packet packet = {.type = 0};
@@ -290,7 +290,7 @@ static void other_versions(void)
 }
 
 /* The length in the head is another check; the checksum alone would let these pass. */
-static void wrong_length_in_the_head(void)
+TEST(wrong_length_in_the_head)
 {
     uint8_t packet_bytes[16] = {EITS_LINK_VERSION, 1, 5, 0, 0, 0, 0, 0, 1, 2, 3, 4};
     const uint32_t crc = eits_crc32(0, packet_bytes, 12);
@@ -315,7 +315,7 @@ static void wrong_length_in_the_head(void)
     CHECK_EQUAL(errors(&d), 1);
 }
 
-static void shorter_than_a_packet(void)
+TEST(shorter_than_a_packet)
 {
     eits_link_decoder d = fresh();
     eits_link_packet packet = {.type = 0};
@@ -330,7 +330,7 @@ static void shorter_than_a_packet(void)
 }
 
 /* However the bytes come, what comes out is the same. */
-static void by_bytes_and_by_blocks(void)
+TEST(by_bytes_and_by_blocks)
 {
     static uint8_t line[60000];
     size_t length = 0;
@@ -374,16 +374,7 @@ static void by_bytes_and_by_blocks(void)
 
 int main(void)
 {
-    round_trips();
-    limits_of_room();
-    bad_decoders();
-    every_byte_damaged();
+    run_tests();
     delimiters();
-    finds_its_way_back();
-    longer_than_the_buffer();
-    other_versions();
-    wrong_length_in_the_head();
-    shorter_than_a_packet();
-    by_bytes_and_by_blocks();
     return checks_report("link");
 }

@@ -80,7 +80,7 @@ static void check_result(const bench *b, const eits_info *info)
     free(x), free(y);
 }
 
-static void every_limit_holds(void)
+TEST(every_limit_holds)
 {
     for (int solver = 0; solver < SOLVERS; ++solver) {
         for (int warm = 0; warm < 2; ++warm) {
@@ -113,7 +113,7 @@ static void every_limit_holds(void)
 
 /* Cold FISTA needs just what it spends; and more MACs give no worse an image, so far as FISTA goes
  * down at all. */
-static void to_the_last_mac(void)
+TEST(to_the_last_mac)
 {
     for (int solver = 0; solver < 2; ++solver) {
         eits_context *ctx = set_up(&b);
@@ -127,7 +127,7 @@ static void to_the_last_mac(void)
 }
 
 /* A step that is too long starts over from zero: the limit holds there too. */
-static void beside_step_halvings(void)
+TEST(beside_step_halvings)
 {
     dense_bench_close(&b);
     b.made =
@@ -180,9 +180,7 @@ static void of_a_whole_frame(int masked)
 
 int main(void)
 {
-    every_limit_holds();
-    to_the_last_mac();
-    beside_step_halvings();
+    run_tests();
     of_a_whole_frame(0);
     of_a_whole_frame(1);
     dense_bench_close(&b);

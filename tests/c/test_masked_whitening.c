@@ -132,7 +132,7 @@ static void noise_in_the_correlations(double noise)
     }
 }
 
-static void solvers_solve_the_seen_problem(void)
+TEST(solvers_solve_the_seen_problem)
 {
     for (int storage = 0; storage < 4; ++storage) {
         for (int sign = 0; sign < 3; ++sign) {
@@ -153,7 +153,7 @@ static void solvers_solve_the_seen_problem(void)
 /* Rows drop out one after another until none is left, with and without the drift: finite
  * throughout, zero where nothing is left, the same bits from both kernels and from a fresh context,
  * and the whole frame's own once all are back. */
-static void until_nothing_is_left(void)
+TEST(until_nothing_is_left)
 {
     for (int project = 0; project < 2; ++project) {
         bench b = {0}, fresh = {0};
@@ -191,7 +191,7 @@ static void until_nothing_is_left(void)
 }
 
 /* The values of rows left out are nothing to the answer, and drift of the gain is still ignored. */
-static void rows_out_do_not_count(void)
+TEST(rows_out_do_not_count)
 {
     eits_context *ctx = set_up(&b, WHITENED, 1);
     eits_real seen[2][STRIDE];
@@ -265,7 +265,7 @@ static uint32_t can_whiten_masked_with(double factor, eits_real first_of_whiteni
 
 /* A model that does not say how it was whitened keeps the projection; the unit of the data does
  * not matter. */
-static void models_of_another_form(void)
+TEST(models_of_another_form)
 {
     eits_real plain[RANK], scaled[RANK];
     CHECK(can_whiten_masked_with(1, plain));
@@ -294,10 +294,7 @@ int main(void)
     the_reduction_without_those_rows(0.5);
     noise_in_the_correlations(0);
     noise_in_the_correlations(0.02);
-    solvers_solve_the_seen_problem();
-    until_nothing_is_left();
-    rows_out_do_not_count();
-    models_of_another_form();
+    run_tests();
     dense_bench_close(&b.b);
     return checks_report("observed");
 }

@@ -27,7 +27,7 @@ static eits_status open_small(const small_model *model)
     return open_untouched(model->blob, model->size);
 }
 
-static void good_models_open(void)
+TEST(good_models_open)
 {
     for (int storage = 0; storage < 4; ++storage) {
         const int integer = storage >= EITS_STORAGE_I16;
@@ -78,7 +78,7 @@ static void good_models_open(void)
     }
 }
 
-static void null_and_misaligned(void)
+TEST(null_and_misaligned)
 {
     small_model made = small_model_make(TINY);
     eits_model model;
@@ -97,7 +97,7 @@ static void null_and_misaligned(void)
 
 /* Each shorter blob lies in memory of just its size, so that the address sanitizer sees a read
  * beyond it. */
-static void truncated_at_every_length(void)
+TEST(truncated_at_every_length)
 {
     small_model made = small_model_make(TINY);
     for (size_t length = 0; length < made.size; ++length) {
@@ -119,7 +119,7 @@ static void truncated_at_every_length(void)
     small_model_free(&made);
 }
 
-static void every_byte_flipped_in_turn(void)
+TEST(every_byte_flipped_in_turn)
 {
     small_model made = small_model_make(TINY);
     for (size_t at = 0; at < made.size; ++at) {
@@ -145,7 +145,7 @@ static void every_byte_flipped_in_turn(void)
     small_model_free(&made);
 }
 
-static void header_fields(void)
+TEST(header_fields)
 {
     small_model made = small_model_make(TINY);
     const uint32_t total = (uint32_t)made.size;
@@ -193,7 +193,7 @@ static uint32_t tag_of(const char *text)
     return small_get_u32((const uint8_t *)text);
 }
 
-static void missing_wrong_sized_and_misplaced_sections(void)
+TEST(missing_wrong_sized_and_misplaced_sections)
 {
     static const char *const tags[] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS",
                                        "COLW", "GRID", "DEFS", "GOLD", "SCAL"};
@@ -230,7 +230,7 @@ static void missing_wrong_sized_and_misplaced_sections(void)
     CHECK_EQUAL(with_entry(TINY, "XTRA", 0, tag_of("SCAL")), EITS_E_MODEL_SECTION);
 }
 
-static void unknown_and_repeated_sections(void)
+TEST(unknown_and_repeated_sections)
 {
     small_model made = small_model_make(TINY);
     uint8_t *meta = small_model_entry(&made, "META");
@@ -256,7 +256,7 @@ static void unknown_and_repeated_sections(void)
 }
 
 /* What a model says of its whitening must fit its P and itself; a model may say nothing. */
-static void row_forms(void)
+TEST(row_forms)
 {
     const small_spec spec = {.rank = 5, .side = 6, .shape = SMALL_WHITENED};
     small_model made = small_model_make(spec);
@@ -287,7 +287,7 @@ static void row_forms(void)
     CHECK_EQUAL(with_entry(spec, "WHIT", 0, tag_of("ZZZZ")), EITS_OK);
 }
 
-static void numbers_of_sections(void)
+TEST(numbers_of_sections)
 {
     static const uint32_t counts[] = {0,   1,   SMALL_SECTIONS - 1, 128,
                                       256, 257, 0x10000000u,        0xFFFFFFFFu};
@@ -314,16 +314,4 @@ static void numbers_of_sections(void)
     }
 }
 
-int main(void)
-{
-    good_models_open();
-    null_and_misaligned();
-    truncated_at_every_length();
-    every_byte_flipped_in_turn();
-    header_fields();
-    missing_wrong_sized_and_misplaced_sections();
-    unknown_and_repeated_sections();
-    row_forms();
-    numbers_of_sections();
-    return checks_report("model");
-}
+RUN_TESTS("model")

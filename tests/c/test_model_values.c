@@ -57,7 +57,7 @@ static eits_status with_order(uint32_t i, uint32_t j, uint32_t at, uint32_t valu
     return status;
 }
 
-static void orders_have_each_drive_once_and_whole(void)
+TEST(orders_have_each_drive_once_and_whole)
 {
     CHECK_EQUAL(with_order(0, 0, 80, 0, 160), EITS_OK);
     CHECK_EQUAL(with_order(0, 0, 80, 0, 158), EITS_E_MODEL_SECTION);
@@ -86,7 +86,7 @@ static eits_status with_place_factor(float factor, uint32_t size)
     return status;
 }
 
-static void a_place_factor_is_a_number_from_0_on(void)
+TEST(a_place_factor_is_a_number_from_0_on)
 {
     CHECK_EQUAL(with_place_factor(0, 4), EITS_OK);
     CHECK_EQUAL(with_place_factor(4.5f, 4), EITS_OK);
@@ -95,7 +95,7 @@ static void a_place_factor_is_a_number_from_0_on(void)
     CHECK_EQUAL(with_place_factor(NAN, 4), EITS_E_MODEL_VALUE);
 }
 
-static void dimensions(void)
+TEST(dimensions)
 {
     static const struct {
         uint32_t at, wrong[5], count;
@@ -141,7 +141,7 @@ static void dimensions(void)
     CHECK_EQUAL(with_word(TINY, "DIMS", 24, 4096), EITS_OK);
 }
 
-static void numbers_of_the_dimensions(void)
+TEST(numbers_of_the_dimensions)
 {
     for (uint32_t at = 40; at < 64; at += 4) {
         CHECK_EQUAL(with_number(TINY, "DIMS", at, NAN), EITS_E_MODEL_VALUE);
@@ -186,7 +186,7 @@ static eits_status with_electrodes(uint32_t count)
     return status;
 }
 
-static void electrodes_folds_and_pixels(void)
+TEST(electrodes_folds_and_pixels)
 {
     CHECK_EQUAL(with_electrodes(3), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_electrodes(4), EITS_OK);
@@ -234,7 +234,7 @@ static void electrodes_folds_and_pixels(void)
     CHECK_EQUAL(with_word(single, "GRID", 0, 1u << 16), EITS_E_MODEL_VALUE);
 }
 
-static void not_finite_in_each_section(void)
+TEST(not_finite_in_each_section)
 {
     static const char *const tags[] = {"VREF", "REDU", "SENS", "COLW", "GOLD"};
     static const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
@@ -341,7 +341,7 @@ static void multiply_f32(uint8_t *at, float factor)
 
 /* How the model was whitened: each number is checked against P, and s_1 against the greatest row.
  */
-static void whitening_form(void)
+TEST(whitening_form)
 {
     const small_spec spec = {.rank = 8, .side = 6, .shape = SMALL_WHITENED};
     CHECK_EQUAL(with_number(spec, "WHIT", 0, -1), EITS_E_MODEL_VALUE);
@@ -398,7 +398,7 @@ static void use(const small_model *made)
     free(memory);
 }
 
-static void every_byte_changed_and_sealed(void)
+TEST(every_byte_changed_and_sealed)
 {
     static const uint8_t changes[] = {0xFF, 0x80, 0x40, 0x01};
     for (int storage = 0; storage < 4; ++storage) {
@@ -420,7 +420,7 @@ static void every_byte_changed_and_sealed(void)
     }
 }
 
-static void many_bytes_changed_and_sealed(void)
+TEST(many_bytes_changed_and_sealed)
 {
     uint64_t state = 99;
     for (int round = 0; round < 2000; ++round) {
@@ -441,16 +441,8 @@ static void many_bytes_changed_and_sealed(void)
 
 int main(void)
 {
-    orders_have_each_drive_once_and_whole();
-    a_place_factor_is_a_number_from_0_on();
-    dimensions();
-    numbers_of_the_dimensions();
-    electrodes_folds_and_pixels();
-    not_finite_in_each_section();
+    run_tests();
     fields();
     defaults();
-    whitening_form();
-    every_byte_changed_and_sealed();
-    many_bytes_changed_and_sealed();
     return checks_report("model_values");
 }

@@ -22,7 +22,7 @@ static void finite_touches(const eits_context *ctx, const eits_touch *touches, u
 
 /* Pixels of 1e38 mm make a touch's strength infinite, and weights may have no inverse: then the
  * disc's response is. */
-static void touches_are_finite_whatever_the_units(void)
+TEST(touches_are_finite_whatever_the_units)
 {
     static const float units[][2] = {
         {1e38f, 0.02f}, {6.0f, 1e-45f}, {6.0f, 1e-39f}, {6.0f, 1e36f}, {1e-38f, 3e38f}};
@@ -83,7 +83,7 @@ static eits_real learn_noise(double first, double others)
 
 /* Deviations whose squares, in the first frame's unit, overflow: the noise is unknown, the
  * reference good all the same. Without that, however great the volts are, it is known. */
-static void noise_out_of_range_is_unknown(void)
+TEST(noise_out_of_range_is_unknown)
 {
     const double great = BOTH_WIDTHS(1e28, 1e250);
     CHECK_EQUAL(learn_noise(BOTH_WIDTHS(1e-25, 1e-200), 1), 0);
@@ -92,7 +92,7 @@ static void noise_out_of_range_is_unknown(void)
 }
 
 /* A reference frame that leads beyond the range is refused and does not count. */
-static void a_reference_frame_out_of_range_is_refused(void)
+TEST(a_reference_frame_out_of_range_is_refused)
 {
     small_model made = small_model_make(SPEC);
     uint8_t *reduction = small_model_section(&made, "REDU", NULL);
@@ -119,7 +119,7 @@ static void a_reference_frame_out_of_range_is_refused(void)
 
 /* Data whose squares vanish: norms and gaps say nothing, so the answer is zero, of every
  * solver. */
-static void data_too_small_to_square_give_zero(void)
+TEST(data_too_small_to_square_give_zero)
 {
     small_model made = small_model_make(SPEC);
     small_context c;
@@ -143,11 +143,4 @@ static void data_too_small_to_square_give_zero(void)
     small_model_free(&made);
 }
 
-int main(void)
-{
-    touches_are_finite_whatever_the_units();
-    noise_out_of_range_is_unknown();
-    a_reference_frame_out_of_range_is_refused();
-    data_too_small_to_square_give_zero();
-    return checks_report("out_of_range");
-}
+RUN_TESTS("out_of_range")

@@ -3,7 +3,7 @@
  */
 #include "spoiled_frame.h"
 
-static void a_clean_frame_has_no_diagnostics(void)
+TEST(a_clean_frame_has_no_diagnostics)
 {
     for (int known = 0; known < 2; ++known) {
         eits_context *ctx = set_up(&b, known);
@@ -16,7 +16,7 @@ static void a_clean_frame_has_no_diagnostics(void)
 
 /* The small model's P is arbitrary: nothing predicts, so both sides of a fold go; the noise is
  * known or told by all folds. */
-static void one_outlier_is_left_out(void)
+TEST(one_outlier_is_left_out)
 {
     for (int known = 0; known < 2; ++known) {
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -43,7 +43,7 @@ static void one_outlier_is_left_out(void)
 
 /* Many folds whose sides disagree: those that share an electrode leave with it; those that
  * share none are no network's. */
-static void many_outliers(void)
+TEST(many_outliers)
 {
     eits_context *ctx = set_up(&b, 1);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
@@ -69,7 +69,7 @@ static void many_outliers(void)
 }
 
 /* One reading of any of the reference frames: left out, and the reference is as without it. */
-static void an_outlier_in_the_reference(void)
+TEST(an_outlier_in_the_reference)
 {
     for (int at = 0; at < UNTOUCHED; ++at) {
         eits_context *ctx = set_up(&b, 1);
@@ -99,7 +99,7 @@ static void an_outlier_in_the_reference(void)
 
 /* Small voltages beside a row that is left out and reads nonsense: outliers are judged by the rows
  * in use alone, and so is the unit that deviations are summed in. */
-static void an_outlier_beside_an_unused_row(void)
+TEST(an_outlier_beside_an_unused_row)
 {
     eits_context *ctx = set_up(&b, 0);
     const uint32_t unused = b.c.model.fold[1].first;
@@ -118,7 +118,7 @@ static void an_outlier_beside_an_unused_row(void)
 }
 
 /* More readings of a reference frame than outliers are: it counts as it is. */
-static void reference_frame_of_another_kind(void)
+TEST(reference_frame_of_another_kind)
 {
     eits_context *ctx = set_up(&b, 1);
     for (uint32_t count = 1; count <= EITS_OUTLIER_MAX + 1; ++count) {
@@ -132,7 +132,7 @@ static void reference_frame_of_another_kind(void)
     }
 }
 
-static void medians(void)
+TEST(medians)
 {
     uint64_t state = 5;
     for (uint32_t n = 1; n < 40; ++n) {
@@ -152,7 +152,7 @@ static void medians(void)
     }
 }
 
-static void options_and_names(void)
+TEST(options_and_names)
 {
     eits_context *ctx = set_up(&b, 0);
     eits_options o = *eits_get_options(ctx);
@@ -168,16 +168,4 @@ static void options_and_names(void)
     CHECK(strcmp(eits_diagnostic_text((eits_diagnostic)0), "unknown diagnostic") == 0);
 }
 
-int main(void)
-{
-    a_clean_frame_has_no_diagnostics();
-    one_outlier_is_left_out();
-    many_outliers();
-    an_outlier_in_the_reference();
-    an_outlier_beside_an_unused_row();
-    reference_frame_of_another_kind();
-    medians();
-    options_and_names();
-    tear_down(&b);
-    return checks_report("diagnostics");
-}
+RUN_TESTS("diagnostics", tear_down(&b))

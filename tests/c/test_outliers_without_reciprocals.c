@@ -170,7 +170,7 @@ static void spoil(bench *b, uint32_t k, double off)
     copy_halves(b, b->frame);
 }
 
-static void clean_half_scans(void)
+TEST(clean_half_scans)
 {
     for (int project = 0; project < 2; ++project) {
         eits_context *ctx = set_up(&b, 1);
@@ -187,7 +187,7 @@ static void clean_half_scans(void)
 
 /* Left out with its copy, and counted; the image is that of a frame whose rows were known to be
  * bad. */
-static void one_outlier_of_a_half_scan(void)
+TEST(one_outlier_of_a_half_scan)
 {
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         eits_context *ctx = set_up(&b, 1);
@@ -229,7 +229,7 @@ static void one_outlier_of_a_half_scan(void)
 
 /* Which of several it is cannot be told without reciprocals; and reciprocals that differ by noise
  * bear each other out. */
-static void mismatches_that_are_no_outlier(void)
+TEST(mismatches_that_are_no_outlier)
 {
     eits_context *ctx = set_up(&b, 1);
     clean_frame(&b, 0.15);
@@ -270,7 +270,7 @@ static void mismatches_that_are_no_outlier(void)
 }
 
 /* How far the gain drifted is no news; an outlier beside it is. */
-static void drift_is_no_mismatch(void)
+TEST(drift_is_no_mismatch)
 {
     eits_context *ctx = set_up(&b, 0);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) { /* a reference that the model cannot give */
@@ -301,7 +301,7 @@ static void drift_is_no_mismatch(void)
 }
 
 /* Of a fold whose sides differ, the side that the others bear out stays. */
-static void the_wrong_side_goes(void)
+TEST(the_wrong_side_goes)
 {
     for (int kind = 0; kind < 3; ++kind) {
         for (uint32_t k = 0; k < SMALL_PAIRS; ++k) {
@@ -322,7 +322,7 @@ static void the_wrong_side_goes(void)
 }
 
 /* Two wrong of three that agree: the third tells. With one fold left out nothing tells. */
-static void several_wrong_sides(void)
+TEST(several_wrong_sides)
 {
     eits_context *ctx = set_up(&b, 0);
     for (uint32_t count = 1; count <= EITS_OUTLIER_MAX; ++count) {
@@ -348,7 +348,7 @@ static void several_wrong_sides(void)
 /* The thresholds, from both sides: noise, the fraction of the largest datum, the fraction of their
  * own.
  */
-static void what_sides_may_differ_by(void)
+TEST(what_sides_may_differ_by)
 {
     static const struct {
         double change, off, largest; /* of fold 4, of its second side, of fold 0 */
@@ -390,7 +390,7 @@ static int uses_either(const eits_context *ctx, uint32_t i)
 
 /* The channel of one pair: the rows measured across it go, their reciprocals stay. Of two
  * electrodes that share no channel, all. */
-static void noisy_channel(void)
+TEST(noisy_channel)
 {
     for (int crossed = 0; crossed < 2; ++crossed) {
         eits_context *ctx = open_shaped(&b, crossed ? CROSSED : PAIR, 0, EITS_DATA_DIFFERENCE);
@@ -411,16 +411,4 @@ static void noisy_channel(void)
     }
 }
 
-int main(void)
-{
-    clean_half_scans();
-    one_outlier_of_a_half_scan();
-    mismatches_that_are_no_outlier();
-    drift_is_no_mismatch();
-    the_wrong_side_goes();
-    several_wrong_sides();
-    what_sides_may_differ_by();
-    noisy_channel();
-    tear_down(&b);
-    return checks_report("unpaired");
-}
+RUN_TESTS("unpaired", tear_down(&b))

@@ -64,7 +64,7 @@ static void reference(float volts, double measured, eits_status expected)
           (isfinite((double)ctx->reference.gain) && ctx->reference.gain != 0));
 }
 
-static void references_out_of_proportion_never_give_nan(void)
+TEST(references_out_of_proportion_never_give_nan)
 {
     const eits_status narrow_only = BOTH_WIDTHS(EITS_E_FRAME_ZERO, EITS_OK);
     reference(1, 1, EITS_OK);
@@ -97,7 +97,7 @@ static void check_cleared(const eits_context *ctx)
           isfinite((double)eits_get_info(ctx)->lambda));
 }
 
-static void correlations_that_overflow_never_give_nan(void)
+TEST(correlations_that_overflow_never_give_nan)
 {
     for (int solver = 0; solver < 4; ++solver) {
         make(&b, 12);
@@ -136,7 +136,7 @@ static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_l
     return info;
 }
 
-static void columns_whose_squares_vanish_never_give_nan(void)
+TEST(columns_whose_squares_vanish_never_give_nan)
 {
     static const double sizes[] = {1, 1e16};
     for (int solver = EITS_SOLVER_COORDINATE; solver <= EITS_SOLVER_ACTIVE_SET; ++solver) {
@@ -154,11 +154,4 @@ static void columns_whose_squares_vanish_never_give_nan(void)
     }
 }
 
-int main(void)
-{
-    references_out_of_proportion_never_give_nan();
-    correlations_that_overflow_never_give_nan();
-    columns_whose_squares_vanish_never_give_nan();
-    tear_down(&b);
-    return checks_report("overflow");
-}
+RUN_TESTS("overflow", tear_down(&b))

@@ -44,7 +44,7 @@ static void reference_frame(bench *b, double gain, double noise, uint64_t *state
             (eits_real)((1 + 0.01 * small_random(&channels)) * (1 + noise * small_random(state)));
 }
 
-static void gain_and_correlation(void)
+TEST(gain_and_correlation)
 {
     eits_context *ctx = set_up(&b);
     static const double gains[] = {1, 2.5, -0.75, 1e-6, -1e6};
@@ -79,7 +79,7 @@ static void gain_and_correlation(void)
     CHECK_NEAR(ctx->reference.v0_rms, sqrt(vv / SMALL_FOLDED), 20 * EPS);
 }
 
-static void refused_frames(void)
+TEST(refused_frames)
 {
     eits_context *ctx = set_up(&b);
     small_reference(&b.c.model, 1, b.frame);
@@ -114,7 +114,7 @@ static void refused_frames(void)
 }
 
 /* A reference that cannot be one leaves the old one in force, to the bit. */
-static void all_zero_keeps_the_old(void)
+TEST(all_zero_keeps_the_old)
 {
     eits_context *ctx = set_up(&b);
     eits_real frame[SMALL_ROWS], wrong[SMALL_ROWS] = {0}, before[16], after[16], v0[SMALL_ROWS];
@@ -148,7 +148,7 @@ static void all_zero_keeps_the_old(void)
     }
 }
 
-static void order_of_learning(void)
+TEST(order_of_learning)
 {
     eits_context *ctx = set_up(&b);
     uint64_t state = 9;
@@ -272,7 +272,7 @@ static void learned_numbers(int project)
 /* A row masked in any of the reference frames has no reference, and does not disturb the others'
  * noise.
  */
-static void masked_while_learning(void)
+TEST(masked_while_learning)
 {
     double noise[2];
     for (int masked = 0; masked < 2; ++masked) {
@@ -302,7 +302,7 @@ static void masked_while_learning(void)
 }
 
 /* References that say nothing of the model, and masks that leave nothing of the reference. */
-static void nothing_to_compare(void)
+TEST(nothing_to_compare)
 {
     eits_context *ctx = set_up(&b);
     uint64_t state = 34;
@@ -347,7 +347,7 @@ static void nothing_to_compare(void)
 }
 
 /* Offsets far above the noise do not drown it (Welford). */
-static void noise_on_a_large_offset(void)
+TEST(noise_on_a_large_offset)
 {
     eits_context *ctx = set_up(&b);
     uint64_t state = 21;
@@ -374,15 +374,9 @@ static void noise_on_a_large_offset(void)
 
 int main(void)
 {
-    gain_and_correlation();
-    refused_frames();
-    all_zero_keeps_the_old();
-    order_of_learning();
+    run_tests();
     learned_numbers(0);
     learned_numbers(1);
-    masked_while_learning();
-    nothing_to_compare();
-    noise_on_a_large_offset();
     tear_down(&b);
     return checks_report("reference");
 }

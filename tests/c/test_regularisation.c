@@ -22,7 +22,7 @@ static double weight(int i, double mu)
 }
 
 /* F is D, and y is D P d, of the regularisation that the noise asks for. */
-static void the_formula(void)
+TEST(the_formula)
 {
     const double noises[] = {2.1e-3, 0.01, 0.1, 0.9};
     for (size_t n = 0; n < sizeof noises / sizeof noises[0]; ++n) {
@@ -57,7 +57,7 @@ static void the_formula(void)
 
 /* White noise on all rows: in the correlations, as a root mean square over S's columns, and in
  * |y|^2. */
-static void noise_through_it(void)
+TEST(noise_through_it)
 {
     eits_context *ctx = set_up(&b, WHITENED, 0);
     const double stored = (double)ctx->whitening.energy;
@@ -79,7 +79,7 @@ static void noise_through_it(void)
     CHECK_NEAR(ctx->whitening.energy, stored, 0);
 }
 
-static void solvers_solve_the_seen_problem(void)
+TEST(solvers_solve_the_seen_problem)
 {
     for (int storage = 0; storage < 4; ++storage) {
         for (int sign = 0; sign < 3; ++sign) {
@@ -103,7 +103,7 @@ static void reconstruct(bench *b, eits_real image[N])
 
 /* The model's own bits where nothing is known of the noise, or nothing asked for, or hardly more
  * than there is; raised ones are the same from all kernels, and go with the option. */
-static void only_where_asked_for(void)
+TEST(only_where_asked_for)
 {
     bench b = {0}, other = {0};
     eits_real plain[N], image[N], raised[N];
@@ -150,7 +150,7 @@ static void only_where_asked_for(void)
 
 /* Models of another form stay as they are, and so do those whose numbers overflow; one without a
  * regularisation gets one. */
-static void models_of_other_forms(void)
+TEST(models_of_other_forms)
 {
     small_spec spec = WHITENED;
     spec.shape = SMALL_RANDOM;
@@ -178,7 +178,7 @@ static void models_of_other_forms(void)
 
 /* The reference frames' own noise raises the regularisation for the second half of them already,
  * and lambda_noise is as with the model's. */
-static void learned_with_it(void)
+TEST(learned_with_it)
 {
     enum { UNTOUCHED = 4 };
     eits_context *ctx = set_up(&b, WHITENED, 0);
@@ -213,14 +213,4 @@ static void learned_with_it(void)
     free(back);
 }
 
-int main(void)
-{
-    the_formula();
-    noise_through_it();
-    solvers_solve_the_seen_problem();
-    only_where_asked_for();
-    models_of_other_forms();
-    learned_with_it();
-    dense_bench_close(&b.b);
-    return checks_report("floor");
-}
+RUN_TESTS("floor", dense_bench_close(&b.b))

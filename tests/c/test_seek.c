@@ -57,7 +57,7 @@ static int has(const eits_touch *touch, uint32_t count, const eits_disc *disc)
     return 0;
 }
 
-static void touches_that_the_image_does_not_show_are_found(void)
+TEST(touches_that_the_image_does_not_show_are_found)
 {
     static const struct {
         uint32_t count;
@@ -97,7 +97,7 @@ static void touches_that_the_image_does_not_show_are_found(void)
     }
 }
 
-static void what_explains_too_little_is_no_touch(void)
+TEST(what_explains_too_little_is_no_touch)
 {
     const eits_disc disc[2] = {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(0.02), 1}};
     dense_bench b = {0};
@@ -122,7 +122,7 @@ static void what_explains_too_little_is_no_touch(void)
 
 /* Sought discs go from a pixel's centre by whole pixels: so they come to lie there, and rounding
  * must not decide whether the rim's pixel is near. */
-static void a_disc_a_whole_pixel_beyond_the_rim_is_no_touch(void)
+TEST(a_disc_a_whole_pixel_beyond_the_rim_is_no_touch)
 {
     static const struct {
         eits_real beyond; /* of the rim's pixel, pixels */
@@ -163,7 +163,7 @@ static void answer(eits_context *ctx, const eits_touch *touch, double dx, double
 }
 
 /* C = unit (G'G)^-1, G by finite differences, beside the answers of both touches. */
-static void a_place_is_as_sure_as_the_fit_and_the_models_factor_say(void)
+TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
 {
     static const eits_disc disc[2] = {{-10, 3, 9, R(0.05), 1}, {14, 3, 9, R(0.05), 1}};
     const double step = sizeof(eits_real) == 4 ? 0.02 : 1e-4, factor = 2.5;
@@ -204,7 +204,7 @@ static void a_place_is_as_sure_as_the_fit_and_the_models_factor_say(void)
 }
 
 /* A touch that nothing is left beside has no place to be unsure of. */
-static void without_a_residual_a_place_is_not_rated(void)
+TEST(without_a_residual_a_place_is_not_rated)
 {
     static const eits_disc disc = {-21, 9, 9, R(0.05), 1};
     dense_bench b = {0};
@@ -225,12 +225,4 @@ static void without_a_residual_a_place_is_not_rated(void)
     dense_bench_close(&b);
 }
 
-int main(void)
-{
-    touches_that_the_image_does_not_show_are_found();
-    what_explains_too_little_is_no_touch();
-    a_disc_a_whole_pixel_beyond_the_rim_is_no_touch();
-    a_place_is_as_sure_as_the_fit_and_the_models_factor_say();
-    without_a_residual_a_place_is_not_rated();
-    return checks_report("seek");
-}
+RUN_TESTS("seek")

@@ -56,7 +56,7 @@ static eits_info solve(eits_context *ctx, uint32_t iterations, eits_sign sign, d
     return *eits_get_info(ctx);
 }
 
-static void identity_gives_the_soft_threshold(void)
+TEST(identity_gives_the_soft_threshold)
 {
     const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 1};
     for (int sign = 0; sign < 3; ++sign) {
@@ -86,7 +86,7 @@ static void identity_gives_the_soft_threshold(void)
     }
 }
 
-static void same_as_the_textbook(void)
+TEST(same_as_the_textbook)
 {
     static const uint32_t counts[] = {1, 2, 3, 11, 60};
     for (int storage = 0; storage < 4; ++storage) {
@@ -115,7 +115,7 @@ static void same_as_the_textbook(void)
 }
 
 /* Panels, portable and fastest kernels: the same bits of image and info. */
-static void same_bits_in_every_layout(void)
+TEST(same_bits_in_every_layout)
 {
     for (int storage = 0; storage < 4; ++storage) {
         eits_real first[N];
@@ -137,7 +137,7 @@ static void same_bits_in_every_layout(void)
     }
 }
 
-static void optimum_has_its_marks(void)
+TEST(optimum_has_its_marks)
 {
     for (int sign = 0; sign < 3; ++sign) {
         eits_context *ctx = set_up(&b, RANDOM, 1);
@@ -174,7 +174,7 @@ static void optimum_has_its_marks(void)
     }
 }
 
-static void gap_bounds_the_suboptimality(void)
+TEST(gap_bounds_the_suboptimality)
 {
     static const uint32_t counts[] = {1, 2, 4, 8, 16, 32, 64, 128};
     for (int sign = 0; sign < 3; ++sign) {
@@ -202,7 +202,7 @@ static void gap_bounds_the_suboptimality(void)
     }
 }
 
-static void stopping_by_the_gap(void)
+TEST(stopping_by_the_gap)
 {
     eits_context *ctx = set_up(&b, RANDOM, 0);
     CHANGE_OPTIONS(ctx, o.gap_rel = R(1e-3), o.gap_every = 7);
@@ -222,7 +222,7 @@ static void stopping_by_the_gap(void)
     CHECK(info.stop == EITS_STOP_GAP && info.iterations == 3);
 }
 
-static void zero_is_the_optimum(void)
+TEST(zero_is_the_optimum)
 {
     for (int sign = 0; sign < 3; ++sign) {
         eits_context *ctx = set_up(&b, RANDOM, 0);
@@ -259,7 +259,7 @@ static void zero_is_the_optimum(void)
 
 /* Rows that are left out: the same as the dense problem with their directions taken out of S and y.
  */
-static void solving_beside_a_basis(void)
+TEST(solving_beside_a_basis)
 {
     eits_context *ctx = set_up(&b, RANDOM, 1);
     eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
@@ -295,7 +295,7 @@ static void solving_beside_a_basis(void)
 
 /* On the identity with one positive datum each iterate has one non-zero, so that each product can
  * be counted by hand. */
-static void work_is_counted(void)
+TEST(work_is_counted)
 {
     const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
     eits_context *ctx = set_up(&b, spec, 0);
@@ -364,17 +364,4 @@ static void work_is_counted(void)
                                (whole + 2 * triangle));
 }
 
-int main(void)
-{
-    identity_gives_the_soft_threshold();
-    same_as_the_textbook();
-    same_bits_in_every_layout();
-    optimum_has_its_marks();
-    gap_bounds_the_suboptimality();
-    stopping_by_the_gap();
-    zero_is_the_optimum();
-    solving_beside_a_basis();
-    work_is_counted();
-    tear_down(&b);
-    return checks_report("solve");
-}
+RUN_TESTS("solve", tear_down(&b))

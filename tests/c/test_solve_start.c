@@ -34,7 +34,7 @@ static eits_info solve(eits_context *ctx)
 }
 
 /* After a halved step the iterations that are left are those from zero, with fresh momentum. */
-static void a_halved_step_starts_afresh(void)
+TEST(a_halved_step_starts_afresh)
 {
     small_spec spec = RANDOM;
     spec.lipschitz_factor = 1.02 / 6;
@@ -59,7 +59,7 @@ static void a_halved_step_starts_afresh(void)
 
 /* The residual is small at the start, but the penalty is not: zero is the better start, to the bit.
  */
-static void a_start_worse_than_zero(void)
+TEST(a_start_worse_than_zero)
 {
     for (int solver = 0; solver < 4; ++solver) {
         bench warm = {0}, cold = {0};
@@ -108,7 +108,7 @@ static eits_context *open_warm(bench *b, int solver)
 }
 
 /* Whether touches are looked for between warm frames makes no difference to the images. */
-static void touches_leave_no_trace(void)
+TEST(touches_leave_no_trace)
 {
     for (int solver = 0; solver < 4; ++solver) {
         bench seen = {0}, unseen = {0};
@@ -132,7 +132,7 @@ static void touches_leave_no_trace(void)
 
 /* A frame after one that was refused, or showed nothing, starts cold: the same bits for the same
  * MACs as in a fresh context. */
-static void cold_after_nothing(void)
+TEST(cold_after_nothing)
 {
     for (int why = 0; why < 3; ++why) {
         bench b = {0}, fresh = {0};
@@ -166,7 +166,7 @@ static void cold_after_nothing(void)
 }
 
 /* No interval is so long that it comes round to a short one. */
-static void the_longest_intervals(void)
+TEST(the_longest_intervals)
 {
     static const uint32_t intervals[] = {1000, UINT32_MAX - 1, UINT32_MAX};
     uint64_t macs[3];
@@ -183,7 +183,7 @@ static void the_longest_intervals(void)
 
 /* A hundred thousand iterations end where the gap cannot fall any further, and nothing grows on the
  * way. */
-static void iterations_without_number(void)
+TEST(iterations_without_number)
 {
     for (int solver = 0; solver < 4; ++solver) {
         eits_context *ctx = dense_bench_open(&b, RANDOM, 1);
@@ -203,7 +203,7 @@ static void iterations_without_number(void)
 
 /* Steps more than twice too long that throw every coefficient beyond its sign, to zero, whenever
  * one looks. */
-static void steps_that_end_at_zero(void)
+TEST(steps_that_end_at_zero)
 {
     for (int factor = 40; factor < 50; factor += 3) {
         for (uint32_t every = 1; every < 6; ++every) {
@@ -225,15 +225,4 @@ static void steps_that_end_at_zero(void)
     }
 }
 
-int main(void)
-{
-    a_halved_step_starts_afresh();
-    a_start_worse_than_zero();
-    touches_leave_no_trace();
-    cold_after_nothing();
-    the_longest_intervals();
-    iterations_without_number();
-    steps_that_end_at_zero();
-    dense_bench_close(&b);
-    return checks_report("starts");
-}
+RUN_TESTS("starts", dense_bench_close(&b))

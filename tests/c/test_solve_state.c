@@ -51,7 +51,7 @@ static eits_info solve(eits_context *ctx)
     return *eits_get_info(ctx);
 }
 
-static void detection_threshold_and_lambda_rule(void)
+TEST(detection_threshold_and_lambda_rule)
 {
     eits_context *ctx = set_up(&b, RANDOM);
     fill_y(&b, 1, 0, 0);
@@ -92,7 +92,7 @@ static void detection_threshold_and_lambda_rule(void)
     CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS);
 }
 
-static void warm_start_saves_iterations(void)
+TEST(warm_start_saves_iterations)
 {
     uint32_t needed[2];
     for (uint32_t warm = 0; warm < 2; ++warm) {
@@ -113,7 +113,7 @@ static void warm_start_saves_iterations(void)
 
 /* After lift-off, a frame of noise with the touch's coefficients as its start: what is left is what
  * a cold start gives. */
-static void no_ghost_after_lift_off(void)
+TEST(no_ghost_after_lift_off)
 {
     eits_context *ctx = set_up(&b, RANDOM);
     CHANGE_OPTIONS(ctx, o.warm_start = 1, o.iterations = 20);
@@ -136,7 +136,7 @@ static void no_ghost_after_lift_off(void)
     free(after);
 }
 
-static void warm_start_is_forgotten(void)
+TEST(warm_start_is_forgotten)
 {
     eits_context *ctx = set_up(&b, RANDOM);
     eits_options o = *eits_get_options(ctx);
@@ -172,7 +172,7 @@ static void warm_start_is_forgotten(void)
 }
 
 /* A stated Lipschitz constant that is too small: the step is halved until the objective falls. */
-static void step_too_large(void)
+TEST(step_too_large)
 {
     static const double factors[] = {0.3, 0.125, 0.02};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
@@ -212,7 +212,7 @@ static void step_too_large(void)
 
 /* On the identity one step of s takes the objective, for any lambda, to its start's value just
  * where s = 2: a run that ends above it has won nothing. */
-static void ending_above_the_start(void)
+TEST(ending_above_the_start)
 {
     for (int k = 0; k < 4; ++k) {
         const int above = k % 2;
@@ -231,7 +231,7 @@ static void ending_above_the_start(void)
     }
 }
 
-static void step_absurdly_large(void)
+TEST(step_absurdly_large)
 {
     static const double factors[] = {1e-4, 1e-12, 1e-36};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
@@ -256,7 +256,7 @@ static void step_absurdly_large(void)
     }
 }
 
-static void data_that_are_not_finite(void)
+TEST(data_that_are_not_finite)
 {
     eits_context *ctx = set_up(&b, RANDOM);
     static const double wrong[] = {NAN, INFINITY, -INFINITY, BOTH_WIDTHS(1e30, 1e200)};
@@ -290,7 +290,7 @@ static void data_that_are_not_finite(void)
 
 /* Frames in other units: the gain takes them up. By powers of two to the bit, by others within
  * rounding. */
-static void units_do_not_matter(void)
+TEST(units_do_not_matter)
 {
     static const double units[] = {1, 0x1p-20, 0x1p20, 0x1p-60, 1e-6, 1e-3, 3.7, 1e6, -1, -1e-6};
     eits_real first[N], frame[SMALL_ROWS], reference[SMALL_ROWS];
@@ -338,17 +338,4 @@ static void units_do_not_matter(void)
     }
 }
 
-int main(void)
-{
-    detection_threshold_and_lambda_rule();
-    warm_start_saves_iterations();
-    no_ghost_after_lift_off();
-    warm_start_is_forgotten();
-    step_too_large();
-    ending_above_the_start();
-    step_absurdly_large();
-    data_that_are_not_finite();
-    units_do_not_matter();
-    dense_bench_close(&b);
-    return checks_report("solve_state");
-}
+RUN_TESTS("solve_state", dense_bench_close(&b))

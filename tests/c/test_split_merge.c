@@ -98,7 +98,7 @@ static void two_halves_become_one(int first)
 }
 
 /* Tried or not, what is not joined stays as it was, bit for bit. */
-static void two_touches_stay_two(void)
+TEST(two_touches_stay_two)
 {
     static const eits_real distances[] = {20, 24, 36};
     for (int d = 0; d < 3; ++d) {
@@ -120,7 +120,7 @@ static void two_touches_stay_two(void)
     }
 }
 
-static void opposite_signs_are_never_one(void)
+TEST(opposite_signs_are_never_one)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc truth[2] = {{-3, 3, 9, R(0.05), 1}, {3, 3, 9, R(-0.05), -1}};
@@ -133,7 +133,7 @@ static void opposite_signs_are_never_one(void)
 
 /* Nearest first: of three in a row whose outer ones are nearer to the middle than to each other,
  * one is left for one touch. */
-static void three_thirds_become_one(void)
+TEST(three_thirds_become_one)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc one = {3, 3, 12, R(0.05), 1};
@@ -147,7 +147,7 @@ static void three_thirds_become_one(void)
     CHECK(has(&f, &one, 2));
 }
 
-static void one_disc_over_two_touches_becomes_two(void)
+TEST(one_disc_over_two_touches_becomes_two)
 {
     static const eits_real along[4][2] = {
         {1, 0}, {R(0.70711), R(0.70711)}, {0, 1}, {R(-0.70711), R(0.70711)}};
@@ -179,7 +179,7 @@ static void one_disc_over_two_touches_becomes_two(void)
 }
 
 /* Two explain more than one, but little of what is left: that may as well be something else. */
-static void a_split_that_gains_little_is_undone(void)
+TEST(a_split_that_gains_little_is_undone)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc truth[2] = {{-10, 6, 9, R(0.05), 1}, {18, 6, 9, R(0.05), 1}},
@@ -203,7 +203,7 @@ static void a_split_that_gains_little_is_undone(void)
     }
 }
 
-static void one_large_touch_stays_one(void)
+TEST(one_large_touch_stays_one)
 {
     static const eits_real others[] = {0, R(0.01), R(0.05), R(0.2)};
     for (int rest = 0; rest < 4; ++rest) { /* whatever else is in the data */
@@ -235,7 +235,7 @@ static uint32_t found(eits_context *ctx, uint32_t bits, eits_touch *touch)
 }
 
 /* Two touches that the image shows as one peak. */
-static void one_peak_two_touches(void)
+TEST(one_peak_two_touches)
 {
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
@@ -274,7 +274,7 @@ static eits_context *open_pair(dense_bench *b, small_spec spec, uint32_t second_
     return ctx;
 }
 
-static void the_second_pass_solves_the_separate_data(void)
+TEST(the_second_pass_solves_the_separate_data)
 {
     dense_bench b = {0}, plain = {0};
     eits_touch touch[EITS_MAX_TOUCHES];
@@ -307,7 +307,7 @@ static void the_second_pass_solves_the_separate_data(void)
 
 /* One solve more than without: not for one touch, without fields, uncoupled, or with a limit of
  * multiply-accumulates. */
-static void when_there_is_no_second_pass(void)
+TEST(when_there_is_no_second_pass)
 {
     static const struct {
         small_spec spec;
@@ -336,7 +336,7 @@ static void when_there_is_no_second_pass(void)
 }
 
 /* Data of which nothing comes: the frame's own image stays, and its data. */
-static void nothing_comes_of_it(void)
+TEST(nothing_comes_of_it)
 {
     eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0);
     const eits_real nothing[RANK] = {0}, infinite[RANK] = {R(INFINITY)};
@@ -360,7 +360,7 @@ static void nothing_comes_of_it(void)
 }
 
 /* The batch's image is the one that eits_find_touches leaves. */
-static void images_of_a_batch(void)
+TEST(images_of_a_batch)
 {
     eits_real frame[2][SMALL_ROWS], image[2][SIDE * SIDE];
     eits_touch touch[2][EITS_MAX_TOUCHES], alone[EITS_MAX_TOUCHES];
@@ -392,7 +392,7 @@ static void images_of_a_batch(void)
     CHECK(after_second_pass > 0);
 }
 
-static void options_have_ranges(void)
+TEST(options_have_ranges)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     eits_options o;
@@ -415,18 +415,7 @@ int main(void)
 {
     two_halves_become_one(0);
     two_halves_become_one(1);
-    two_touches_stay_two();
-    opposite_signs_are_never_one();
-    three_thirds_become_one();
-    one_disc_over_two_touches_becomes_two();
-    a_split_that_gains_little_is_undone();
-    one_large_touch_stays_one();
-    one_peak_two_touches();
-    the_second_pass_solves_the_separate_data();
-    when_there_is_no_second_pass();
-    nothing_comes_of_it();
-    images_of_a_batch();
-    options_have_ranges();
+    run_tests();
     dense_bench_close(&b);
     return checks_report("regroup");
 }

@@ -101,7 +101,7 @@ static const eits_touch *check_found(const bench *b, finger f, double apart, dou
     return best;
 }
 
-static void one_touch_anywhere(void)
+TEST(one_touch_anywhere)
 {
     uint64_t state = 92;
     for (int storage = 0; storage < 4; ++storage) {
@@ -123,7 +123,7 @@ static void one_touch_anywhere(void)
     }
 }
 
-static void both_signs(void)
+TEST(both_signs)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger pair[2] = {{-25, 10, 9, 0.05}, {25, -12, 9, -0.03}};
@@ -145,7 +145,7 @@ static void both_signs(void)
               (double)b.found[k].strength_s_per_m_mm2 < 0.5 * fabs(strength(pair[1])));
 }
 
-static void two_touches_and_one(void)
+TEST(two_touches_and_one)
 {
     (void)set_up(&b, EITS_STORAGE_F32, 0);
     const finger three[3] = {{-30, -25, 9, 0.05}, {30, -20, 8, 0.04}, {0, 30, 10, 0.06}};
@@ -172,7 +172,7 @@ static void two_touches_and_one(void)
     CHECK(seen[2] >= 4 && seen[1] >= 1);
 }
 
-static void dropped_and_limited(void)
+TEST(dropped_and_limited)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger two[2] = {{-27, 3, 9, 0.05}, {25, 5, 9, 0.015}};
@@ -209,7 +209,7 @@ static void dropped_and_limited(void)
 
 /* More peaks than there is room for: the highest are kept, in order, and no memory beyond is
  * touched. */
-static void many_peaks(void)
+TEST(many_peaks)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     CHANGE_OPTIONS(ctx, o.touch_sweeps = 0, o.touch_threshold = 0, o.touch_min_fraction = 0,
@@ -245,7 +245,7 @@ static void many_peaks(void)
     }
 }
 
-static void no_touch_below_the_detection_threshold(void)
+TEST(no_touch_below_the_detection_threshold)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger two[2] = {{-25, 0, 9, 0.05}, {25, 5, 9, 0.015}};
@@ -268,7 +268,7 @@ static void no_touch_below_the_detection_threshold(void)
           eits_get_info(ctx)->touch_macs == 0);
 }
 
-static void without_sweeps(void)
+TEST(without_sweeps)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger f = {16.5, -8.5, 9, 0.05};
@@ -282,7 +282,7 @@ static void without_sweeps(void)
     CHECK_NEAR(t.strength_s_per_m_mm2, strength(f), 0.15 * strength(f));
 }
 
-static void radius_by_strength(void)
+TEST(radius_by_strength)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const eits_options defaults = *eits_get_options(ctx);
@@ -314,7 +314,7 @@ static void radius_by_strength(void)
     }
 }
 
-static void at_rim_and_corner(void)
+TEST(at_rim_and_corner)
 {
     static const finger edges[] = {{-57, -57, 9, 0.05}, {57, 57, 9, 0.05},  {60, 0, 9, 0.05},
                                    {-60, 10, 9, 0.05},  {-57, 57, 9, 0.05}, {7, -58, 9, 0.05},
@@ -338,7 +338,7 @@ static void at_rim_and_corner(void)
     }
 }
 
-static void nothing_to_find(void)
+TEST(nothing_to_find)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger f = {10, 10, 9, 0.05}, two[2] = {{-25, 0, 9, 0.05}, {25, 5, 9, 0.03}};
@@ -364,18 +364,4 @@ static void nothing_to_find(void)
     CHECK(memcmp(image, eits_get_image(ctx), sizeof image) == 0);
 }
 
-int main(void)
-{
-    one_touch_anywhere();
-    both_signs();
-    two_touches_and_one();
-    dropped_and_limited();
-    many_peaks();
-    no_touch_below_the_detection_threshold();
-    without_sweeps();
-    radius_by_strength();
-    at_rim_and_corner();
-    nothing_to_find();
-    tear_down(&b);
-    return checks_report("touch");
-}
+RUN_TESTS("touch", tear_down(&b))

@@ -49,7 +49,7 @@ static uint64_t touch_macs(eits_context *ctx, uint32_t expected_touches)
 }
 
 /* Discs at pixel centres, of the seed's radius, held there: every product can be counted. */
-static void work_is_counted(void)
+TEST(work_is_counted)
 {
     small_model made;
     small_context c;
@@ -80,7 +80,7 @@ static void work_is_counted(void)
     small_model_free(&made);
 }
 
-static void units_do_not_matter(void)
+TEST(units_do_not_matter)
 {
     small_model made;
     small_context c;
@@ -130,7 +130,7 @@ static double unexplained(const double *y, const double *atoms, uint32_t count, 
 /* What a touch explains is the fraction of |y|^2 that leaving the touch out leaves unexplained, the
  * others taking up what they can: for discs that overlap, at pixel centres, with their strengths
  * alone fitted. One peak of the image has nothing behind it. */
-static void explained_is_what_leaving_out_costs(void)
+TEST(explained_is_what_leaving_out_costs)
 {
     /* x, y mm, change */
     static const double places[4][3] = {{-27, -27, 0}, {-3, 3, 0.05}, {15, 9, 0.04}, {3, 21, 0.03}};
@@ -178,7 +178,7 @@ static void explained_is_what_leaving_out_costs(void)
 
 /* A touch must stand out of the noise at its own place: at the greatest S_j'(its part) of the 3 x 3
  * pixels around it. */
-static void each_touch_must_exceed_the_detection_threshold(void)
+TEST(each_touch_must_exceed_the_detection_threshold)
 {
     small_model made;
     small_context c;
@@ -208,7 +208,7 @@ static void each_touch_must_exceed_the_detection_threshold(void)
 }
 
 /* Data that stand out of the noise tell the radius; in noise it is what strength suggests. */
-static void radius_by_the_data_or_by_the_noise(void)
+TEST(radius_by_the_data_or_by_the_noise)
 {
     static const double noises[] = {1e-5, 0.02, 4};
     static const double radii[] = {12, 12, 9};
@@ -236,12 +236,4 @@ static void radius_by_the_data_or_by_the_noise(void)
     }
 }
 
-int main(void)
-{
-    explained_is_what_leaving_out_costs();
-    each_touch_must_exceed_the_detection_threshold();
-    work_is_counted();
-    units_do_not_matter();
-    radius_by_the_data_or_by_the_noise();
-    return checks_report("touch_fit");
-}
+RUN_TESTS("touch_fit")

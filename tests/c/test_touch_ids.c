@@ -25,7 +25,7 @@ static eits_touch at(double x, double y)
     return (eits_touch){.id = 77, .x_mm = (eits_real)x, .y_mm = (eits_real)y, .radius_mm = 9};
 }
 
-static void ids_follow_moves_and_not_jumps(void)
+TEST(ids_follow_moves_and_not_jumps)
 {
     eits_context *ctx = set_up(&b, 10);
     eits_touch t = at(0, 0);
@@ -53,7 +53,7 @@ static void ids_follow_moves_and_not_jumps(void)
 
 /* Two that pass each other: nearness says which is which, whatever the order in which they
  * are listed. */
-static void crossing(void)
+TEST(crossing)
 {
     eits_context *ctx = set_up(&b, 25);
     for (int k = 0; k <= 20; ++k) {
@@ -67,7 +67,7 @@ static void crossing(void)
 
 /* The nearest pairs first: the one that moved little keeps its id, though another is within reach
  * as well. */
-static void nearest_first(void)
+TEST(nearest_first)
 {
     eits_context *ctx = set_up(&b, 30);
     eits_touch first[3] = {at(0, 0), at(20, 0), at(40, 0)};
@@ -86,7 +86,7 @@ static void nearest_first(void)
     CHECK(more[1].id == 4 && more[0].id == 5);
 }
 
-static void all_of_a_full_house(void)
+TEST(all_of_a_full_house)
 {
     eits_context *ctx = set_up(&b, 5);
     uint32_t ids[EITS_MAX_TOUCHES];
@@ -110,7 +110,7 @@ static void all_of_a_full_house(void)
     CHECK_EQUAL(ctx->tracker.next_id, EITS_MAX_TOUCHES + 1);
 }
 
-static void following_may_be_off(void)
+TEST(following_may_be_off)
 {
     eits_context *ctx = set_up(&b, 0);
     eits_touch t = at(1, 2);
@@ -122,7 +122,7 @@ static void following_may_be_off(void)
     CHECK_EQUAL(t.id, 2);
 }
 
-static void zero_is_never_an_id(void)
+TEST(zero_is_never_an_id)
 {
     eits_context *ctx = set_up(&b, 5);
     ctx->tracker.next_id = UINT32_MAX - 1;
@@ -133,7 +133,7 @@ static void zero_is_never_an_id(void)
 
 /* From data to ids: a disc that moves keeps its id, is lifted and comes back with a new one, jumps
  * and is another. */
-static void through_the_whole_core(void)
+TEST(through_the_whole_core)
 {
     eits_context *ctx =
         dense_bench_open(&b, (small_spec){.rank = 64, .side = 20, .shape = SMALL_WAVES}, 0);
@@ -163,15 +163,4 @@ static void through_the_whole_core(void)
     }
 }
 
-int main(void)
-{
-    through_the_whole_core();
-    ids_follow_moves_and_not_jumps();
-    crossing();
-    nearest_first();
-    all_of_a_full_house();
-    following_may_be_off();
-    zero_is_never_an_id();
-    dense_bench_close(&b);
-    return checks_report("touch ids");
-}
+RUN_TESTS("touch ids", dense_bench_close(&b))

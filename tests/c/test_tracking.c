@@ -52,7 +52,7 @@ static uint32_t one(eits_context *ctx, eits_touch *reported, double x, double ex
 }
 
 /* Sure ones at once, others once they were found as often as is asked, on end. */
-static void tracks_start_once_confirmed(void)
+TEST(tracks_start_once_confirmed)
 {
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 3, 0, 0);
@@ -85,7 +85,7 @@ static void tracks_start_once_confirmed(void)
 }
 
 /* A track_start has to be found again near by; one that is known may move further. */
-static void reach(void)
+TEST(reach)
 {
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 2, 0, 0); /* follow_mm 25 */
@@ -106,7 +106,7 @@ static void reach(void)
 
 /* A clear touch that is lifted is gone at once, though its id is kept for a while; a faint one is
  * reported meanwhile. */
-static void tracks_end_after_the_hold(void)
+TEST(tracks_end_after_the_hold)
 {
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 2, 2, 0);
@@ -139,7 +139,7 @@ static void tracks_end_after_the_hold(void)
 }
 
 /* Held touches never take the place of found ones. */
-static void a_full_house(void)
+TEST(a_full_house)
 {
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 0, 5, 0);
@@ -179,7 +179,7 @@ static void jitter(eits_context *ctx, double speed, double explained, double *fo
     *reported_mm = sqrt(*reported_mm / 50);
 }
 
-static void smoothing(void)
+TEST(smoothing)
 {
     double found, still, moving, clear;
     eits_context *ctx = set_up(&b, 0, 2, 0.66);
@@ -202,7 +202,7 @@ static void smoothing(void)
 }
 
 /* Radius and strength follow the gain of the place; explained is the frame's own. */
-static void smooth_strengths(void)
+TEST(smooth_strengths)
 {
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 0, 2, 0.66);
@@ -221,7 +221,7 @@ static void smooth_strengths(void)
 
 /* Two fingers that pass one another keep their ids by where they are going; without that the
  * nearest place is another's. */
-static void passing(void)
+TEST(passing)
 {
     for (int smooth = 0; smooth < 2; ++smooth) {
         eits_touch t[EITS_MAX_TOUCHES];
@@ -237,7 +237,7 @@ static void passing(void)
 }
 
 /* A touch that is held goes on as it went, along either axis, but not off the skin. */
-static void held_in_motion(void)
+TEST(held_in_motion)
 {
     for (int axis = 0; axis < 2; ++axis) {
         eits_touch t[EITS_MAX_TOUCHES];
@@ -261,7 +261,7 @@ static void held_in_motion(void)
 }
 
 /* Options at the ends of their ranges: reported numbers are numbers. */
-static void extremes(void)
+TEST(extremes)
 {
     static const double huge[] = {0, 1e-30, 1e30};
     for (int k = 0; k < 27; ++k) {
@@ -281,7 +281,7 @@ static void extremes(void)
 }
 
 /* Switched on and off between frames: off, touches are as they were found. */
-static void switched(void)
+TEST(switched)
 {
     eits_touch t[EITS_MAX_TOUCHES];
     eits_context *ctx = set_up(&b, 2, 2, 0.66);
@@ -298,18 +298,4 @@ static void switched(void)
     CHECK_EQUAL(t[0].id, 2);
 }
 
-int main(void)
-{
-    tracks_start_once_confirmed();
-    reach();
-    tracks_end_after_the_hold();
-    a_full_house();
-    smoothing();
-    smooth_strengths();
-    passing();
-    held_in_motion();
-    extremes();
-    switched();
-    dense_bench_close(&b);
-    return checks_report("track in time");
-}
+RUN_TESTS("track in time", dense_bench_close(&b))

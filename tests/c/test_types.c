@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-static void status_texts(void)
+TEST(status_texts)
 {
     static const struct {
         eits_status status;
@@ -44,7 +44,7 @@ static void status_texts(void)
     CHECK(strcmp(eits_status_text((eits_status)1), "unknown status") == 0);
 }
 
-static void arithmetic_is_as_written(void)
+TEST(arithmetic_is_as_written)
 {
     eits_real left[EITS_ARITHMETIC_TRIALS];
     eits_try_arithmetic(left);
@@ -57,7 +57,7 @@ static void arithmetic_is_as_written(void)
     }
 }
 
-static void version_and_width(void)
+TEST(version_and_width)
 {
     char text[32];
     (void)snprintf(text, sizeof text, "%d.%d.%d", EITS_VERSION_MAJOR, EITS_VERSION_MINOR,
@@ -67,7 +67,7 @@ static void version_and_width(void)
     CHECK_EQUAL(sizeof(eits_real), BOTH_WIDTHS(4, 8));
 }
 
-static void crc32_of_known_texts(void)
+TEST(crc32_of_known_texts)
 {
     static const char fox[] = "The quick brown fox jumps over the lazy dog";
     uint8_t zeros[32] = {0}, ones[32];
@@ -84,7 +84,7 @@ static void crc32_of_known_texts(void)
     }
 }
 
-static void protocol_hash_of_known_tables(void)
+TEST(protocol_hash_of_known_tables)
 {
     static const uint8_t row[4] = {0, 1, 2, 3},
                          letters[8] = {'a', 'b', 'c', 'd', 'e', 'f', 'g', 'h'};
@@ -96,12 +96,4 @@ static void protocol_hash_of_known_tables(void)
     CHECK(eits_protocol_hash(8, 1, row) != eits_protocol_hash(9, 1, row));
 }
 
-int main(void)
-{
-    status_texts();
-    arithmetic_is_as_written();
-    version_and_width();
-    crc32_of_known_texts();
-    protocol_hash_of_known_tables();
-    return checks_report("types");
-}
+RUN_TESTS("types")

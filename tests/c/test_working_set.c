@@ -67,7 +67,7 @@ static void check_same(const eits_context *a, const eits_context *b)
     CHECK(i->gap == j->gap && i->residual == j->residual && i->lambda == j->lambda);
 }
 
-static void looking_always_gives_the_bits_of_fista(void)
+TEST(looking_always_gives_the_bits_of_fista)
 {
     static const uint32_t counts[] = {1, 2, 11, 60};
     for (int storage = 0; storage < 4; ++storage) {
@@ -100,7 +100,7 @@ static void looking_always_gives_the_bits_of_fista(void)
 }
 
 /* A step that is too long, by little or beyond all bounds: the same halvings, the same end. */
-static void looking_always_recovers_like_fista(void)
+TEST(looking_always_recovers_like_fista)
 {
     static const double factors[] = {1.0 / 3, 1.0 / 16, 1e-9};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
@@ -120,7 +120,7 @@ static void looking_always_recovers_like_fista(void)
     }
 }
 
-static void a_wild_run_ends_as_zero(void)
+TEST(a_wild_run_ends_as_zero)
 {
     static const double factors[] = {1e-4, 1e-12, 1e-36};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
@@ -139,7 +139,7 @@ static void a_wild_run_ends_as_zero(void)
 
 /* Asked for a gap, or given time: the duality gap holds over all columns, also those that no
  * iteration touched. */
-static void the_optimum_is_that_of_all_columns(void)
+TEST(the_optimum_is_that_of_all_columns)
 {
     for (int sign = 0; sign < 3; ++sign) {
         for (int asked = 0; asked < 2; ++asked) {
@@ -167,7 +167,7 @@ static void the_optimum_is_that_of_all_columns(void)
 }
 
 /* Prepared or not, portable or not: one result. */
-static void same_bits_in_every_layout(void)
+TEST(same_bits_in_every_layout)
 {
     for (int storage = 0; storage < 4; ++storage) {
         dense_bench b[4] = {0};
@@ -186,7 +186,7 @@ static void same_bits_in_every_layout(void)
 }
 
 /* Rows left out and the drift of the gain: the same projections as FISTA's. */
-static void beside_a_basis(void)
+TEST(beside_a_basis)
 {
     dense_bench b[2] = {0};
     for (int solver = 0; solver < 2; ++solver) {
@@ -212,7 +212,7 @@ static void beside_a_basis(void)
 
 /* From the optimum a warm start stays there; what it starts from is all of the last frame's
  * coefficients. */
-static void warm_starts(void)
+TEST(warm_starts)
 {
     eits_context *ctx = set_up(&b, RANDOM, 1);
     eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, 20000, EITS_SIGN_BOTH, 0.03);
@@ -226,7 +226,7 @@ static void warm_starts(void)
 }
 
 /* On the identity with one positive datum the working set is that one column. */
-static void work_is_counted(void)
+TEST(work_is_counted)
 {
     eits_context *ctx = set_up(&b, (small_spec){.rank = 16, .side = 4, .shape = SMALL_IDENTITY}, 0);
     const uint64_t whole = 16 * 16, column = 16;
@@ -247,7 +247,7 @@ static void work_is_counted(void)
     CHECK_EQUAL(solve(ctx, o).macs, whole + whole + 7 * column + 9 * column + 2 * whole);
 }
 
-static void refused_options(void)
+TEST(refused_options)
 {
     eits_context *ctx = set_up(&b, RANDOM, 0);
     CHECK_EQUAL(eits_get_options(ctx)->solver,
@@ -258,7 +258,7 @@ static void refused_options(void)
 }
 
 /* The same peaks in the same order, of the columns around the active ones alone. */
-static void violations_nearby(void)
+TEST(violations_nearby)
 {
     static const uint32_t active[] = {0, 30, 31, N - 1};
     for (uint32_t count = 0; count <= 4; ++count) {
@@ -292,7 +292,7 @@ static void violations_nearby(void)
 
 /* Zeros that stay zero leave the set; what is not zero, is on the way, or would move stays, in its
  * order. */
-static void zeros_at_rest_are_pruned(void)
+TEST(zeros_at_rest_are_pruned)
 {
     static const struct {
         double x, z, gradient;
@@ -329,19 +329,4 @@ static void zeros_at_rest_are_pruned(void)
     }
 }
 
-int main(void)
-{
-    looking_always_gives_the_bits_of_fista();
-    looking_always_recovers_like_fista();
-    a_wild_run_ends_as_zero();
-    the_optimum_is_that_of_all_columns();
-    same_bits_in_every_layout();
-    beside_a_basis();
-    warm_starts();
-    work_is_counted();
-    refused_options();
-    violations_nearby();
-    zeros_at_rest_are_pruned();
-    dense_bench_close(&b);
-    return checks_report("working set");
-}
+RUN_TESTS("working set", dense_bench_close(&b))

@@ -47,7 +47,7 @@ static void expect(const bench *b, uint32_t place, eits_event_kind kind, uint32_
     CHECK_EQUAL(b->out[place].time_us, 5);
 }
 
-static void a_key_is_pressed_and_released(void)
+TEST(a_key_is_pressed_and_released)
 {
     begin(&b);
     give(&b, EITS_EVENT_DOWN, 1, 5, 5);
@@ -66,7 +66,7 @@ static void a_key_is_pressed_and_released(void)
     CHECK_EQUAL(b.told, 0);
 }
 
-static void every_place_of_a_shared_edge_is_in_one_key(void)
+TEST(every_place_of_a_shared_edge_is_in_one_key)
 {
     for (int k = 0; k <= 300; ++k) {
         begin(&b);
@@ -75,7 +75,7 @@ static void every_place_of_a_shared_edge_is_in_one_key(void)
     }
 }
 
-static void a_slide_changes_keys_once_it_is_clearly_over_the_border(void)
+TEST(a_slide_changes_keys_once_it_is_clearly_over_the_border)
 {
     begin(&b);
     give(&b, EITS_EVENT_DOWN, 1, 19, 5);
@@ -90,7 +90,7 @@ static void a_slide_changes_keys_once_it_is_clearly_over_the_border(void)
     expect(&b, 0, EITS_EVENT_RELEASE, 2);
 }
 
-static void two_fingers_in_a_zone_press_it_once(void)
+TEST(two_fingers_in_a_zone_press_it_once)
 {
     begin(&b);
     give(&b, EITS_EVENT_DOWN, 1, 95, 0);
@@ -108,7 +108,7 @@ static void two_fingers_in_a_zone_press_it_once(void)
     CHECK_EQUAL(b.told, 0);
 }
 
-static void a_ring_says_where(void)
+TEST(a_ring_says_where)
 {
     begin(&b);
     give(&b, EITS_EVENT_DOWN, 1, -75, 0);
@@ -133,7 +133,7 @@ static void a_ring_says_where(void)
     expect(&b, 0, EITS_EVENT_PRESS, 4);
 }
 
-static void room_and_places_that_run_out_are_counted(void)
+TEST(room_and_places_that_run_out_are_counted)
 {
     begin(&b);
     const eits_event down = {.kind = EITS_EVENT_DOWN, .first_id = 1, .x_mm = 5, .y_mm = 5};
@@ -149,7 +149,7 @@ static void room_and_places_that_run_out_are_counted(void)
     CHECK_EQUAL(b.told, 0);
 }
 
-static void what_a_link_may_bring_is_passed_over(void)
+TEST(what_a_link_may_bring_is_passed_over)
 {
     begin(&b);
     give(&b, EITS_EVENT_DOWN, 0, 5, 5);
@@ -163,7 +163,7 @@ static void what_a_link_may_bring_is_passed_over(void)
     CHECK_EQUAL(b.told, 1);
 }
 
-static void zones_that_cannot_be_are_refused(void)
+TEST(zones_that_cannot_be_are_refused)
 {
     begin(&b);
     const eits_real bad[] = {0, 0, 1, 0, (eits_real)NAN, 3};
@@ -188,15 +188,4 @@ static void zones_that_cannot_be_are_refused(void)
     CHECK_EQUAL(eits_zones_update(&b.state, &e, 1, b.out, 8, NULL), EITS_E_ARGUMENT);
 }
 
-int main(void)
-{
-    a_key_is_pressed_and_released();
-    every_place_of_a_shared_edge_is_in_one_key();
-    a_slide_changes_keys_once_it_is_clearly_over_the_border();
-    two_fingers_in_a_zone_press_it_once();
-    a_ring_says_where();
-    room_and_places_that_run_out_are_counted();
-    what_a_link_may_bring_is_passed_over();
-    zones_that_cannot_be_are_refused();
-    return checks_report("zones");
-}
+RUN_TESTS("zones")

@@ -6,7 +6,7 @@
 static fake_board board;
 static fake_write written[FAKE_SPI_LOG];
 
-static void test_tuning(void)
+TEST(test_tuning)
 {
     /* AN-1070, "Programming the AD9833": 400 Hz from 25 MHz is 0x10C7 = 4295 */
     CHECK_EQUAL(fw_ad9833_tuning(25000000, 400000), 0x10C7);
@@ -26,7 +26,7 @@ static void test_tuning(void)
     CHECK_EQUAL(fw_ad9833_tuning(64000001, 1000), 0);
 }
 
-static void test_inverse(void)
+TEST(test_inverse)
 {
     CHECK_EQUAL(fw_ad9833_millihertz(8000000, 1677722), 50000012);
     CHECK_EQUAL(fw_ad9833_millihertz(25000000, 1 << 28), 0); /* 28 bits */
@@ -39,7 +39,7 @@ static void test_inverse(void)
     }
 }
 
-static void test_phase(void)
+TEST(test_phase)
 {
     CHECK_EQUAL(fw_ad9833_phase(0), 0);
     CHECK_EQUAL(fw_ad9833_phase(90000), 1024);
@@ -52,7 +52,7 @@ static void test_phase(void)
     CHECK_EQUAL(fw_ad9833_phase(43), 0);
 }
 
-static void test_words(void)
+TEST(test_words)
 {
     uint16_t words[FW_AD9833_WORDS];
     fw_ad9833_words(0x10C7, 0, FW_SINE, words); /* AN-1070's sequence */
@@ -82,7 +82,7 @@ static fw_ad9833 fresh(void)
     return generator;
 }
 
-static void test_start(void)
+TEST(test_start)
 {
     fw_ad9833 generator = fresh();
     CHECK_EQUAL(generator.state, FW_AD9833_UNKNOWN);
@@ -107,7 +107,7 @@ static void test_start(void)
     CHECK_EQUAL(board.writes, 11);
 }
 
-static void test_bus_fails_at_each_word(void)
+TEST(test_bus_fails_at_each_word)
 {
     for (uint32_t at = 0; at < FW_AD9833_WORDS; ++at) {
         fw_ad9833 generator = fresh();
@@ -130,13 +130,4 @@ static void test_bus_fails_at_each_word(void)
     }
 }
 
-int main(void)
-{
-    test_tuning();
-    test_inverse();
-    test_phase();
-    test_words();
-    test_start();
-    test_bus_fails_at_each_word();
-    return checks_report("ad9833");
-}
+RUN_TESTS("ad9833")

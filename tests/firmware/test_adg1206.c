@@ -13,7 +13,7 @@ static fw_adg1206 fresh(void)
     return (fw_adg1206){board.board.multiplexers};
 }
 
-static void test_sequence(void)
+TEST(test_sequence)
 {
     const fw_adg1206 bank = fresh();
     const uint8_t first[4] = {1, 2, 12, 15}, second[4] = {0, 8, 4, 5};
@@ -35,7 +35,7 @@ static void test_sequence(void)
     CHECK_EQUAL(board.monitor.lines & 0xF0000u, 0);
 }
 
-static void test_every_electrode(void)
+TEST(test_every_electrode)
 {
     const fw_adg1206 bank = fresh();
     for (uint32_t place = 0; place < 4; ++place) {
@@ -51,7 +51,7 @@ static void test_every_electrode(void)
     CHECK(board.monitor.violation == NULL);
 }
 
-static void test_range(void)
+TEST(test_range)
 {
     const fw_adg1206 bank = fresh();
     const uint8_t good[4] = {1, 2, 3, 4}, bad[][4] = {{16, 2, 3, 4}, {1, 255, 3, 4}, {1, 2, 16, 4},
@@ -63,7 +63,7 @@ static void test_range(void)
     CHECK_EQUAL(board.writes, 3);
 }
 
-static void test_lines_fail(void)
+TEST(test_lines_fail)
 {
     const uint8_t before[4] = {1, 2, 3, 4}, after[4] = {5, 6, 7, 8};
     for (uint32_t at = 0; at < 3; ++at) {
@@ -81,11 +81,4 @@ static void test_lines_fail(void)
     }
 }
 
-int main(void)
-{
-    test_sequence();
-    test_every_electrode();
-    test_range();
-    test_lines_fail();
-    return checks_report("adg1206");
-}
+RUN_TESTS("adg1206")

@@ -23,7 +23,7 @@ static eits_packet_reply scan_with(eits_command_scan scan)
     return host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
 }
 
-static void test_lengths(void)
+TEST(test_lengths)
 {
     const struct {
         eits_packet_type type;
@@ -52,7 +52,7 @@ static void test_lengths(void)
     CHECK_EQUAL(b.board.resets, 0);
 }
 
-static void test_unknown(void)
+TEST(test_unknown)
 {
     eits_command_plain c = {0};
     REPLY(host_command(&b.host, (eits_packet_type)0x90, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
@@ -68,7 +68,7 @@ static void test_unknown(void)
 
 /* Names in INFO are cut to their room, the board's before a last zero, and have zeros behind them.
  */
-static void test_names(void)
+TEST(test_names)
 {
     static const char LONG[] = "abcdefghijklmnopqrstuvwxyzabcdefghijklmnopqrstuvwxyz";
     static const char SHORT[64] = "two\0hidden";
@@ -90,7 +90,7 @@ static void test_names(void)
     b.board.board = board;
 }
 
-static void test_stream_ranges(void)
+TEST(test_stream_ranges)
 {
     REPLY(host_stream(&b.host, 32, 1, 0), EITS_REPLY_RANGE, 4, 31);
     REPLY(host_stream(&b.host, 1, 0, 0), EITS_REPLY_RANGE, 6, 1);
@@ -98,7 +98,7 @@ static void test_stream_ranges(void)
     CHECK_EQUAL(host_info(&b.host).streaming, 0);
 }
 
-static void test_tare_ranges(void)
+TEST(test_tare_ranges)
 {
     REPLY(host_tare(&b.host, 0), EITS_REPLY_RANGE, 4, 1);
     REPLY(host_tare(&b.host, 2), EITS_REPLY_RANGE, 4, 4);
@@ -107,7 +107,7 @@ static void test_tare_ranges(void)
     CHECK_EQUAL(host_info(&b.host).tared, 0);
 }
 
-static void test_scan_ranges(void)
+TEST(test_scan_ranges)
 {
     eits_command_scan s = host_default_scan();
     s.excitation_millihz = 3499999; /* at 350 uA rms */
@@ -164,7 +164,7 @@ static void test_scan_ranges(void)
 
 /* What is refused changes nothing: tare, settings and frames go on. What is taken forgets the tare.
  */
-static void test_scan_and_tare(void)
+TEST(test_scan_and_tare)
 {
     REPLY(host_tare(&b.host, 4), EITS_REPLY_OK, 0, 0);
     REPLY(host_stream(&b.host, 7, 1, 0), EITS_REPLY_OK, 0, 0);
@@ -193,7 +193,7 @@ static eits_packet_reply solver_with(eits_command_solver c)
     return host_command(&b.host, EITS_PACKET_SOLVER, &c, sizeof c);
 }
 
-static void test_solver(void)
+TEST(test_solver)
 {
     const eits_command_solver good = {.iterations = 7,
                                       .max_touches = 3,
@@ -266,7 +266,7 @@ static void test_solver(void)
     CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
 }
 
-static void test_mask_row(void)
+TEST(test_mask_row)
 {
     eits_command_mask_row c = {.row = 208, .masked = 1};
     REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_RANGE, 4, 207);
@@ -287,7 +287,7 @@ static void test_mask_row(void)
 }
 
 /* A request sent again gives the same answer and nothing else; another number does it anew. */
-static void test_sent_again(void)
+TEST(test_sent_again)
 {
     eits_command_stream c = {.request = 5000, .what = EITS_STREAM_RAW, .every = 1, .frames = 3};
     host_forget(&b.host);
@@ -328,7 +328,7 @@ static void test_sent_again(void)
     CHECK(b.host.instrument.last_frame - scanned <= 1); /* at once */
 }
 
-static void test_stats_again(void)
+TEST(test_stats_again)
 {
     host_run(&b.host, 100);
     eits_command_get_stats c = {7000, 1};
@@ -360,7 +360,7 @@ static void test_stats_again(void)
 }
 
 /* While a tare is under way. */
-static void test_busy(void)
+TEST(test_busy)
 {
     eits_command_tare tare = {.request = 8000, .frames = 50};
     host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
@@ -382,7 +382,7 @@ static void test_busy(void)
 }
 
 /* Bytes that are no packets are counted, and what follows them is understood. */
-static void test_bad_bytes(void)
+TEST(test_bad_bytes)
 {
     const eits_packet_stats before = host_stats(&b.host, 0);
     eits_command_plain c = {9000};
@@ -411,19 +411,7 @@ static void test_bad_bytes(void)
 int main(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    test_lengths();
-    test_unknown();
-    test_names();
-    test_stream_ranges();
-    test_tare_ranges();
-    test_scan_ranges();
-    test_scan_and_tare();
-    test_solver();
-    test_mask_row();
-    test_sent_again();
-    test_stats_again();
-    test_busy();
-    test_bad_bytes();
+    run_tests();
     bench_stop(&b);
     return checks_report("commands");
 }

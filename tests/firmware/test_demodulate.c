@@ -22,7 +22,7 @@ static void make_burst(uint32_t samples, double rate_hz, double hz, double ampli
                                    middle + 0.5);
 }
 
-static void test_turns(void)
+TEST(test_turns)
 {
     for (uint64_t turn = 0; turn < (uint64_t)1 << 32; turn += 7654321) {
         float c, s;
@@ -37,7 +37,7 @@ static void test_turns(void)
     CHECK(c == 0 && s == 1);
 }
 
-static void test_whole_periods(void)
+TEST(test_whole_periods)
 {
     CHECK(fw_whole_periods(50000000, 1000000, 80));
     CHECK(fw_whole_periods(50000000, 1000000, 20));
@@ -52,7 +52,7 @@ static void test_whole_periods(void)
     CHECK_EQUAL(fw_nearest_integer(30000000, 1000000, 80), 100); /* 3 periods in 100 */
 }
 
-static void test_scale(void)
+TEST(test_scale)
 {
     CHECK_EQUAL(fw_volts_per_code_nv(&CAPTURE), 805664); /* 3.3 V / 4096 */
     const fw_capture gained = {NULL, NULL, 4095, 3300000, 2500000};
@@ -69,7 +69,7 @@ static void test_scale(void)
 
 /* Amplitudes and phases within what rounding to whole codes leaves: 4 / pi times half a step at
  * worst, less where the samples of a burst fall on many places of the period. */
-static void test_amplitudes(void)
+TEST(test_amplitudes)
 {
     const struct {
         uint32_t millihertz, rate, samples;
@@ -97,7 +97,7 @@ static void test_amplitudes(void)
 
 /* The generator's frequency is not quite the nominal one; the phase stays where it is, over hours
  * and the clock's wrap. */
-static void test_phase_followed(void)
+TEST(test_phase_followed)
 {
     const uint32_t tuning = fw_ad9833_tuning(8000000, 50000000);
     const double turn_per_us = tuning * 8.0 / 268435456.0;
@@ -121,7 +121,7 @@ static void test_phase_followed(void)
     }
 }
 
-static void test_ends_of_range(void)
+TEST(test_ends_of_range)
 {
     fw_iq z;
     CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, 1677722, 50000000, 1000000, 80), FW_OK);
@@ -142,7 +142,7 @@ static void test_ends_of_range(void)
 }
 
 /* The greatest sum of 16-bit codes over the longest burst does not overflow. */
-static void test_wide_converter(void)
+TEST(test_wide_converter)
 {
     const fw_capture wide = {NULL, NULL, 65535, 3300000, 1000000};
     CHECK_EQUAL(fw_demodulate_setup(&d, &wide, 8000000, 8388608, 250000000, 1000000, 1024), FW_OK);
@@ -156,7 +156,7 @@ static void test_wide_converter(void)
 
 /* Two pairs of the model, upside down and half a turn away from what it expects: the phase follows,
  * whichever row of each pair can be used. */
-static void test_phase_from_either_row(void)
+TEST(test_phase_from_either_row)
 {
     static const eits_fold FOLD[2] = {{.first = 0, .second = 1, .sign = 1},
                                       {.first = 2, .second = 3, .sign = -1}};
@@ -181,15 +181,4 @@ static void test_phase_from_either_row(void)
     }
 }
 
-int main(void)
-{
-    test_turns();
-    test_whole_periods();
-    test_scale();
-    test_amplitudes();
-    test_phase_followed();
-    test_ends_of_range();
-    test_wide_converter();
-    test_phase_from_either_row();
-    return checks_report("demodulate");
-}
+RUN_TESTS("demodulate")

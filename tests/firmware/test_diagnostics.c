@@ -59,7 +59,7 @@ static double bridged(void *user, const uint8_t e[4], uint64_t at_ns)
     return volts;
 }
 
-static void test_bridged(void)
+TEST(test_bridged)
 {
     start();
     host_run(&b.host, 50);
@@ -91,7 +91,7 @@ static double one_row_off(void *user, const uint8_t e[4], uint64_t at_ns)
     return sheet_volts(user, e) + (e[0] == 2 && e[2] == 9 ? 0.02 : 0);
 }
 
-static void test_outlier(void)
+TEST(test_outlier)
 {
     start();
     host_run(&b.host, 50);
@@ -117,7 +117,7 @@ static void test_outlier(void)
 }
 
 /* What is not looked for is not found. */
-static void test_switched_off(void)
+TEST(test_switched_off)
 {
     start();
     const eits_options *o = eits_get_options(b.host.instrument.engine.ctx);
@@ -142,8 +142,6 @@ int main(void)
 {
     test_open_while_nobody_looks(0);
     test_open_while_nobody_looks(5);
-    test_bridged();
-    test_outlier();
-    test_switched_off();
+    run_tests();
     return checks_report("found");
 }

@@ -44,7 +44,7 @@ static eits_packet_reply set(uint32_t settings, uint32_t limit_ua)
     return host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c);
 }
 
-static void test_off_until_asked(void)
+TEST(test_off_until_asked)
 {
     start_unheard();
     CHECK_EQUAL(b.board.generator.control & AD9833_MODEL_RESET, AD9833_MODEL_RESET);
@@ -67,7 +67,7 @@ static void test_off_until_asked(void)
 
 /* Silence ends the drive and the stream within a second, not the reference; who asks again gets
  * frames of the same tare. */
-static void test_silence(void)
+TEST(test_silence)
 {
     start_unheard();
     b.board.board.settle_frames = 2;
@@ -113,7 +113,7 @@ static void test_silence(void)
     CHECK_EQUAL(host_info(&b.host).tared, 1);
 }
 
-static void test_owner_keeps_it(void)
+TEST(test_owner_keeps_it)
 {
     start_unheard();
     CHECK_EQUAL(set(EITS_SETTING_KEEP_DRIVE, 0).status, EITS_REPLY_OK);
@@ -129,7 +129,7 @@ static void test_owner_keeps_it(void)
     b.host.kept_on = false;
 }
 
-static void test_lock(void)
+TEST(test_lock)
 {
     start_unheard();
     CHECK_EQUAL(set(8, 0).status, EITS_REPLY_RANGE);
@@ -159,7 +159,7 @@ static void test_lock(void)
 
 /* Power goes at any write of a change of settings, pages that are full and erased among them: the
  * old ones stay, or the new ones are there. */
-static void test_cuts(void)
+TEST(test_cuts)
 {
     static fw_store store; /* not in registers that longjmp forgets */
     static volatile uint32_t step, saved;
@@ -190,7 +190,7 @@ static void test_cuts(void)
     CHECK_EQUAL(fw_kept_load(&store).magic, 0);
 }
 
-static void test_limit(void)
+TEST(test_limit)
 {
     start_unheard();
     CHECK_EQUAL(set(0, EITS_LIMIT_KEPT).status, EITS_REPLY_OK);
@@ -231,7 +231,7 @@ static void test_limit(void)
 }
 
 /* Multiplexers that do not open when the drive is asked for: nothing drives until they do. */
-static void test_lines_that_do_not_open(void)
+TEST(test_lines_that_do_not_open)
 {
     start_unheard();
     b.board.lines_fail_from = b.board.lines_calls;
@@ -249,7 +249,7 @@ static void test_lines_that_do_not_open(void)
     CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_BUS, 0);
 }
 
-static void test_resets_are_reported(void)
+TEST(test_resets_are_reported)
 {
     start_unheard();
     b.board.board.last_reset = (fw_last_reset){.clock = 1, .supply = 1};
@@ -259,7 +259,7 @@ static void test_resets_are_reported(void)
 }
 
 /* Examples of FIPS 180-2, appendix B, and lengths about a block. */
-static void test_sha256(void)
+TEST(test_sha256)
 {
     static const uint8_t EMPTY[4] = {0xe3, 0xb0, 0xc4, 0x42}, ABC[4] = {0xba, 0x78, 0x16, 0xbf},
                          TWO[4] = {0x24, 0x8d, 0x6a, 0x61}, MANY[4] = {0xcd, 0xc7, 0x6e, 0x5c};
@@ -277,7 +277,7 @@ static void test_sha256(void)
     CHECK(memcmp(digest, MANY, 4) == 0);
 }
 
-static void test_hashes(void)
+TEST(test_hashes)
 {
     start_unheard();
     b.board.board.image = (const uint8_t *)"abc";
@@ -295,18 +295,4 @@ static void test_hashes(void)
     CHECK(memcmp(hashes->firmware, digest, 32) == 0);
 }
 
-int main(void)
-{
-    test_off_until_asked();
-    test_silence();
-    test_owner_keeps_it();
-    test_lock();
-    test_cuts();
-    test_limit();
-    test_lines_that_do_not_open();
-    test_resets_are_reported();
-    test_sha256();
-    test_hashes();
-    bench_stop(&b);
-    return checks_report("drive");
-}
+RUN_TESTS("drive", bench_stop(&b))

@@ -13,7 +13,7 @@ static uint32_t told(eits_fault code, bool raised)
     return count;
 }
 
-static void test_last_reset(void)
+TEST(test_last_reset)
 {
     bench_start(&b, &SKIN_ADJACENT);
     fake_restart(&b.board);
@@ -39,7 +39,7 @@ static void test_last_reset(void)
 }
 
 /* What is cleared by command and still there rises again. */
-static void test_cleared_but_there(void)
+TEST(test_cleared_but_there)
 {
     bench_start(&b, NULL);
     CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, true), 1);
@@ -61,7 +61,7 @@ static void test_cleared_but_there(void)
 
 /* The generator cannot be written at start-up: told, tried again, and the scan begins when it can.
  */
-static void test_generator_bus(void)
+TEST(test_generator_bus)
 {
     for (uint32_t at = 0; at < 5; ++at) {
         bench_start(&b, &SKIN_ADJACENT);
@@ -87,7 +87,7 @@ static void test_generator_bus(void)
 
 /* Multiplexers that cannot be switched: once is measured again, always is told; then rows are no
  * numbers. */
-static void test_multiplexer_bus(void)
+TEST(test_multiplexer_bus)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
@@ -125,7 +125,7 @@ static void test_multiplexer_bus(void)
 
 /* A bus that fails while a scan starts is told as that, and not as a converter that gives nothing.
  */
-static void test_bus_at_the_start_of_a_scan(void)
+TEST(test_bus_at_the_start_of_a_scan)
 {
     eits_command_scan scan = host_default_scan();
     uint32_t buses = 0;
@@ -146,7 +146,7 @@ static void test_bus_at_the_start_of_a_scan(void)
 
 /* So many frames with a fault and then without it: when it rises and goes, each electrode by
  * itself; a frame in between begins the count anew. */
-static void test_hysteresis(void)
+TEST(test_hysteresis)
 {
     const struct {
         eits_fault code;
@@ -192,7 +192,7 @@ static void test_hysteresis(void)
     bench_stop(&b);
 }
 
-static void test_watchdog_is_fed(void)
+TEST(test_watchdog_is_fed)
 {
     bench_start(&b, &SKIN_ADJACENT);
     const uint32_t before = b.board.feeds;
@@ -207,14 +207,4 @@ static void test_watchdog_is_fed(void)
     bench_stop(&b);
 }
 
-int main(void)
-{
-    test_last_reset();
-    test_cleared_but_there();
-    test_generator_bus();
-    test_multiplexer_bus();
-    test_bus_at_the_start_of_a_scan();
-    test_hysteresis();
-    test_watchdog_is_fed();
-    return checks_report("faults");
-}
+RUN_TESTS("faults")

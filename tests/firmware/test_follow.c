@@ -41,7 +41,7 @@ static uint32_t with_flags(uint32_t flags)
     return count;
 }
 
-static void test_what_is_refused(void)
+TEST(test_what_is_refused)
 {
     set_up(&SKIN_ADJACENT); /* without fields */
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
@@ -58,7 +58,7 @@ static void test_what_is_refused(void)
 
 /* A still skin: one packet says that it begins, all frames are brought to one instant and solved,
  * with the bits that they have. */
-static void test_a_still_skin(void)
+TEST(test_a_still_skin)
 {
     set_up(&SKIN_WITH_FIELDS);
     host_forget(&b.host);
@@ -117,7 +117,7 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
 
 /* A main loop that is slower than the scan: frames are left out, drives are not, and a frame that
  * is looked at is the one that was scanned last. */
-static void test_a_slow_main_loop(void)
+TEST(test_a_slow_main_loop)
 {
     set_up(&SKIN_WITH_FIELDS);
     CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
@@ -139,7 +139,7 @@ static void test_a_slow_main_loop(void)
 
 /* Commands that change what drives build on begin anew; questions do not. Drives that waited too
  * long are left out: then too. */
-static void test_beginning_anew(void)
+TEST(test_beginning_anew)
 {
     set_up(&SKIN_WITH_FIELDS);
     CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
@@ -175,11 +175,8 @@ static void test_beginning_anew(void)
 
 int main(void)
 {
-    test_what_is_refused();
-    test_a_still_skin();
+    run_tests();
     test_a_touch(0, 0);
     test_a_touch(2000, 900000);
-    test_a_slow_main_loop();
-    test_beginning_anew();
     return checks_report("follow");
 }

@@ -193,7 +193,7 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
 
 /* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the
  * angle. */
-static void test_phase_of_the_voltages(void)
+TEST(test_phase_of_the_voltages)
 {
     for (int k = 0; k < 9; ++k) {
         bench_start(&b, &SKIN_ADJACENT);
@@ -219,7 +219,7 @@ static void test_phase_of_the_voltages(void)
     }
 }
 
-static void test_streaming(void)
+TEST(test_streaming)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
@@ -256,7 +256,7 @@ static void test_streaming(void)
 }
 
 /* Where the link takes no more, whole packets are dropped and counted, and nothing waits. */
-static void test_back_pressure(void)
+TEST(test_back_pressure)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
@@ -278,7 +278,7 @@ static void test_back_pressure(void)
 }
 
 /* A tare that fails leaves the last reference, its angle and its images. */
-static void test_failed_tare(void)
+TEST(test_failed_tare)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_tare(&b.host, 16).status, EITS_REPLY_OK);
@@ -324,7 +324,7 @@ static void test_failed_tare(void)
 
 /* Frames whose scan began before the command are not untouched ones; frames of a tare are all sent,
  * whatever `every` is. */
-static void test_reference_frames(void)
+TEST(test_reference_frames)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 5, 0).status, EITS_REPLY_OK);
@@ -347,7 +347,7 @@ static void test_reference_frames(void)
     bench_stop(&b);
 }
 
-static void test_self_test_keeps_the_tare(void)
+TEST(test_self_test_keeps_the_tare)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
@@ -379,7 +379,7 @@ static void test_self_test_keeps_the_tare(void)
 }
 
 /* A tare takes frames whose scan began with the command or later, also where the clock wraps. */
-static void test_tare_begins_with_the_command(void)
+TEST(test_tare_begins_with_the_command)
 {
     static const uint32_t commands[] = {1000, 0, 0xFFFFFFFFu, 0x80000000u};
     for (int k = 0; k < 4; ++k) {
@@ -399,12 +399,6 @@ int main(void)
     test_same_bits(&SKIN_ADJACENT, 1, 2, 1, 0);
     test_same_bits(&SKIN_OPPOSITE, 5, 1, 4, 0);
     test_same_bits(&SKIN_ADJACENT, 4, 1, 1, 50);
-    test_phase_of_the_voltages();
-    test_streaming();
-    test_back_pressure();
-    test_failed_tare();
-    test_reference_frames();
-    test_self_test_keeps_the_tare();
-    test_tare_begins_with_the_command();
+    run_tests();
     return checks_report("instrument");
 }

@@ -123,7 +123,7 @@ static void test_open(bool tared, uint16_t check_every)
 }
 
 /* Two at once, neighbours or not. */
-static void test_two_open(void)
+TEST(test_two_open)
 {
     start(1);
     tare();
@@ -148,7 +148,7 @@ static double to_the_rail(void *user, const uint8_t electrodes[4], uint64_t at_n
     return memchr(electrodes, 6, 4) != NULL ? 9.0 : sheet_volts(user, electrodes);
 }
 
-static void test_open_at_the_rail(void)
+TEST(test_open_at_the_rail)
 {
     start(1);
     tare();
@@ -167,7 +167,7 @@ static double faint(void *user, const uint8_t electrodes[4], uint64_t at_ns)
     return 0.015 * sheet_volts(user, electrodes);
 }
 
-static void test_faint_skin(void)
+TEST(test_faint_skin)
 {
     start(1);
     b.board.noise_codes = 0;
@@ -187,7 +187,7 @@ static double stuck_row(void *user, const uint8_t e[4], uint64_t at_ns)
     return e[0] == 5 && e[2] == 8 ? 0.3 : sheet_volts(user, e);
 }
 
-static void test_masked_row_is_not_judged(void)
+TEST(test_masked_row_is_not_judged)
 {
     start(1);
     b.board.volts = stuck_row;
@@ -235,7 +235,7 @@ static double one_row_saturates(void *user, const uint8_t e[4], uint64_t at_ns)
     return it ? 1.7 : sheet_volts(user, e);
 }
 
-static void test_saturation(void)
+TEST(test_saturation)
 {
     start(1);
     tare();
@@ -319,7 +319,7 @@ static double nothing(void *user, const uint8_t e[4], uint64_t at_ns)
     return 0;
 }
 
-static void test_dead(void)
+TEST(test_dead)
 {
     start(1);
     tare();
@@ -347,15 +347,10 @@ int main(void)
     test_open(false, 1);
     test_open(true, 1);
     test_open(true, 4);
-    test_two_open();
-    test_open_at_the_rail();
-    test_faint_skin();
-    test_masked_row_is_not_judged();
+    run_tests();
     test_touches_are_not_open(true);
     test_touches_are_not_open(false);
-    test_saturation();
     test_reciprocity(1);
     test_reciprocity(3);
-    test_dead();
     return checks_report("quality");
 }

@@ -65,7 +65,7 @@ static void test_voltages(const skin_spec *spec)
 
 /* With settling as long as what the multiplexers take, what was before is not seen; without it, it
  * would be. */
-static void test_settling(void)
+TEST(test_settling)
 {
     bench_start(&b, &SKIN_ADJACENT);
     b.board.tau_ns = 3000;
@@ -91,7 +91,7 @@ static void test_settling(void)
 }
 
 /* A switch that comes too late costs a slot, and the row is measured again. */
-static void test_late_switch(void)
+TEST(test_late_switch)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
@@ -127,7 +127,7 @@ static void test_late_switch(void)
 }
 
 /* Rows that cannot be measured at all are given up, marked, and are not a number. */
-static void test_never_settles(void)
+TEST(test_never_settles)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
@@ -220,7 +220,7 @@ static void test_reciprocal(const skin_spec *spec)
     bench_stop(&b);
 }
 
-static void test_frame_period(void)
+TEST(test_frame_period)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
@@ -266,7 +266,7 @@ static void test_frame_period(void)
 
 /* While the main loop is busy, one frame is filled, then the scan waits; no frame is half old and
  * half new. */
-static void test_two_buffers(void)
+TEST(test_two_buffers)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
@@ -286,7 +286,7 @@ static void test_two_buffers(void)
     bench_stop(&b);
 }
 
-static void test_stall(void)
+TEST(test_stall)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
@@ -324,7 +324,7 @@ static void test_stall(void)
     bench_stop(&b);
 }
 
-static void test_slots(void)
+TEST(test_slots)
 {
     fw_scan_settings s = FW_SCAN_DEFAULT;
     CHECK_EQUAL(fw_slot_us(&s), 100);
@@ -339,21 +339,15 @@ static void test_slots(void)
 
 int main(void)
 {
-    test_slots();
+    run_tests();
     test_order(&SKIN_ADJACENT, 208);
     test_order(&SKIN_OPPOSITE, 192);
     test_order(&SKIN_BY_SEVEN, 208);
     test_voltages(&SKIN_ADJACENT);
     test_voltages(&SKIN_OPPOSITE);
     test_voltages(&SKIN_BY_SEVEN);
-    test_settling();
-    test_late_switch();
-    test_never_settles();
     test_reciprocal(&SKIN_ADJACENT);
     test_reciprocal(&SKIN_OPPOSITE);
     test_reciprocal(&SKIN_BY_SEVEN);
-    test_frame_period();
-    test_two_buffers();
-    test_stall();
     return checks_report("scan");
 }

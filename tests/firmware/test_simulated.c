@@ -123,7 +123,7 @@ static int scan(rig *r)
     return shown(r);
 }
 
-static void test_frames_in_order(void)
+TEST(test_frames_in_order)
 {
     start(&a, 50000);
     CHECK(!sim_wants_frame(&a.sim));
@@ -153,7 +153,7 @@ static void test_frames_in_order(void)
 }
 
 /* Nobody wants frames: time stands still. Off and on: it goes on, and the model is there. */
-static void test_time_and_restart(void)
+TEST(test_time_and_restart)
 {
     stream(&a, 0, 0);
     const uint64_t us = a.sim.now_us;
@@ -171,7 +171,7 @@ static void test_time_and_restart(void)
 
 /* As fast as it goes, frames of the scene come more than once; another board beside it has its own
  * scene. */
-static void test_two_boards(void)
+TEST(test_two_boards)
 {
     start(&a, 0);
     start(&b, 0);
@@ -190,7 +190,7 @@ static void test_two_boards(void)
 
 /* Frames that are put before the board one at a time give the same packets as all at once; where
  * one is missing time stands still. */
-static void test_frames_by_and_by(void)
+TEST(test_frames_by_and_by)
 {
     start(&a, 50000);
     start(&b, 50000);
@@ -218,7 +218,7 @@ static void test_frames_by_and_by(void)
 
 /* A frame that is put once is shown in the scan that it was made for, and in no other; the host
  * learns when that begins and when each row is measured. */
-static void test_frames_of_one_scan(void)
+TEST(test_frames_of_one_scan)
 {
     uint32_t delays_us[ROWS];
     start(&a, 50000);
@@ -254,7 +254,7 @@ static void test_frames_of_one_scan(void)
 /* Another instrument's numbers reach the host bit for bit; what is not finite is no voltage.
  * Nothing is said of a scan, and none can be set. Where frames stay away that is a fault, which
  * goes. */
-static void test_frames_given(void)
+TEST(test_frames_given)
 {
     float given[2 * ROWS] = {0};
     start_given(&a, 20000, true);
@@ -303,12 +303,7 @@ int main(void)
         for (uint32_t i = 0; i < ROWS; ++i)
             volts[k * ROWS + i] = (1.0f + 0.01f * (float)k) * (float)bench_volts(&source, i);
     }
-    test_frames_in_order();
-    test_time_and_restart();
-    test_two_boards();
-    test_frames_by_and_by();
-    test_frames_of_one_scan();
-    test_frames_given();
+    run_tests();
     bench_stop(&source);
     return checks_report("simulated");
 }

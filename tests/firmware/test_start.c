@@ -7,7 +7,7 @@
 
 static bench b;
 
-static void test_no_model(void)
+TEST(test_no_model)
 {
     bench_start(&b, NULL);
     const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_NO_MODEL, true, 0);
@@ -44,7 +44,7 @@ static void test_no_model(void)
 
 /* After a change of the model the new table is scanned, reciprocals and all, and the old tare is
  * gone. */
-static void test_model_change(void)
+TEST(test_model_change)
 {
     bench_start(&b, &SKIN_ADJACENT);
     eits_command_scan scan = host_default_scan();
@@ -86,7 +86,7 @@ static void test_model_change(void)
     bench_stop(&b);
 }
 
-static void test_starts_and_ends(void)
+TEST(test_starts_and_ends)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(b.host.packet[0].type, EITS_PACKET_INFO); /* said unasked, of request 0 */
@@ -118,10 +118,4 @@ static void test_starts_and_ends(void)
     bench_stop(&b);
 }
 
-int main(void)
-{
-    test_no_model();
-    test_model_change();
-    test_starts_and_ends();
-    return checks_report("start");
-}
+RUN_TESTS("start")

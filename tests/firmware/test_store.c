@@ -21,7 +21,7 @@ static void start_with_adjacent(void)
     bench_restart(&b);
 }
 
-static void test_newest(void)
+TEST(test_newest)
 {
     const struct {
         uint32_t first, second, bank;
@@ -89,7 +89,7 @@ static void still_adjacent(int tared)
 }
 
 /* What is wrong with an upload leaves the model, the tare and the stream as they were. */
-static void test_refused(void)
+TEST(test_refused)
 {
     start_with_adjacent();
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
@@ -146,7 +146,7 @@ static void test_refused(void)
 }
 
 /* More memory than the board has: refused at once, and at start-up the other bank is opened. */
-static void test_memory(void)
+TEST(test_memory)
 {
     start_with_adjacent();
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
@@ -187,7 +187,7 @@ static void test_memory(void)
     skin_model_free(&big);
 }
 
-static void test_offsets(void)
+TEST(test_offsets)
 {
     start_with_adjacent();
     const uint32_t size = (uint32_t)opposite.size;
@@ -239,7 +239,7 @@ static void test_offsets(void)
 }
 
 /* The last piece may be any number of bytes. */
-static void test_odd_end(void)
+TEST(test_odd_end)
 {
     start_with_adjacent();
     static uint8_t longer[FAKE_BANK];
@@ -255,7 +255,7 @@ static void test_odd_end(void)
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
 }
 
-static void test_flash_fails(void)
+TEST(test_flash_fails)
 {
     start_with_adjacent();
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
@@ -287,14 +287,9 @@ int main(void)
 {
     adjacent = skin_model_make(&SKIN_ADJACENT);
     opposite = skin_model_make(&SKIN_OPPOSITE);
-    test_newest();
+    run_tests();
     test_upload(4096);
     test_upload(52);
-    test_refused();
-    test_memory();
-    test_offsets();
-    test_odd_end();
-    test_flash_fails();
     skin_model_free(&adjacent);
     skin_model_free(&opposite);
     return checks_report("store");
