@@ -83,9 +83,9 @@ install_package() {
         find_python
         say "installing eitskin[$1]: packages, then compiling the C core; about a minute"
         touch "$stamp.next"
-        pip_install "$root[$1]"
-        case ",$1," in # the studies, which only a checkout has
-        *,test,*) pip_install --no-deps "$root/python" ;;
+        case $1 in
+        build) pip_install "$root[$1]" ;;
+        *) pip_install "$root[$1]" "$root/python" ;; # emulated board and studies, which only a checkout has
         esac
         mv "$stamp.next" "$stamp"
     fi

@@ -17,7 +17,7 @@ URLS = {
     "serial:PORT": "a serial port; serial:PORT?baud=N where it is not at 1000000 baud",
     "text:PORT": "an instrument that sends lines: text:PORT?layout=FILE (docs/guide/your-board.md)",
     "sim:SCENE": "a simulated board that sees a scene: a file, or a name of  eitskin scene list",
-    "emu:SCENE": "the firmware itself on an emulated board that sees a scene (extra: emulator)",
+    "emu:SCENE": "the firmware on an emulated board (a checkout: pip install ./python)",
     "file:RUN.eits": "a recording, made by  eitskin record",
 }
 
@@ -48,10 +48,7 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps({"ports": [port.as_dict() for port in found], "urls": URLS}, indent=2))
         return 0
     if not found:
-        print(
-            "no serial port; without a board, play with  --device sim:two_touch  or  --device"
-            " emu:two_touch"
-        )
+        print("no serial port; without a board, play with  --device sim:two_touch")
     for port in found:
         print(_line(port))
     print("--device takes:")

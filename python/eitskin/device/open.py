@@ -15,7 +15,7 @@ from eitskin.device.ports import BAUD, Port, SerialTransport, only_board, ports
 from eitskin.device.source import open_source, source_schemes
 from eitskin.device.timing import split_timing
 from eitskin.device.transport import Transport
-from eitskin.errors import UsageError
+from eitskin.errors import MissingExtraError, UsageError
 
 AS_IN = {
     "serial": "serial:/dev/ttyACM0",
@@ -101,13 +101,23 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
 
         return open_simulated(rest, model=model, loop=timing.loop)
     if scheme == "emu":
-        from eitskin.emulator.transport import open_emulated
-
-        transport: Transport = open_emulated(rest, model=model, image=image, loop=timing.loop)
-        return transport
+        return _emulated(rest, model, image, timing.loop)
     from eitskin.device.recordings.recording import FileTransport
 
     return FileTransport(rest)
+
+
+def _emulated(scene: str, model: bytes | None, image: Path | None, loop: bool) -> Transport:
+    """The board of a package that the wheel does not have."""
+    try:
+        from eitskin_emulator.transport import open_emulated
+    except ImportError:
+        raise MissingExtraError(
+            f"emu:{scene}: the emulated board comes with eitskin's sources alone: run there  pip"
+            " install ./python"
+        ) from None
+    transport: Transport = open_emulated(scene, model=model, image=image, loop=loop)
+    return transport
 
 
 def list_devices() -> list[Port]:

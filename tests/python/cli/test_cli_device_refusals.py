@@ -286,9 +286,10 @@ def test_what_the_board_refuses(refused: Refused, scene: Path) -> None:
 # ---- extras ----
 
 
-def test_without_the_emulator(scene: Path) -> None:
-    done = run_python(without("unicorn") + MAIN, "stream", "--device", f"emu:{scene}")
-    assert done.returncode == EXTRA and "pip install 'eitskin[emulator]'" in done.stderr
+@pytest.mark.parametrize("missing", ["eitskin_emulator", "unicorn"])
+def test_without_the_emulated_board(missing: str, scene: Path) -> None:
+    done = run_python(without(missing) + MAIN, "stream", "--device", f"emu:{scene}")
+    assert done.returncode == EXTRA and "run there  pip install ./python" in done.stderr
     assert done.stderr.count("\n") == 1
 
 

@@ -14,14 +14,14 @@ from eitskin.device.recordings.host_check import HostCheck, HostTwin
 from eitskin.device.transport import Transport
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import RawFrame
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_S
-from eitskin.emulator.memory import RAM
-from eitskin.emulator.scene_skin import skin_of
-from eitskin.emulator.transport import EmulatedTransport
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.library_scenes import find_scene
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_S
+from eitskin_emulator.memory import RAM
+from eitskin_emulator.scene_skin import skin_of
+from eitskin_emulator.transport import EmulatedTransport
 
 IMAGE = "firmware/eitskin_nucleo_f767zi.bin"
 EVERYTHING = Stream.RAW | Stream.IMAGE | Stream.TOUCHES | Stream.EVENTS

@@ -16,14 +16,14 @@ from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo, RawFrame, Reply
 from eitskin.device.wire.payloads import parse
-from eitskin.emulator.analog.converter import STEP_V
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.emulator.transport import EmulatedTransport
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.skin.protocol import Protocol
+from eitskin_emulator.analog.converter import STEP_V
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin_emulator.transport import EmulatedTransport
 from emulated import clean, power_up
 
 BOOT_S, ANSWER_S, SCAN_S = 0.4, 0.15, 0.075  # the board solves the model's golden frames first

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from thumb import flat_skin
 
-from eitskin.emulator.analog.ad9833 import FULL_TURN, Ad9833
-from eitskin.emulator.analog.adg1206 import OFF_TICKS, Multiplexers
-from eitskin.emulator.analog.converter import STEP_V, codes
-from eitskin.emulator.analog.front_end import TAU_TICKS, FrontEnd
-from eitskin.emulator.analog.skin import AnalogSkin
-from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.emulator.peripherals.spi import SpiFrame
 from eitskin.skin.protocol import adjacent, opposite, table
+from eitskin_emulator.analog.ad9833 import FULL_TURN, Ad9833
+from eitskin_emulator.analog.adg1206 import OFF_TICKS, Multiplexers
+from eitskin_emulator.analog.converter import STEP_V, codes
+from eitskin_emulator.analog.front_end import TAU_TICKS, FrontEnd
+from eitskin_emulator.analog.skin import AnalogSkin
+from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin_emulator.peripherals.spi import SpiFrame
 
 MCLK_HZ, MCLK_TICKS = 8_000_000, 54
 STEP = round(50_000 * FULL_TURN / MCLK_HZ)

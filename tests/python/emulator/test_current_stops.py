@@ -8,14 +8,14 @@ import pytest
 from eitskin.device.client import Device
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import Drive, FaultCode, ReplyStatus, Setting, Stream
-from eitskin.emulator.analog.ad9833 import Ad9833
-from eitskin.emulator.analog.adg1206 import OFF_TICKS, Multiplexers
-from eitskin.emulator.analog.drive_monitor import DriveMonitor
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.emulator.peripherals.adc2 import SR
-from eitskin.emulator.peripherals.rcc import HSE_HZ
-from eitskin.emulator.peripherals.spi import SpiFrame
+from eitskin_emulator.analog.ad9833 import Ad9833
+from eitskin_emulator.analog.adg1206 import OFF_TICKS, Multiplexers
+from eitskin_emulator.analog.drive_monitor import DriveMonitor
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin_emulator.peripherals.adc2 import SR
+from eitskin_emulator.peripherals.rcc import HSE_HZ
+from eitskin_emulator.peripherals.spi import SpiFrame
 from emulated import board_of, clean, connect, hang, power_up
 
 OPEN = (None,) * 4

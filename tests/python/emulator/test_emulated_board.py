@@ -9,10 +9,6 @@ import pytest
 from eitskin.device.client import Device
 from eitskin.device.wire.link_table import FaultCode, Quality, RawFlags, Stream
 from eitskin.device.wire.packets import Fault, RawFrame, SolvedTouches
-from eitskin.emulator.analog.converter import STEP_V
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.emulator.scene_skin import skin_of
 from eitskin.errors import DeviceError, ProtocolError
 from eitskin.model.build import BuildSettings, linearise, make_model
 from eitskin.model.eitm import encode_model
@@ -20,6 +16,10 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.library_scenes import find_scene
 from eitskin.skin.protocol import opposite
 from eitskin.skin.skin import paper_skin
+from eitskin_emulator.analog.converter import STEP_V
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin_emulator.scene_skin import skin_of
 from emulated import EVERYTHING, board_of, clean, connect, power_up, raw_frames, twin_check
 from small_models import small
 

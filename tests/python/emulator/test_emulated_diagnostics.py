@@ -12,12 +12,12 @@ from eitskin.device.client import Device
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FaultCode
 from eitskin.device.wire.packets import Fault
-from eitskin.emulator.analog.skin import AnalogSkin
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.scene_skin import skin_of
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
+from eitskin_emulator.analog.skin import AnalogSkin
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.scene_skin import skin_of
 from emulated import EVERYTHING, board_of, connect, twin_check
 
 

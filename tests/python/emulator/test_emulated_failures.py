@@ -9,9 +9,9 @@ from eitskin.device.client import Device
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import FaultCode, Stream
 from eitskin.device.wire.packets import Fault, SolvedTouches
-from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.emulator.memory import RAM
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin_emulator.memory import RAM
 from emulated import clean, connect, hang, power_up, restarted
 from small_models import small_blob
 

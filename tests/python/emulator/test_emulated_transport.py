@@ -1,7 +1,6 @@
 """``emu:SCENE``: opening it, its time, its refusals."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -10,10 +9,10 @@ from eitskin.device.open import open_device
 from eitskin.device.transport import Transport
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import SolvedTouches
-from eitskin.emulator import transport as transport_module
-from eitskin.emulator.clocktime import TICKS_PER_S
-from eitskin.emulator.transport import EmulatedTransport, open_emulated
-from eitskin.errors import DeviceError, FileError, MissingExtraError, ProtocolError
+from eitskin.errors import DeviceError, FileError, ProtocolError
+from eitskin_emulator import transport as transport_module
+from eitskin_emulator.clocktime import TICKS_PER_S
+from eitskin_emulator.transport import EmulatedTransport, open_emulated
 from emulated import IMAGE
 from small_models import small_blob
 
@@ -84,12 +83,6 @@ def test_refusals(built: Path, tmp_path: Path) -> None:
         open_emulated("two_touch", image=elf)
     with pytest.raises(ProtocolError, match="its skin has 16 electrodes, the model is for 8"):
         open_emulated("two_touch", image=built, model=small_blob(electrodes=8, rank=12))
-
-
-def test_without_unicorn_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "unicorn", None)
-    with pytest.raises(MissingExtraError, match=r"eitskin\[emulator\]"):
-        open_emulated("two_touch")
 
 
 def test_the_image_that_ships_runs() -> None:

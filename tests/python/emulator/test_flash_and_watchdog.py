@@ -3,10 +3,10 @@
 import pytest
 from thumb import CLOCK, compile_program, flat_skin, out, run_program
 
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.emulator.memory import BANK_BYTES
 from eitskin.errors import DeviceError
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin_emulator.memory import BANK_BYTES
 from emulated import board_of, connect, power_up
 
 OPEN = "FLASH_KEYR = 0x45670123u; FLASH_KEYR = 0xCDEF89ABu;"

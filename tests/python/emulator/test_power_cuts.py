@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from eitskin.device.bank import bank_bytes
-from eitskin.emulator.analog.skin import AnalogSkin
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.memory import BANK_BYTES, BANKS, FLASH
-from eitskin.emulator.peripherals.flash import LARGE
 from eitskin.skin.protocol import adjacent
+from eitskin_emulator.analog.skin import AnalogSkin
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.memory import BANK_BYTES, BANKS, FLASH
+from eitskin_emulator.peripherals.flash import LARGE
 from emulated import clean, connect
 from small_models import tiny_blob
 

@@ -3,12 +3,12 @@
 import pytest
 from thumb import CLOCK, OUT, STACK_TOP, compile_program, flat_skin, out, run_program, unexpected
 
-from eitskin.emulator import board as board_module
-from eitskin.emulator import counter
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_US
-from eitskin.emulator.memory import RAM
 from eitskin.errors import DeviceError
+from eitskin_emulator import board as board_module
+from eitskin_emulator import counter
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_US
+from eitskin_emulator.memory import RAM
 
 # arithmetic with IT blocks, floating point, division and memory: whatever slicing could spoil
 MIXED = """
@@ -338,7 +338,7 @@ def test_a_bug_in_a_peripheral_is_not_swallowed(monkeypatch: pytest.MonkeyPatch)
     def broken(self: object, offset: int, size: int) -> int:
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr("eitskin.emulator.peripherals.rcc.Rcc.read", broken)
+    monkeypatch.setattr("eitskin_emulator.peripherals.rcc.Rcc.read", broken)
     with pytest.raises(ZeroDivisionError, match="a bug"):
         run_program("void program(void) { OUT[0] = RCC_CR; }", 100)
 

@@ -4,10 +4,10 @@ what goes wrong."""
 import pytest
 from thumb import CLOCK, compile_program, flat_skin, out, run_program
 
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_US
-from eitskin.emulator.memory import RAM
-from eitskin.emulator.serial_line import resampled
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_US
+from eitskin_emulator.memory import RAM
+from eitskin_emulator.serial_line import resampled
 
 SERIAL = """
     clock_216();

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from thumb import CLOCK, compile_program, flat_skin, out, run_program
 
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_US
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_US
 
 TIMERS_ON = "RCC_APB1ENR |= 0xB; (void)RCC_APB1ENR;"
 

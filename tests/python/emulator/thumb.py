@@ -10,11 +10,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from eitskin.emulator.analog.skin import AnalogSkin
-from eitskin.emulator.board import EmulatedBoard
-from eitskin.emulator.clocktime import TICKS_PER_US
-from eitskin.emulator.memory import RAM
 from eitskin.skin.protocol import adjacent
+from eitskin_emulator.analog.skin import AnalogSkin
+from eitskin_emulator.board import EmulatedBoard
+from eitskin_emulator.clocktime import TICKS_PER_US
+from eitskin_emulator.memory import RAM
 
 ROOT = Path(__file__).resolve().parents[3]
 BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"

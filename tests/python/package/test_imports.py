@@ -1,5 +1,5 @@
 """Who imports whom: no circle of modules, each package only those that its data come from, and
-nothing of the studies in what is installed."""
+nothing of what only a checkout has in what is installed."""
 
 import ast
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ ORDER = (
     {"frames", "reference"},
     {"solve", "scene"},
     {"calibration"},
-    {"device", "emulator"},  # emu: is opened by the one and speaks the other's link
+    {"device"},
     {"teaching"},
     {"scoring"},
     {"tuning", "demo"},
@@ -98,7 +98,7 @@ def test_circles_are_seen() -> None:
     assert circles(chain) == [["b", "c"]]
 
 
-@pytest.mark.parametrize("package", ["eitskin", "eitskin_studies"])
+@pytest.mark.parametrize("package", ["eitskin", "eitskin_emulator", "eitskin_studies"])
 def test_no_module_imports_itself_by_way_of_others(package: str) -> None:
     assert circles(graph(package)) == []
 
@@ -117,7 +117,15 @@ def test_imports_follow_the_data() -> None:
     assert against == set()
 
 
-def test_the_installed_package_knows_nothing_of_the_studies() -> None:
+def test_the_installed_package_knows_nothing_of_a_checkouts_but_emu() -> None:
+    others = modules("eitskin_studies") | modules("eitskin_emulator")
+    named = {name for name, path in modules("eitskin").items() if imported(path, others)}
+    assert named == {"eitskin.device.open"}
+    assert imported(modules("eitskin")["eitskin.device.open"], others) == {
+        "eitskin_emulator.transport"
+    }
+
+
+def test_the_emulated_board_knows_nothing_of_the_studies() -> None:
     studies = modules("eitskin_studies")
-    named = {path for path in modules("eitskin").values() if imported(path, studies)}
-    assert named == set()
+    assert not any(imported(path, studies) for path in modules("eitskin_emulator").values())

@@ -12,8 +12,6 @@ from eitskin.device.client import Device
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import RawFrame
-from eitskin.emulator.clocktime import TICKS_PER_S
-from eitskin.emulator.scene_skin import skin_of
 from eitskin.errors import ConfigError
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.compiler import compile_scene
@@ -24,6 +22,8 @@ from eitskin.scene.runner import FrameMaker, run, simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.skin.protocol import adjacent, in_order, table
+from eitskin_emulator.clocktime import TICKS_PER_S
+from eitskin_emulator.scene_skin import skin_of
 from small_models import prebuilt
 
 RATE_HZ = 1e4 / 208  # scans of 100 us a row, one behind the other

@@ -1,0 +1,82 @@
+"""Four ADG1206 multiplexers (data sheet Rev. C): which electrode each joins, and whether they were
+broken before they made.
+
+Address and enable come as the levels that pins drive; a pin that drives nothing counts as low (the
+board's pull-downs). The part's own transition time (at most 140 ns) is part of the settling. An
+address that changes while its enable is high, or sooner after it went low than the slowest part
+takes to open (tOFF(EN)), may join two electrodes: both are recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from eitskin_emulator.clocktime import TICKS_PER_S
+
+NAMES = ("I+", "I-", "V+", "V-")
+OFF_TICKS = 140 * TICKS_PER_S // 10**9  # the longest tOFF(EN), -40 to 125 C on +-15 V (table 1)
+MAX_LOGGED = 20_000
+
+
+@dataclass(frozen=True)
+class Switching:
+    """From ``at`` on these electrodes are joined (None: off), [I+, I-, V+, V-]."""
+
+    at: int
+    joined: tuple[int | None, int | None, int | None, int | None]
+
+
+class Multiplexers:
+    """``switched`` hears of each change."""
+
+    def __init__(self) -> None:
+        self._address = self._enable = 0
+        self._off_at = [-OFF_TICKS] * 4
+        self.switched: Callable[[Switching], None] = lambda switching: None
+        self.joined: tuple[int | None, int | None, int | None, int | None] = (None,) * 4
+        self.log: list[Switching] = []
+        self.changes = 0
+        self.violations: list[str] = []
+
+    def set_addresses(self, at: int, address: int) -> None:
+        """The 16 address lines: four bits each."""
+        changed = address ^ self._address
+        for k, name in enumerate(NAMES):
+            if changed >> 4 * k & 0xF:
+                if self._enable >> k & 1:
+                    self._violation(at, f"{name} changed its address while enabled")
+                elif at < self._off_at[k] + OFF_TICKS:
+                    self._violation(at, f"{name} changed its address before it was open")
+        self._address = address
+        self._follow(at)
+
+    def set_enables(self, at: int, enable: int) -> None:
+        """The four enables."""
+        for k in range(4):
+            if self._enable >> k & 1 and not enable >> k & 1:
+                self._off_at[k] = at
+        self._enable = enable
+        self._follow(at)
+
+    def release(self, at: int) -> None:
+        """All lines float at once: the processor is reset. That is no switching order of the
+        program's."""
+        self._address = self._enable = 0
+        self._off_at = [at] * 4
+        self._follow(at)
+
+    def _follow(self, at: int) -> None:
+        on = [(self._address >> 4 * k & 0xF) if self._enable >> k & 1 else None for k in range(4)]
+        joined = (on[0], on[1], on[2], on[3])
+        if joined != self.joined:
+            self.joined = joined
+            self.changes += 1
+            one = Switching(at, joined)
+            if len(self.log) < MAX_LOGGED:
+                self.log.append(one)
+            self.switched(one)
+
+    def _violation(self, at: int, what: str) -> None:
+        if len(self.violations) < MAX_LOGGED:
+            self.violations.append(f"{at / TICKS_PER_S * 1e6:.3f} us: {what}")

@@ -1,0 +1,84 @@
+"""Generator, multiplexers, skin and converter together: what the converter sees at given times.
+
+The amplitude goes from one row's to the next one's as exp(-t / tau), tau = 1.5 us: source, cables,
+skin and amplifier as one first-order lag. Sixteen microseconds leave 2e-5 of a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin_emulator.analog.ad9833 import Ad9833
+from eitskin_emulator.analog.adg1206 import Multiplexers, Switching
+from eitskin_emulator.analog.converter import codes
+from eitskin_emulator.analog.skin import AnalogSkin
+from eitskin_emulator.clocktime import TICKS_PER_S
+
+TAU_TICKS = 1.5e-6 * TICKS_PER_S
+INPUT_CHANNEL, SENSE_CHANNEL = 3, 10
+SOURCE_A, SENSE_OHM, SENSE_STEPS_A_VOLT = 0.5e-3, 1000.0, 4096 / 3.3  # amplitude
+KEPT = 8  # lags that are remembered: samples are asked for at most one conversion after their time
+
+
+class FrontEnd:
+    """``connected`` tells whether the converter's pin is in analog mode. ``before_switch`` lets
+    pending samples be taken."""
+
+    def __init__(self, generator: Ad9833, multiplexers: Multiplexers, skin: AnalogSkin) -> None:
+        self.generator, self.multiplexers, self.skin = generator, multiplexers, skin
+        self.connected: Callable[[], bool] = lambda: True
+        self.before_switch: Callable[[], None] = lambda: None
+        self.sense_connected: Callable[[], bool] = lambda: True
+        self.source_a = SOURCE_A  # amplitude; a fault of the source is another one
+        self.samples = self.unsettled = 0
+        self._lags: list[tuple[int, float, float]] = [
+            (-(1 << 60), 0.0, 0.0)
+        ]  # from a time on: target, and what is left then
+        self.drive_switched: Callable[[int], None] = lambda at: None
+        multiplexers.switched = self._switched
+
+    def _switched(self, switching: Switching) -> None:
+        self.before_switch()
+        target = self.skin.amplitude_v(switching.at, switching.joined)
+        start, before, left = self._lags[-1]
+        reached = before + left * float(np.exp(-(switching.at - start) / TAU_TICKS))
+        self._lags.append((switching.at, target, reached - target))
+        del self._lags[:-KEPT]
+        self.drive_switched(switching.at)
+
+    def sample(self, times: npt.NDArray[np.int64], channel: int) -> npt.NDArray[np.uint16]:
+        """Codes (.,) at ascending ``times`` (ticks)."""
+        if channel != INPUT_CHANNEL or not self.connected():
+            return np.zeros(len(times), dtype=np.uint16)
+        self.samples += len(times)
+        return codes(self._amplitudes(times) * self.generator.output(times))
+
+    def sense(self, at: int, channel: int) -> int:
+        """The code of the voltage over the sense resistor at ``at`` (ticks): half the reference,
+        and what flows back through I-."""
+        if channel != SENSE_CHANNEL or not self.sense_connected():
+            return 0
+        flows = None not in self.multiplexers.joined[:2]
+        now = float(self.generator.output(np.array([at], dtype=np.int64), peek=True)[0])
+        v = self.source_a * SENSE_OHM * now if flows else 0.0
+        return min(max(round(2048 + v * SENSE_STEPS_A_VOLT), 0), 4095)
+
+    def _amplitudes(self, times: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+        out = np.empty(len(times))
+        for k, (start, target, left) in enumerate(self._lags):
+            first = 0 if k == 0 else int(np.searchsorted(times, start))
+            last = (
+                len(times)
+                if k + 1 == len(self._lags)
+                else int(np.searchsorted(times, self._lags[k + 1][0]))
+            )
+            if first < last:
+                out[first:last] = (
+                    target
+                    if left == 0
+                    else target + left * np.exp(-(times[first:last] - start) / TAU_TICKS)
+                )
+        return out

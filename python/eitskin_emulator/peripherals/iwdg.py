@@ -1,0 +1,70 @@
+"""The independent watchdog (RM0410 chapter 30), from the 32 kHz LSI; a written PR or RLR is busy
+for five of its periods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from eitskin_emulator.clocktime import BoardClock, period_ticks
+from eitskin_emulator.peripherals.registers import Registers
+from eitskin_emulator.record import Record
+from eitskin_emulator.schedule import Event, Schedule
+
+LSI_TICKS = period_ticks(32_000)
+START, UNLOCK, RELOAD = 0xCCCC, 0x5555, 0xAAAA
+KR, PR, RLR, SR, WINR = (4 * k for k in range(5))
+RESET_VALUES = {KR: 0, PR: 0, RLR: 0xFFF, SR: 0, WINR: 0xFFF}
+
+
+class Iwdg(Registers):
+    """0x40003000. ``expired`` is called when nobody fed it in time."""
+
+    name, base = "IWDG", 0x40003000
+
+    def __init__(
+        self, clock: BoardClock, schedule: Schedule, record: Record, expired: Callable[[], None]
+    ) -> None:
+        super().__init__(record, RESET_VALUES)
+        self._clock, self._schedule = clock, schedule
+        self._event = Event(lambda at: expired())
+        self._on = self._open = False
+        self._busy_until = 0
+        self.feeds = 0
+
+    def reset(self) -> None:
+        """As after a reset: off."""
+        self.values = dict(self.reset_values)
+        self._on = self._open = False
+        self._schedule.set(self._event, None)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has been started."""
+        return self._on
+
+    @property
+    def timeout_ticks(self) -> int:
+        """From a feed to the reset."""
+        return LSI_TICKS * (4 << min(self.values[PR], 6)) * (self.values[RLR] + 1)
+
+    def read(self, offset: int, size: int) -> int:
+        if offset == SR:
+            return 3 if self._clock.now < self._busy_until else 0
+        return super().read(offset, size)
+
+    def write(self, offset: int, size: int, value: int) -> None:
+        if offset == KR:
+            self._open = value == UNLOCK
+            self._on = self._on or value == START
+            self.feeds += value == RELOAD
+            if self._on and value in (START, RELOAD):
+                self._schedule.set(self._event, self._clock.now + self.timeout_ticks)
+        elif offset == WINR:
+            self.unmodelled("a window")
+        elif not self._open:
+            self.hazard("PR or RLR written while it is locked")
+        else:
+            self._busy_until = self._clock.now + 5 * LSI_TICKS
+            super().write(offset, size, value & (7 if offset == PR else 0xFFF))
+            if self._on:
+                self._schedule.set(self._event, self._clock.now + self.timeout_ticks)
