@@ -14,7 +14,7 @@ from eitskin_studies.benchmarks.diagnostics import (
     Mean,
 )
 from eitskin_studies.benchmarks.diagnostics_faults import DETACHED, FAULTS, NONE
-from eitskin_studies.harness.sections import Filling, text_table
+from eitskin_studies.harness.sections import AS_EVERYWHERE, Filling, text_table
 
 SNR_WORDS = tuple(f"{snr:g} dB" for snr in SNRS_DB)
 FAULT_HEAD = (
@@ -178,13 +178,11 @@ def as_text(result: Findings) -> str:
 def for_page(result: Findings, command: str) -> Filling:
     """The marks of docs/results/diagnostics.md."""
     run = (
-        f"By `{command}`; rules and thresholds were chosen under seeds 77 and 177."
-        f" {result.rate(NONE).scenes} scenes of one to three touches (radius 6 to 12 mm, contrast 3"
-        " to 10), solved nonlinearly on another mesh than the model's; contacts +-20 %; the fault"
-        " at electrode k mod 16 in scene k. SNR is 20 log10(rms(V0) / sigma) of white noise, then a"
-        " converter of 12 bits (16 at 80 dB). 16 frames of reference, then one frame, cold, by the"
-        " paper's model with its own options. Frames rejected, which count as empty images:"
-        f" {refused(result.rates)}."
+        f"By `{command}`: {result.rate(NONE).scenes} scenes of one to three touches,"
+        f" {AS_EVERYWHERE} (16 bits at 80 dB), the fault at electrode k mod 16 in scene k; 16"
+        " frames of reference, then one frame, cold, the paper's model with its own options. Rules"
+        " and thresholds were chosen under seeds 77 and 177. Frames rejected, which count as empty"
+        f" images: {refused(result.rates)}."
     )
     texts = {"run": run, "false-alarms": false_alarms(result)}
     return texts, {

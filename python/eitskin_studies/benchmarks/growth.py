@@ -271,8 +271,8 @@ def for_page(result: GrowthTimes, command: str) -> Filling:
     """The marks ``growth-run`` and ``growth``."""
     run = (
         f"By `{command}`: one thing varied at a time about 16 electrodes, 812 pixels, rank 64 and"
-        " two touches; default options, cold, medians of the thread's time over"
-        f" {result.rounds} rounds in turns, {SCENES} frames each (linear answer, 60 dB);"
-        f" {result.machine}. MACs are exact. Fitted exponents: {summary(result)}."
+        f" two touches; default options, cold, medians of {result.rounds} rounds in turns, {SCENES}"
+        f" frames each (linear answer, 60 dB); {result.machine}. Fitted exponents:"
+        f" {summary(result)}."
     )
     return {"growth-run": run}, {"growth": (HEAD, rows(result))}

@@ -235,12 +235,10 @@ def as_text(result: KernelTimes) -> str:
 def for_page(result: KernelTimes, command: str) -> Filling:
     """The marks ``kernels-run`` and ``kernels``."""
     hot = missed(result, True)
-    peaks = "\n".join(f"- {peaks_text(width)}" for width in result.widths)
     run = (
         f"By `{command}`: {result.columns} columns of {result.rank} numbers,"
         f" {result.widths[0].kernels} kernels, one thread, medians of {result.rounds} rounds in"
-        f" turns; {result.machine}. Peaks, measured in the same rounds:\n\n{peaks}\n\n"
-        f"Of what a prepared context calls, beyond {MAX_TIMES:g} times its limit:"
-        f" {'; '.join(hot) or 'nothing'}."
+        f" turns; {result.machine}. Of what a prepared context calls, beyond {MAX_TIMES:g} times"
+        f" its limit: {'; '.join(hot) or 'nothing'}."
     )
     return {"kernels-run": run}, {"kernels": (HEAD, rows(result))}

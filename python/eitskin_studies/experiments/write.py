@@ -77,10 +77,7 @@ def _command(name: str, page: Path, settings: ExperimentSettings) -> str:
     more = f" --seed {settings.seed}" if settings.seed != ExperimentSettings.seed else ""
     more += f" --share {settings.share:g}" if settings.share != ExperimentSettings.share else ""
     more += "" if settings.data is None else " --data FOLDER"
-    return (
-        f"Tables and pictures are written by `eitskin study {name} -o out/{name}{more} --page"
-        f" docs/results/{page.name}`."
-    )
+    return f"Made by `eitskin study {name} -o out/{name}{more} --page docs/results/{page.name}`."
 
 
 def _csv(table: Table) -> str:

@@ -169,8 +169,7 @@ def for_page(bench: GestureBench, command: str) -> Filling:
     text = (
         f"By `{command}`: {how.sessions} sessions of role {how.role}, seed {how.seed}, each of"
         f" {EACH} gestures of each kind in random order, {RATE_HZ:g} whole scans a second,"
-        f" simulated on a mesh of about {ELEMENTS} elements that the model does not share, contacts"
-        " that differ by up to 20 %, 12 bits."
+        f" simulated on another mesh of about {ELEMENTS} elements, contacts ±20 %, 12 bits."
     )
     tables = {
         "summary": _summary(bench), "kinds": _by_kind(bench), "confusion": _confusion(bench),

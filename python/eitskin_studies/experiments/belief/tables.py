@@ -141,19 +141,19 @@ def summary(sets: Sets) -> str:
         f" 90 % ellipses cover {_range(own)} of the true places in the simulator's world and"
         f" {_range(others)} in others, {len(inside)} of {len(covered)} sets within 87 to 93 %."
         f" Of two fingers 12 to 16 mm apart {_percent(near.right)} are counted, and"
-        f" {_percent(near.honest)} are counted or said to be crowded; of frames counted right,"
+        f" {_percent(near.honest)} are counted or called crowded; of frames counted right,"
         f" {_percent(discs.said_right)} of discs and {_percent(fingers.said_right)} of fingers are"
-        " said to be crowded, too."
+        " called crowded, too."
     )
 
 
 def conditions(settings: ExperimentSettings, count: int) -> str:
     """How the numbers were made."""
     return (
-        'The C core in float32, the prebuilt model, default options. Scenes of the family "judging"'
-        f" of the [other worlds](other-worlds.md), seed {settings.seed}, {count} scenes a set;"
-        ' constants were chosen on the family "tuning". A touch is true where it is paired with a'
-        " true one within 10 mm. Brackets: Wilson's 95 % intervals."
+        'The prebuilt model, float32, default options; scenes of the family "judging" of the [other'
+        f" worlds](other-worlds.md), seed {settings.seed}, {count} a set; constants were chosen on"
+        ' the family "tuning". A touch is true where it is paired with a true one within 10 mm.'
+        " Brackets: Wilson's 95 % intervals."
     )
 
 

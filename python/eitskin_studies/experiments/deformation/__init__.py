@@ -26,6 +26,7 @@ from eitskin_studies.experiments.experiment import (
     Workspace,
 )
 from eitskin_studies.experiments.multitouch.counts import share
+from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.sessions import converter_for
 from eitskin_studies.harness.snr import noise_deviation_v
 
@@ -146,8 +147,7 @@ def _table(scores: list[dict[str, Any]]) -> Table:
 
 def _words(scenes: int, seed: int) -> str:
     return (
-        f"{scenes} random scenes of seed {seed}: 1 to 3 discs of radius 6 to 12 mm, contrast 3 to"
-        f" 10, {SNR_DB:g} dB, 12 bits, contacts +-20 %, frames from {SIMULATED_ELEMENTS} elements;"
+        f"{scenes} random scenes of 1 to 3 discs, seed {seed}, {SNR_DB:g} dB, {AS_EVERYWHERE};"
         f" {UNTOUCHED} untouched frames; the prebuilt model with its default options."
     )
 

@@ -30,6 +30,7 @@ from eitskin_studies.experiments.electrodes.tables import all_tables, is_usual
 from eitskin_studies.experiments.electrodes.tuning import ITERATIONS, LAMBDAS, REGULARISATIONS
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.scored import number_text
+from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.summary import summarise
 from eitskin_studies.pictures.electrodes_pictures import Bar, draw_counts, draw_patterns
 
@@ -43,8 +44,9 @@ SAID = (
     " iterations are the best of {tries} settings, by image MIoU + disc MIoU + exact count, and t"
     " the best by image MIoU, on scenes of seed {tuning_seed} ({tuning} of 1 to 3 touches,"
     " {tuning_six} of six). Noise: sigma = {sigma:.3g} V in a row of 80 samples, {snr:g} dB below"
-    " rms(V0) of 16 adjacent electrodes, the same for every pattern; no converter. Contacts spread"
-    " by 20 %; frames from meshes of about 11,000 elements, models from others of about 6,000."
+    " rms(V0) of 16 adjacent electrodes, the same for every pattern; no converter; else "
+    + AS_EVERYWHERE
+    + "."
 )
 
 

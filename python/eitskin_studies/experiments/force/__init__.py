@@ -143,8 +143,8 @@ def _sets(
     return (
         f"Calibrated on {of(tuned)} of seed {tuning_seed}, reported on {of(reported)} of seed"
         f" {seed}, each with five weights; {len(laws) - 1} laws beside the nominal one; {reps}"
-        f" frames of each light press. The law chosen for the touch at {AVERAGED_DB:g} dB is"
-        f" *{touch.form}*, its gain of order {touch.order}."
+        f" frames of each light press; at {AVERAGED_DB:g} dB the touch's law is *{touch.form}*, its"
+        f" gain of order {touch.order}."
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS, ExperimentSettings, Table
+from eitskin_studies.experiments.experiment import ExperimentSettings, Table
 from eitskin_studies.experiments.homogeneous.cases import INSTRUMENT, QUIET_FRAMES
 from eitskin_studies.experiments.homogeneous.measured import FILE, SOURCE
 from eitskin_studies.experiments.homogeneous.uniformity import Uniformity
@@ -95,9 +95,8 @@ def words(
     seed = 1000 * settings.seed
     conditions = (
         f"{sessions} sessions a case (one without any effect), seeds {seed} to"
-        f" {seed + sessions - 1}, each with contacts, places, gains and noise of its own; the mean"
-        f" of {QUIET_FRAMES} frames; about {SIMULATED_ELEMENTS:,} elements. Percent; mean [95"
-        " % bootstrap interval] over sessions. From the third case on: what the second has, and the"
+        f" {seed + sessions - 1}, each with contacts, places, gains and noise of its own; means of"
+        f" {QUIET_FRAMES} frames. In percent; from the third case on: what the second has, and the"
         " one thing named."
     )
     reading = (

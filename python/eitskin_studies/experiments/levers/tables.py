@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from eitskin_studies.experiments.experiment import (
-    MODEL_ELEMENTS,
-    SIMULATED_ELEMENTS,
     ExperimentSettings,
     Table,
 )
@@ -19,6 +17,7 @@ from eitskin_studies.experiments.levers.measure import (
     TUNING,
 )
 from eitskin_studies.experiments.multitouch.counts import share_of
+from eitskin_studies.harness.sections import AS_EVERYWHERE
 
 Found = Mapping[str, Mapping[str, Any]]
 
@@ -101,11 +100,9 @@ def asked_table(images: Found) -> Table:
 def conditions(settings: ExperimentSettings) -> str:
     """How the numbers came about."""
     return (
-        f"Seed {settings.seed}: {settings.count(SCENES)} scenes of 1 to 3 random touches (radius 6"
-        f" to 12 mm, contrast 3 to 10), and {settings.count(60)} of each other set (radius 9 mm,"
-        f" contrast 5); t chosen on {settings.count(TUNING)} scenes of seed"
-        f" {settings.tuning_seed} at 60 dB, for each row, and kept. Frames from a mesh of about"
-        f" {SIMULATED_ELEMENTS} elements with contacts +-20 %, models from one of about"
-        f" {MODEL_ELEMENTS}; 12 bits, 16 from 70 dB on. Brackets: 95 % intervals, Wilson's for"
-        " fractions, bootstrap for means."
+        f"Seed {settings.seed}: {settings.count(SCENES)} scenes of 1 to 3 random touches, and"
+        f" {settings.count(60)} of each other set (radius 9 mm, contrast 5), {AS_EVERYWHERE}, 16"
+        f" bits from 70 dB on; t chosen on {settings.count(TUNING)} scenes of seed"
+        f" {settings.tuning_seed} at 60 dB, for each row, and kept. Brackets: 95 % intervals,"
+        " Wilson's for fractions, bootstrap for means."
     )

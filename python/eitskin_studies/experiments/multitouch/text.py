@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Workspace
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.multitouch.ambiguity import ScoredFrame, calibration
 from eitskin_studies.experiments.multitouch.cells import (
     GEOMETRIES,
@@ -21,6 +21,7 @@ from eitskin_studies.experiments.multitouch.test_data import (
     TRAINING_PARTS,
     TouchData,
 )
+from eitskin_studies.harness.sections import AS_EVERYWHERE
 
 GOOD = 0.90
 
@@ -33,13 +34,11 @@ def conditions(touch_data: TouchData, workspace: Workspace) -> str:
         f"{SHORT.get(name, name)}: {one.value:g} and t' = {one.threshold:g}" for name, one in chosen
     )
     return (
-        f"Seed {settings.seed}; frames from a mesh of about {SIMULATED_ELEMENTS} elements, contacts"
-        f" +-20 %, models from one of about {MODEL_ELEMENTS}. SNR is 20 log10(rms(V0) / sigma) at"
-        " 80 samples; 12 bits, from 70 dB on 16. The core has its models' defaults. Parameter and"
-        " threshold t' of the classical methods were chosen together, for most exact counts, on"
-        f" {TRAINING_PARTS * settings.count(MIXED_SCENES, 3)} mixed tuning scenes at 60 dB (seed"
-        f" {settings.tuning_seed}): {trained}. Brackets are 95 % intervals: Wilson's for fractions,"
-        " bootstrap for errors."
+        f"Seed {settings.seed}, {AS_EVERYWHERE}, 16 bits from 70 dB on; SNR at 80 samples. The core"
+        " has its models' defaults. Parameter and threshold t' of the classical methods were chosen"
+        f" together, for most exact counts, on {TRAINING_PARTS * settings.count(MIXED_SCENES, 3)}"
+        f" mixed tuning scenes at 60 dB (seed {settings.tuning_seed}): {trained}. Brackets: 95 %"
+        " intervals, Wilson's for fractions, bootstrap for errors."
     )
 
 

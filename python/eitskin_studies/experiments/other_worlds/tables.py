@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from eitskin_studies.experiments.experiment import ExperimentSettings, Table
+from eitskin_studies.harness.sections import AS_EVERYWHERE
 
 Scores = Sequence[Mapping[str, Any]]
 
@@ -110,12 +111,10 @@ def conditions(settings: ExperimentSettings, count: int, knows_errors: bool) -> 
         else " The prebuilt model does not say what it may be wrong by, so that these do nothing."
     )
     return (
-        "The C core in float32, the prebuilt model, default options; without guards: without"
-        f' `row_gains` and `touch_test`.{guards} Scenes of the family "judging", seed'
-        f" {settings.seed}, {count} scenes a set, each with a skin of its own: contacts ±20 %, 64"
-        " quiet frames, and 60 dB, but 80 dB in sets of eight; 12 bits, 16 at 80 dB. Frames come"
-        " from a mesh of about 11000 elements, solved nonlinearly. A touch is found within 10 mm"
-        " of a true one; a scene is exact where none is missed and none false. Brackets: Wilson's"
+        "The prebuilt model, float32, default options; without guards: without `row_gains` and"
+        f' `touch_test`.{guards} Scenes of the family "judging", seed {settings.seed}, {count} a'
+        f" set, each with a skin of its own, {AS_EVERYWHERE}, 60 dB (sets of eight: 80 dB, 16"
+        " bits). *Exact*: every touch is found within 10 mm, and none is false. Brackets: Wilson's"
         " 95 % intervals."
     )
 

@@ -25,6 +25,7 @@ from eitskin_studies.experiments.experiment import (
 )
 from eitskin_studies.experiments.multitouch.counts import share
 from eitskin_studies.experiments.multitouch.variants import read_images
+from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.sessions import FrameSession
 
 FloatArray = npt.NDArray[np.float64]
@@ -163,7 +164,7 @@ def _words(contacts: int, seed: int) -> str:
     return (
         f"Seed {seed}; discs of radius {RADIUS_MM:g} mm and contrast {CONTRAST:g}, each next one"
         f" where it changes the frame most, at least {APART_MM:g} mm from those before;"
-        f" {contacts * NOISES} frames a number, from {contacts} draws of contacts (+-20 %) with"
-        f" {NOISES} of noise; frames from another mesh; the prebuilt model with its defaults. In %,"
-        " scenes counted exactly."
+        f" {contacts * NOISES} frames a number, from {contacts} draws of contacts with {NOISES} of"
+        f" noise, {AS_EVERYWHERE}; the prebuilt model with its defaults. In %, scenes counted"
+        " exactly."
     )

@@ -10,14 +10,15 @@ from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.shapes.measuring import SNR_DB, TEST, TUNING, Maker
 from eitskin_studies.experiments.shapes.tables import all_tables
 from eitskin_studies.experiments.shapes.variants import variants
+from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.pictures.shapes_pictures import ShapePanel, draw_shapes
 
 TITLE = "a rounded rectangle, a forearm and a hand"
 SAID = (
     "{test} test scenes a shape (seed {seed}) of 1 to 3 random touches and {tuning} others (seed"
-    " {tuning_seed}) on which its t was chosen; {snr:g} dB of the skin's own rms(V0), a 12-bit"
-    " converter, contacts spread by 20 %; frames from meshes of about 11,000 elements, models from"
-    " others of about 6,000."
+    " {tuning_seed}) on which its t was chosen; {snr:g} dB of the skin's own rms(V0), "
+    + AS_EVERYWHERE
+    + "."
 )
 
 

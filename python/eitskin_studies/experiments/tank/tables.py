@@ -254,13 +254,10 @@ def conditions(evaluation_sets: EvaluationSets, settings: ExperimentSettings) ->
     tuned, tested = len(evaluation_sets.metal.frames_v), len(evaluation_sets.test.frames_v)
     return (
         f"Parameters and t: {tuned} simulated scenes of metal, for both signs as many of metal and"
-        " plastic, seed "
-        f'{settings.tuning_seed}; columns "simulated": {tested} scenes of metal, seed'
-        f" {settings.seed}. Noise "
-        f"{100 * evaluation_sets.noise_share:.1f} % of the rms of each frame's change, the median"
-        f" of what"
-        " reciprocal readings of "
-        "the measured frames show. MIoU bilinear, mask x > t max(x)."
+        f' plastic, seed {settings.tuning_seed}; columns "simulated": {tested} scenes of metal,'
+        f" seed {settings.seed}. Noise: {100 * evaluation_sets.noise_share:.1f} % of the rms of"
+        " each frame's change, as the measured frames' reciprocal readings show (median). MIoU"
+        " bilinear."
     )
 
 

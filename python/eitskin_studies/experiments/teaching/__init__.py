@@ -105,9 +105,9 @@ def _conditions(splits: int) -> str:
     return (
         f"{splits} random splits of 500 presses (seeds 0 to {splits - 1}), the last {JUDGED} of"
         " each judged, each against the untouched frame just before it; medians over splits. No"
-        " number of a method was chosen on the judged presses of its split; the recipe as a whole"
-        " was chosen on this set. Two presses are sums of two real ones; exact: two touches, each"
-        f" within {PAIR_MM:g} mm of its own. Ellipses are the core's own."
+        " number of a method was chosen on judged presses, but the recipe as a whole on this set."
+        " Two presses are sums of two real ones; exact: two touches, each within"
+        f" {PAIR_MM:g} mm of its own."
     )
 
 
