@@ -18,13 +18,13 @@ SEED = 2024
 
 
 @pytest.fixture(scope="module", params=[60, 200])
-def simulated(request: pytest.FixtureRequest) -> Simulated:
+def simulated(request) -> Simulated:
     """scripts/test has 60 scenes, scripts/test --all 200."""
     return session("acceptance", request.param, SEED)
 
 
 @pytest.fixture(scope="module")
-def scores(simulated: Simulated) -> list[FrameScore]:
+def scores(simulated) -> list[FrameScore]:
     """Each scene by itself, by the float32 core."""
     model, blob = prebuilt()
     frames = simulated.as_frames()
@@ -41,7 +41,7 @@ def scores(simulated: Simulated) -> list[FrameScore]:
     return found
 
 
-def test_the_scenes_are_what_they_should_be(simulated: Simulated) -> None:
+def test_the_scenes_are_what_they_should_be(simulated):
     counts = [len(scene.touches) for scene in simulated.touches.scenes]
     assert set(counts) == {1, 2, 3} and min(counts.count(k) for k in (1, 2, 3)) > 0.22 * len(counts)
     assert simulated.mesh_elements > 3 * prebuilt()[0].meta["mesh_elements"]
@@ -50,25 +50,25 @@ def test_the_scenes_are_what_they_should_be(simulated: Simulated) -> None:
     ) == pytest.approx(60)
 
 
-def test_image(scores: list[FrameScore]) -> None:
+def test_image(scores):
     values = np.array([score.miou_image for score in scores])
     assert values.mean() >= 0.84
     assert np.quantile(values, 0.1) >= 0.72
 
 
-def test_touches_as_discs(scores: list[FrameScore]) -> None:
+def test_touches_as_discs(scores):
     values = np.array([score.miou_touches for score in scores])
     assert values.mean() >= 0.88
     assert np.quantile(values, 0.1) >= 0.80
 
 
-def test_positions(scores: list[FrameScore]) -> None:
+def test_positions(scores):
     errors = [distance for score in scores for distance in score.matching.distances_mm]
     assert np.median(errors) <= 1.5
     assert np.quantile(errors, 0.95) <= 4.0
 
 
-def test_counts(scores: list[FrameScore]) -> None:
+def test_counts(scores):
     assert np.mean([score.matching.exact for score in scores]) >= 0.9
     assert sum(score.matching.false_touches for score in scores) <= 0.05 * len(scores)
     assert sum(score.matching.misses for score in scores) <= 0.05 * len(scores)

@@ -162,7 +162,7 @@ def scores(left_out_rows: LeftOutRows, electrodes: int, count: int) -> FloatArra
 
 
 @some_and_all
-def test_a_detached_electrode(left_out_rows: LeftOutRows, count: int) -> None:
+def test_a_detached_electrode(left_out_rows, count):
     whole, damaged = scores(left_out_rows, 0, count), scores(left_out_rows, 1, count)
     loss = whole - damaged
     print(f"whole {whole}, an electrode off {damaged}, loss {loss}")
@@ -172,7 +172,7 @@ def test_a_detached_electrode(left_out_rows: LeftOutRows, count: int) -> None:
 
 
 @some_and_all
-def test_each_further_electrode_costs_a_little(left_out_rows: LeftOutRows, count: int) -> None:
+def test_each_further_electrode_costs_a_little(left_out_rows, count):
     found = np.array([scores(left_out_rows, electrodes, count) for electrodes in range(4)])
     print(found)
     steps = -np.diff(found, axis=0)
@@ -182,7 +182,7 @@ def test_each_further_electrode_costs_a_little(left_out_rows: LeftOutRows, count
 
 
 @some_and_all
-def test_a_few_lost_rows_cost_next_to_nothing(left_out_rows: LeftOutRows, count: int) -> None:
+def test_a_few_lost_rows_cost_next_to_nothing(left_out_rows, count):
     """Both of a reciprocal pair: one alone stands for both."""
     fold, generator = prebuilt()[0].fold, np.random.default_rng(SEED)
     whole = scores(left_out_rows, 0, count)
@@ -199,7 +199,7 @@ def test_a_few_lost_rows_cost_next_to_nothing(left_out_rows: LeftOutRows, count:
         assert loss.max() <= most, rows
 
 
-def test_no_touch_is_seen_where_there_is_none(left_out_rows: LeftOutRows) -> None:
+def test_no_touch_is_seen_where_there_is_none(left_out_rows):
     """Quiet frames after the reference, an electrode's rows lost: as few pass the gate as with all
     rows."""
     seen = {0: 0, 1: 0}

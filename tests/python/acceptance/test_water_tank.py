@@ -30,7 +30,7 @@ IMPORT = [
 
 
 @pytest.fixture(scope="module")
-def folder(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(shared_data, tmp_path_factory) -> Path:
     """Imported frames and the tank's model."""
     place = tmp_path_factory.mktemp("tank")
     source = str(shared_data / "kit4_dev.npz")
@@ -66,9 +66,7 @@ def reconstructed(
 
 
 @pytest.mark.parametrize("engine", ["c", "numpy"])
-def test_every_metal_object_is_found_and_nothing_else(
-    folder: Path, engine: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_metal_object_is_found_and_nothing_else(folder, engine, capsys):
     only = ["--only", ",".join(TOUCH_LIKE), "--engine", engine]
     facts = reconstructed(folder, "kit4.npz", capsys, *only)
     assert {frame["name"]: len(frame["touches"]) for frame in facts["frames"]} == TOUCH_LIKE
@@ -80,7 +78,7 @@ def test_every_metal_object_is_found_and_nothing_else(
     assert min(frame["miou_touches"] for frame in facts["frames"]) >= 0.80
 
 
-def test_the_reference_is_the_models_own(folder: Path) -> None:
+def test_the_reference_is_the_models_own(folder):
     model, blob = load_model(folder / "kit4.eitm")
     frames = load_frames(folder / "kit4.npz")
     for engine in ("c", "c64", "numpy"):
@@ -91,7 +89,7 @@ def test_the_reference_is_the_models_own(folder: Path) -> None:
         assert scorer_for(model).gate_mm == pytest.approx(10 * 280 / 194)
 
 
-def test_gains_of_single_channels_do_not_matter_to_ratios(folder: Path) -> None:
+def test_gains_of_single_channels_do_not_matter_to_ratios(folder):
     """log(v / v0) is the same whatever each channel's amplifier does, as long as it does so in
     both."""
     model, blob = load_model(folder / "kit4.eitm")
@@ -108,9 +106,7 @@ def test_gains_of_single_channels_do_not_matter_to_ratios(folder: Path) -> None:
         assert np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) < 3
 
 
-def test_a_raw_export_in_another_order_and_polarity(
-    folder: Path, shared_data: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_raw_export_in_another_order_and_polarity(folder, shared_data, capsys):
     """The rod before electrode 0 (12 o'clock) at 0.58 of the radius is the strongest touch, and it
     conducts."""
     source, output = str(shared_data / "tank_metal_e1.csv"), str(folder / "e1.npz")

@@ -42,26 +42,26 @@ def refused(path: Path, kind: type[EitskinError], *words: str) -> None:
         f"[{'.'.join(['a'] * 33)}]\nb",
     ],
 )
-def test_keys_of_thousands_of_parts(tmp_path: Path, key: str) -> None:
+def test_keys_of_thousands_of_parts(tmp_path, key):
     path = tmp_path / "skin.toml"
     path.write_text(f"{key} = 1\n")
     refused(path, ConfigError, "a key of over 32 parts")
 
 
-def test_dots_that_are_no_keys_are_no_matter(tmp_path: Path) -> None:
+def test_dots_that_are_no_keys_are_no_matter(tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text(f'a = "{"." * 100}" # {"... " * 50}\nb = [{"1.5, " * 1000}]\n')
     assert len(load_toml(path, "skin")["b"]) == 1000
 
 
 @pytest.mark.parametrize(("name", "megabytes"), [("skin.toml", 1), ("a.svg", 2), ("a.dxf", 2)])
-def test_files_of_many_megabytes(tmp_path: Path, name: str, megabytes: int) -> None:
+def test_files_of_many_megabytes(tmp_path, name, megabytes):
     path = tmp_path / name
     path.write_bytes(b" " * (megabytes * 1_000_000 + 1))
     refused(path, FileError, f"over {megabytes} MB")
 
 
-def test_a_device_without_end_is_read_up_to_the_limit() -> None:
+def test_a_device_without_end_is_read_up_to_the_limit():
     with pytest.raises(FileError, match=r"/dev/zero: over 0\.001 MB, more than a model may have"):
         read_bytes("/dev/zero", "model", 1000)
 
@@ -76,16 +76,14 @@ def packed(path: Path, **arrays: Any) -> None:
             archive.writestr(f"{name}.npy", stream.getvalue())
 
 
-def test_an_archive_that_unpacks_to_far_more(tmp_path: Path) -> None:
+def test_an_archive_that_unpacks_to_far_more(tmp_path):
     path = tmp_path / "frames.npz"
     packed(path, time_s=np.zeros(16_000_000))
     assert path.stat().st_size < 128e6 / MAX_RATIO
     refused(path, FileError, "would unpack to 1280", "split it")
 
 
-def test_fields_that_are_not_known_are_not_unpacked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_fields_that_are_not_known_are_not_unpacked(tmp_path, monkeypatch):
     path, read = tmp_path / "frames.npz", []
     packed(path, unknown=np.zeros(1000))
 
@@ -102,7 +100,7 @@ def test_fields_that_are_not_known_are_not_unpacked(
     assert "voltage_v" in read and "unknown" not in read
 
 
-def test_ten_thousand_arrays(tmp_path: Path) -> None:
+def test_ten_thousand_arrays(tmp_path):
     path = tmp_path / "many.npz"
     with zipfile.ZipFile(path, "w") as archive:
         for k in range(10_001):
@@ -111,7 +109,7 @@ def test_ten_thousand_arrays(tmp_path: Path) -> None:
         read_npz(path, "file of arrays")
 
 
-def test_style_sheets_of_comments(tmp_path: Path) -> None:
+def test_style_sheets_of_comments(tmp_path):
     path = tmp_path / "a.svg"
     path.write_text(
         '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm">'
@@ -132,7 +130,7 @@ def test_style_sheets_of_comments(tmp_path: Path) -> None:
         ("<path style='%s' d='M0 0h9v9z'/>" % ("a:b;" * 3000), "style sheets over 10000"),
     ],
 )
-def test_paths_that_ask_for_much_work(tmp_path: Path, drawn: str, words: str) -> None:
+def test_paths_that_ask_for_much_work(tmp_path, drawn, words):
     path = tmp_path / "a.svg"
     path.write_text(
         f'<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm">{drawn}</svg>'
@@ -140,7 +138,7 @@ def test_paths_that_ask_for_much_work(tmp_path: Path, drawn: str, words: str) ->
     refused(path, ConfigError, words)
 
 
-def test_splines_of_a_million_points(tmp_path: Path) -> None:
+def test_splines_of_a_million_points(tmp_path):
     document = ezdxf.new()
     document.header["$INSUNITS"] = 6
     for k in range(20):
@@ -149,7 +147,7 @@ def test_splines_of_a_million_points(tmp_path: Path) -> None:
     refused(tmp_path / "a.dxf", ConfigError, "over 30000 points")
 
 
-def test_presses_that_unpack_to_far_more(tmp_path: Path) -> None:
+def test_presses_that_unpack_to_far_more(tmp_path):
     path = tmp_path / "presses.npz"
     np.savez_compressed(path, untouched=np.zeros(60_000_000))
     with pytest.raises(FileError, match="would unpack to 480000"):
@@ -157,7 +155,7 @@ def test_presses_that_unpack_to_far_more(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("drawn", [True, False])
-def test_arrays_of_a_million_blocks(tmp_path: Path, drawn: bool) -> None:
+def test_arrays_of_a_million_blocks(tmp_path, drawn):
     """Of blocks that are empty, too: they would be made all the same."""
     document = ezdxf.new()
     document.header["$INSUNITS"] = 4
@@ -170,7 +168,7 @@ def test_arrays_of_a_million_blocks(tmp_path: Path, drawn: bool) -> None:
     refused(tmp_path / "a.dxf", ConfigError, "over 20000 entities")
 
 
-def test_blocks_in_a_circle(tmp_path: Path) -> None:
+def test_blocks_in_a_circle(tmp_path):
     document = ezdxf.new()
     document.header["$INSUNITS"] = 4
     document.blocks.new("B").add_blockref("B", (0, 0))
@@ -179,7 +177,7 @@ def test_blocks_in_a_circle(tmp_path: Path) -> None:
     refused(tmp_path / "a.dxf", ConfigError, "blocks within each other, over 100 deep")
 
 
-def test_lines_are_joined_with_work_in_proportion(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lines_are_joined_with_work_in_proportion(monkeypatch):
     """Ends that are looked at: a few for each line, not all others'."""
     looked = [0]
 

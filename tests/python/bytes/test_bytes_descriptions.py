@@ -1,7 +1,5 @@
 """Any text as a scene's or a skin's description: a scene, or a refusal of one line."""
 
-from pathlib import Path
-
 import pytest
 from bytes_damage import ODD_BYTES, ODD_WORDS, any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
@@ -59,7 +57,7 @@ SCENES = [SCENE, *(path.read_bytes() for path in library().values())]
 
 @given(content=any_bytes([SKIN, DISK], WORDS))
 @bounded(300)
-def test_any_skin_is_read_or_refused_in_a_line(tmp_path: Path, content: bytes) -> None:
+def test_any_skin_is_read_or_refused_in_a_line(tmp_path, content):
     path = written(tmp_path, "skin.toml", content)
     read = read_or_refuse(lambda: load_skin(path))
     if read is not None:
@@ -70,7 +68,7 @@ def test_any_skin_is_read_or_refused_in_a_line(tmp_path: Path, content: bytes) -
 
 @given(content=any_bytes(SCENES, WORDS))
 @bounded(300)
-def test_any_scene_is_read_or_refused_in_a_line(tmp_path: Path, content: bytes) -> None:
+def test_any_scene_is_read_or_refused_in_a_line(tmp_path, content):
     written(tmp_path, "skin.toml", SKIN)
     path = written(tmp_path, "scene.toml", content)
     scene = read_or_refuse(lambda: load_scene(path))
@@ -83,7 +81,7 @@ OTHERS = ("true", '"a"', '"\\u0000"', "[]", "[" * 5000, "1979-05-27", "{}")
 
 
 @pytest.mark.parametrize("value", NUMBERS + OTHERS, ids=lambda value: value[:12])
-def test_each_value_of_a_wrong_kind_is_refused_in_a_line(tmp_path: Path, value: str) -> None:
+def test_each_value_of_a_wrong_kind_is_refused_in_a_line(tmp_path, value):
     written(tmp_path, "skin.toml", SKIN)
     for whole, read in ((SKIN, load_skin), (DISK, load_skin), (SCENE, load_scene)):
         lines = whole.decode().splitlines()

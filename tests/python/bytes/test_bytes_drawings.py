@@ -36,15 +36,13 @@ WORDS = (
 @pytest.mark.parametrize("scale_mm", [None, 1.0])
 @given(content=any_bytes([HAND, CURVES], WORDS))
 @bounded(150)
-def test_any_svg_is_read_or_refused_in_a_line(
-    tmp_path: Path, scale_mm: float | None, content: bytes
-) -> None:
+def test_any_svg_is_read_or_refused_in_a_line(tmp_path, scale_mm, content):
     _read(written(tmp_path, "a.svg", content), scale_mm)
 
 
 @given(content=any_bytes([FOREARM, FOREARM.replace(b"LWPOLYLINE", b"SPLINE")], WORDS))
 @bounded(80)
-def test_any_dxf_is_read_or_refused_in_a_line(tmp_path: Path, content: bytes) -> None:
+def test_any_dxf_is_read_or_refused_in_a_line(tmp_path, content):
     _read(written(tmp_path, "a.dxf", content), 1.0)
 
 

@@ -31,7 +31,7 @@ def own_file(folder: Path, **extra: Any) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def own(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
+def own(tmp_path_factory) -> list[bytes]:
     folder = tmp_path_factory.mktemp("own")
     return [own_file(folder), own_file(folder, time_s=np.arange(3.0))]
 
@@ -72,7 +72,7 @@ ODD_ARRAYS: tuple[Any, ...] = (
 
 @given(content=any_bytes(ARCHIVES))
 @bounded(200)
-def test_any_archive_is_frames_or_refused(tmp_path: Path, content: bytes) -> None:
+def test_any_archive_is_frames_or_refused(tmp_path, content):
     path = written(tmp_path, "x.npz", content)
     frames = read_or_refuse(lambda: load_frames(path))
     if frames is not None:
@@ -83,22 +83,20 @@ def test_any_archive_is_frames_or_refused(tmp_path: Path, content: bytes) -> Non
 
 @given(data=st.data())
 @bounded(60)
-def test_a_damaged_frames_file_is_refused(
-    own: list[bytes], tmp_path: Path, data: st.DataObject
-) -> None:
+def test_a_damaged_frames_file_is_refused(own, tmp_path, data):
     path = written(tmp_path, "x.npz", data.draw(any_bytes(own)))
     read_or_refuse(lambda: load_frames(path))
 
 
 @pytest.mark.parametrize("name", sorted(FIELDS))
-def test_each_field_may_hold_anything(tmp_path: Path, name: str) -> None:
+def test_each_field_may_hold_anything(tmp_path, name):
     for k, value in enumerate(ODD_ARRAYS):
         path = written(tmp_path, f"{k}.npz", stored(**{**FIELDS, name: value}))
         read_or_refuse(lambda path=path: load_frames(path))
         read_or_refuse(lambda path=path: load_frames(path, allow_nonfinite=True))
 
 
-def test_each_array_of_a_foreign_file_may_hold_anything(tmp_path: Path) -> None:
+def test_each_array_of_a_foreign_file_may_hold_anything(tmp_path):
     keys = {
         "voltage": "v", "reference": "ref", "names": "names", "time": "t",
         "protocol_table": "table",
@@ -134,7 +132,7 @@ TABLES = [TABLE, COLUMNS.encode(), b"# comment\n" + TABLE.replace(b",", b"\t") +
 
 @given(content=any_bytes(TABLES, ODD_BYTES + ODD_WORDS))
 @bounded(200)
-def test_any_text_table_is_frames_or_refused(tmp_path: Path, content: bytes) -> None:
+def test_any_text_table_is_frames_or_refused(tmp_path, content):
     path = written(tmp_path, "x.csv", content)
     for quiet in (
         {"reference_frames": "0"},
@@ -157,7 +155,7 @@ ELECTRODES = b"\n".join(b"%d,%d,%d,%d" % tuple(row) for row in PROTOCOL.drive_me
 
 @given(content=any_bytes([ELECTRODES], ODD_BYTES + ODD_WORDS))
 @bounded(100)
-def test_any_protocol_table_is_one_or_refused(tmp_path: Path, content: bytes) -> None:
+def test_any_protocol_table_is_one_or_refused(tmp_path, content):
     options = ImportOptions(
         SourceOptions(reference_frames="0"), table_file=str(written(tmp_path, "t.csv", content))
     )
@@ -188,14 +186,14 @@ def mat_files() -> list[bytes]:
 
 @given(data=st.data())
 @bounded(250)
-def test_any_matlab_file_is_frames_or_refused(tmp_path: Path, data: st.DataObject) -> None:
+def test_any_matlab_file_is_frames_or_refused(tmp_path, data):
     path = written(tmp_path, "x.mat", data.draw(any_bytes(mat_files())))
     options = ImportOptions(SourceOptions(voltage="v", reference="ref"))
     frames = read_or_refuse(lambda: import_frames(path, options, PROTOCOL, None))
     assert frames is None or np.isfinite(frames.voltage_v).all()
 
 
-def test_a_refused_import_leaves_what_was_there(tmp_path: Path) -> None:
+def test_a_refused_import_leaves_what_was_there(tmp_path):
     from eitskin.cli.main import main
 
     target = written(tmp_path, "out.npz", b"as it was")

@@ -1,8 +1,6 @@
 """Any bytes as an .eitm model: read by Python and C alike or refused in a line; what is read can be
 used."""
 
-from pathlib import Path
-
 import numpy as np
 from bytes_damage import any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
@@ -28,7 +26,7 @@ def resealed(content: bytes) -> bytes:
 
 @given(content=any_bytes(WHOLE))
 @bounded(150)
-def test_a_damaged_model_is_refused_in_a_line(tmp_path: Path, content: bytes) -> None:
+def test_a_damaged_model_is_refused_in_a_line(tmp_path, content):
     path = written(tmp_path, "x.eitm", content)
     if read_or_refuse(lambda: load_model(path)) is None:
         assert read_or_refuse(lambda: CoreEngine(content, prepared=False)) is None
@@ -36,9 +34,7 @@ def test_a_damaged_model_is_refused_in_a_line(tmp_path: Path, content: bytes) ->
 
 @given(content=any_bytes(WHOLE).map(resealed))
 @bounded(250)
-def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(
-    tmp_path: Path, content: bytes
-) -> None:
+def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(tmp_path, content):
     path = written(tmp_path, "x.eitm", content)
     loaded = read_or_refuse(lambda: load_model(path))
     if loaded is None:

@@ -2,7 +2,6 @@
 matter."""
 
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 from bytes_damage import any_bytes, bounded, read_or_refuse, written
@@ -82,7 +81,7 @@ def pieces(content: bytes, size: int) -> list[bytes]:
 
 @given(content=any_bytes(WIRES), size=st.integers(1, 700))
 @bounded(150)
-def test_any_line_gives_packets_whatever_the_pieces(content: bytes, size: int) -> None:
+def test_any_line_gives_packets_whatever_the_pieces(content, size):
     whole, cut = Decoder(), Decoder()
     packets = whole.feed(content)
     assert [packet for piece in pieces(content, size) for packet in cut.feed(piece)] == packets
@@ -99,7 +98,7 @@ KINDS = [kind for kind, _ in PAYLOADS] + [PacketType.STATS, 0x55]
 
 @given(kind=st.sampled_from(KINDS), payload=any_bytes([one for _, one in PAYLOADS]))
 @bounded(250)
-def test_any_payload_is_of_its_type_or_malformed(kind: int, payload: bytes) -> None:
+def test_any_payload_is_of_its_type_or_malformed(kind, payload):
     try:
         content = parse(kind, payload)
     except MalformedPacket as error:
@@ -135,7 +134,7 @@ NOTES = [
     )
 )
 @bounded(200)
-def test_any_recording_is_read_or_refused_in_a_line(tmp_path: Path, content: bytes) -> None:
+def test_any_recording_is_read_or_refused_in_a_line(tmp_path, content):
     path = written(tmp_path, "x.eits", content)
     head = read_or_refuse(lambda: read_head(path))
     options = read_or_refuse(lambda: recorded_options(path))
@@ -156,6 +155,6 @@ HEADS = [
 
 @given(head=any_bytes(HEADS))
 @bounded(100)
-def test_any_head_of_a_recording(tmp_path: Path, head: bytes) -> None:
+def test_any_head_of_a_recording(tmp_path, head):
     path = written(tmp_path, "x.eits", encode(PacketType.RECORDING, 0, head))
     read_or_refuse(lambda: read_head(path))

@@ -2,7 +2,6 @@
 over, or refused."""
 
 import json
-from pathlib import Path
 
 from bytes_damage import ODD_BYTES, ODD_WORDS, any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
@@ -29,7 +28,7 @@ IMAGE = load_image()[0][:4096]
 
 @given(content=any_bytes([FRONT], WORDS))
 @bounded(200)
-def test_any_results_of_the_trade_off_are_read_or_refused(tmp_path: Path, content: bytes) -> None:
+def test_any_results_of_the_trade_off_are_read_or_refused(tmp_path, content):
     path = written(tmp_path, "front.json", content)
     front = read_or_refuse(lambda: load_front(path))
     if front is not None:
@@ -38,7 +37,7 @@ def test_any_results_of_the_trade_off_are_read_or_refused(tmp_path: Path, conten
 
 @given(content=any_bytes([STORE], WORDS))
 @bounded(150)
-def test_a_run_goes_on_from_any_store(tmp_path: Path, content: bytes) -> None:
+def test_a_run_goes_on_from_any_store(tmp_path, content):
     store = read_or_refuse(lambda: Store(written(tmp_path, "store.jsonl", content)))
     assert store is not None
     store.put({"a": 1}, [1.5])
@@ -47,5 +46,5 @@ def test_a_run_goes_on_from_any_store(tmp_path: Path, content: bytes) -> None:
 
 @given(content=any_bytes([IMAGE]))
 @bounded(60)
-def test_any_firmware_image_is_checked_or_refused(tmp_path: Path, content: bytes) -> None:
+def test_any_firmware_image_is_checked_or_refused(tmp_path, content):
     read_or_refuse(lambda: check_image(tmp_path / "x.bin", content))

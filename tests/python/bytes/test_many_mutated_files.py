@@ -14,7 +14,7 @@ SCRIPT = HERE / "mutated_files.py"
 
 
 @pytest.mark.parametrize("count", [40, 1000])
-def test_each_is_read_or_refused_soon(count: int) -> None:
+def test_each_is_read_or_refused_soon(count):
     done = subprocess.run(
         [sys.executable, SCRIPT, str(count)], env={**os.environ, "PYTHONPATH": str(HERE.parent)},
         capture_output=True, text=True, check=False,

@@ -12,7 +12,7 @@ from eitskin.calibration.presses import Presses, joined
 from eitskin.errors import FrameError
 
 
-def test_a_known_law_and_gain_are_found() -> None:
+def test_a_known_law_and_gain_are_found():
     found = calibrate(presses(), RADIUS_MM)
     seen = found.fitted.form, found.fitted.order, found.groups, found.by_place
     assert seen == ("saturating", 2, 24, True)
@@ -32,14 +32,14 @@ def test_a_known_law_and_gain_are_found() -> None:
     assert told == pytest.approx(load, rel=0.02)
 
 
-def test_a_flat_skin_needs_no_gain() -> None:
+def test_a_flat_skin_needs_no_gain():
     found = calibrate(presses(bent=False), RADIUS_MM, resamples=0)
     assert found.fitted.order == 0
     assert found.law.gain.tolist() == [1.0]
 
 
 @pytest.mark.parametrize("exponent", [0.6, 1.3])
-def test_powers_are_told_as_well(exponent: float) -> None:
+def test_powers_are_told_as_well(exponent):
     known = presses(noise=0.002, bent=False)
     strength = 2.0 * known.force_n**exponent * known.strength / saturating(known.force_n)
     found = calibrate(replace_strength(known, strength), RADIUS_MM, resamples=0)
@@ -51,7 +51,7 @@ def replace_strength(known: Presses, strength: np.ndarray) -> Presses:
     return Presses(known.force_n, strength, known.place_mm)
 
 
-def test_the_table_is_the_law() -> None:
+def test_the_table_is_the_law():
     law = calibrate(presses(noise=0.0), RADIUS_MM, resamples=0).law
     load = np.linspace(0.02, 2.0, 50)
     assert law.forces_at(np.zeros((50, 2)), saturating(load)) == pytest.approx(
@@ -65,14 +65,14 @@ def test_the_table_is_the_law() -> None:
     )  # the last slope, to twice the greatest load
 
 
-def test_beyond_the_outermost_place_the_gain_stays() -> None:
+def test_beyond_the_outermost_place_the_gain_stays():
     law = calibrate(presses(), RADIUS_MM, resamples=0).law
     assert law.reach == pytest.approx(np.hypot(*places(24).T).max() / RADIUS_MM)
     out = law.gains_at(np.array([(law.reach * RADIUS_MM, 0.0), (200.0, 0.0), (1e9, 0.0)]))
     assert out[1:] == pytest.approx(out[0])
 
 
-def test_one_place_is_told_to_be_one() -> None:
+def test_one_place_is_told_to_be_one():
     one = presses()
     one = one.take(np.arange(5))
     found = calibrate(one, RADIUS_MM, resamples=20)
@@ -82,7 +82,7 @@ def test_one_place_is_told_to_be_one() -> None:
     )
 
 
-def test_unlike_intervals_for_unlike_noise() -> None:
+def test_unlike_intervals_for_unlike_noise():
     width = []
     for noise in (0.005, 0.05):
         (low, high), *_ = calibrate(presses(noise=noise), RADIUS_MM, resamples=60).interval
@@ -90,7 +90,7 @@ def test_unlike_intervals_for_unlike_noise() -> None:
     assert width[1] > 3 * width[0]
 
 
-def test_the_same_seed_gives_the_same() -> None:
+def test_the_same_seed_gives_the_same():
     one, other = (
         calibrate(presses(8), RADIUS_MM, seed=4, resamples=20).as_dict() for _ in range(2)
     )
@@ -106,12 +106,12 @@ def test_the_same_seed_gives_the_same() -> None:
          "2 different weights are too few"),
     ],
 )  # fmt: skip
-def test_too_little_is_refused(rows: object, text: str) -> None:
+def test_too_little_is_refused(rows, text):
     with pytest.raises(FrameError, match=text):
-        calibrate(presses().take(np.arange(120)[rows]), RADIUS_MM)  # type: ignore[index]
+        calibrate(presses().take(np.arange(120)[rows]), RADIUS_MM)
 
 
-def test_weights_too_alike_are_refused() -> None:
+def test_weights_too_alike_are_refused():
     known = presses()
     alike = Presses(1 + 0.1 * known.force_n, known.strength, known.place_mm)
     with pytest.raises(
@@ -121,13 +121,13 @@ def test_weights_too_alike_are_refused() -> None:
         calibrate(alike, RADIUS_MM)
 
 
-def test_strength_that_falls_is_refused() -> None:
+def test_strength_that_falls_is_refused():
     known = presses()
     with pytest.raises(FrameError, match="strength does not grow with load"):
         calibrate(replace_strength(known, 1 / known.force_n), RADIUS_MM)
 
 
-def test_places_and_weights_are_told_apart() -> None:
+def test_places_and_weights_are_told_apart():
     chain = np.array(
         [(0.0, 0.0), (0.9 * PLACE_MM, 0.0), (1.8 * PLACE_MM, 0.0), (4 * PLACE_MM, 0.0)]
     )
@@ -137,7 +137,7 @@ def test_places_and_weights_are_told_apart() -> None:
     assert len(both) == 35
 
 
-def test_a_straight_line_is_told_to_have_no_end() -> None:
+def test_a_straight_line_is_told_to_have_no_end():
     known = presses(noise=0.0, bent=False)
     found = calibrate(replace_strength(known, 2 * known.force_n), RADIUS_MM, resamples=0)
     assert "no saturation" in " ".join(found.notes) or found.fitted.form == "power"

@@ -14,7 +14,7 @@ def written(tmp_path: Path, text: str, name: str = "w.csv") -> Path:
     return path
 
 
-def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
+def test_csv_and_toml_say_the_same(tmp_path):
     table = written(tmp_path, "first, last, weight_g, x_mm, y_mm\n0,3,100,1.5,-2\n\n4,,200,,\n")
     first = "[[press]]\nfirst = 0\nlast = 3\nforce_n = 0.980665\nx_mm = 1.5\ny_mm = -2\n"
     tables = written(tmp_path, first + "[[press]]\nfirst = 4\nweight_g = 200\n", "w.toml")
@@ -48,7 +48,7 @@ def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("first,weight_g\n0.5,5\n", "first = 0.5 must be a whole number"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_in_a_line(tmp_path: Path, text: str, line: str) -> None:
+def test_what_is_wrong_is_told_in_a_line(tmp_path, text, line):
     with pytest.raises(ConfigError) as caught:
         load_weights(written(tmp_path, text))
     assert line in str(caught.value)
@@ -56,14 +56,14 @@ def test_what_is_wrong_is_told_in_a_line(tmp_path: Path, text: str, line: str) -
     assert "\n" not in str(caught.value)
 
 
-def test_toml_of_another_form(tmp_path: Path) -> None:
+def test_toml_of_another_form(tmp_path):
     with pytest.raises(ConfigError, match=r"press must be tables; write \[\[press\]\]"):
         load_weights(written(tmp_path, "press = 3\n", "w.toml"))
     with pytest.raises(ConfigError, match="unknown key 'presses'"):
         load_weights(written(tmp_path, "[[presses]]\nfirst = 1\n", "w.toml"))
 
 
-def test_no_file_and_no_text(tmp_path: Path) -> None:
+def test_no_file_and_no_text(tmp_path):
     with pytest.raises(FileError):
         load_weights(tmp_path / "none.csv")
     (tmp_path / "w.csv").write_bytes(b"\xff\xfe\x00")

@@ -16,7 +16,7 @@ Refused = Callable[..., str]
 
 
 @pytest.fixture(scope="session")
-def frames_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def frames_file(tmp_path_factory) -> Path:
     """Twenty simulated frames of the paper's skin with their truth."""
     path = tmp_path_factory.mktemp("frames") / "frames.npz"
     save_frames(path, session().as_frames())
@@ -24,7 +24,7 @@ def frames_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def changed_frames(frames_file: Path, tmp_path: Path) -> Callable[..., Path]:
+def changed_frames(frames_file, tmp_path) -> Callable[..., Path]:
     """Write the frames file with fields replaced (None: left out), past the checks of
     ``save_frames``."""
 
@@ -50,7 +50,7 @@ def changed_frames(frames_file: Path, tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
+def refused(tmp_path, capsys) -> Refused:
     """Run the command; it must give ``code``, one line on stderr, nothing on stdout, and no new
     file. Returns the line."""
 
@@ -69,7 +69,7 @@ def refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
 
 
 @pytest.fixture
-def done(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+def done(capsys) -> Callable[..., str]:
     """Run the command; it must succeed in silence on stderr. Returns what it printed."""
 
     def run(*arguments: object) -> str:

@@ -2,7 +2,6 @@
 and on a simulated board."""
 
 import json
-from collections.abc import Callable
 from math import cos, radians, sin
 from pathlib import Path
 
@@ -29,9 +28,6 @@ PLACES = [(r * cos(radians(a)), r * sin(radians(a))) for r, a in RINGS]
 SOME = 0.08  # 95 % of the loads that the fit had not seen are within 5 %
 NEW = [((-20.0, 25.0), 65), ((50.0, -30.0), 120), ((-45.0, -45.0), 180), ((5.0, 62.0), 90)]
 
-Refused = Callable[..., str]
-Done = Callable[..., str]
-
 
 def bench(name: str, presses: list[tuple[tuple[float, float], int]]) -> tuple[str, str]:
     """A scene of one frame a press by a flat end of 8 mm, and the list of its weights."""
@@ -52,7 +48,7 @@ def bench(name: str, presses: list[tuple[tuple[float, float], int]]) -> tuple[st
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     """Frames and weights of the bench and of presses that it does not have, and the model
     calibrated on the first."""
     from eitskin.cli.main import main
@@ -73,7 +69,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_presses_that_it_never_saw_read_their_load(folder: Path, done: Done) -> None:
+def test_presses_that_it_never_saw_read_their_load(folder, done):
     told = json.loads(
         done("reconstruct", folder / "new.npz", "--model", folder / "skin.eitm", "--json")
     )
@@ -86,7 +82,7 @@ def test_presses_that_it_never_saw_read_their_load(folder: Path, done: Done) -> 
     assert "load g" not in done("reconstruct", folder / "new.npz").splitlines()[0]
 
 
-def test_it_says_what_it_found(folder: Path, done: Done) -> None:
+def test_it_says_what_it_found(folder, done):
     arguments = ("calibrate", folder / "weights.npz", "--weights", folder / "weights.csv")
     facts = json.loads(done(*arguments, "--json"))
     model = load_model(folder / "skin.eitm")[0]
@@ -121,7 +117,7 @@ def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
             ]
 
 
-def test_a_board_with_that_model_sends_the_same_load_bits(folder: Path, tmp_path: Path) -> None:
+def test_a_board_with_that_model_sends_the_same_load_bits(folder, tmp_path):
     live = recorded(folder, (folder / "skin.eitm").read_bytes(), tmp_path / "run.eits")
     told = [
         t.force_n / NEWTONS_PER_GRAM
@@ -134,7 +130,7 @@ def test_a_board_with_that_model_sends_the_same_load_bits(folder: Path, tmp_path
     assert (check.touches, check.different) == (len(NEW), [])
 
 
-def test_a_recorded_run_calibrates_too(folder: Path, tmp_path: Path, done: Done) -> None:
+def test_a_recorded_run_calibrates_too(folder, tmp_path, done):
     path, listed = tmp_path / "run.eits", tmp_path / "run.toml"
     live = recorded(folder, prebuilt()[1], path)
     tables = [
@@ -158,9 +154,7 @@ def test_a_recorded_run_calibrates_too(folder: Path, tmp_path: Path, done: Done)
     assert json.loads(done(*both))["presses"] == 54
 
 
-def test_weights_that_do_not_show_are_named(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_weights_that_do_not_show_are_named(folder, tmp_path, capsys):
     from eitskin.cli.main import main
 
     rows = (folder / "weights.csv").read_text().splitlines()
@@ -178,7 +172,7 @@ def test_weights_that_do_not_show_are_named(
     )
 
 
-def test_refusals(folder: Path, refused: Refused, tmp_path: Path) -> None:
+def test_refusals(folder, refused, tmp_path):
     frames, listed = folder / "weights.npz", folder / "weights.csv"
     assert "1 recordings and 2 lists of weights" in refused(
         2, f"calibrate {frames} --weights {listed} --weights {listed}"

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +19,13 @@ from eitskin.model.model import Model
 from fresh_python import run_python, words
 from small_models import prebuilt, small_blob
 
-Done = Callable[..., str]
-
 PNG = b"\x89PNG\r\n\x1a\n"
 FRAMES = 6
 OFF_BY = re.compile(r"off by (\d+\.\d\d) mm")
 
 
 @pytest.fixture(scope="session")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory) -> Path:
     return write_scene(tmp_path_factory.mktemp("scene") / "one.toml", FRAMES)
 
 
@@ -48,9 +45,7 @@ def json_lines(text: str) -> list[dict[str, Any]]:
 # ---- stream ----
 
 
-def test_two_touches_within_two_millimetres_of_the_scene(
-    done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_touches_within_two_millimetres_of_the_scene(done, tmp_path, monkeypatch):
     """The issue's own words, before the simulated board; the emulated one has the same test."""
     monkeypatch.chdir(tmp_path)
     out = done("stream", "--device", "sim:two_touch.toml", "--frames", "20", "-v")
@@ -65,7 +60,7 @@ def test_two_touches_within_two_millimetres_of_the_scene(
     assert "40 of 40 touches found, 0 false" in lines[21]
 
 
-def test_image_places_and_picture(done: Done, tmp_path: Path) -> None:
+def test_image_places_and_picture(done, tmp_path):
     picture = tmp_path / "images.png"
     out = done(f"stream --device sim:two_touch --mode image --frames 20 --picture {picture}")
     errors = [float(error) for error in OFF_BY.findall(out)]
@@ -73,7 +68,7 @@ def test_image_places_and_picture(done: Done, tmp_path: Path) -> None:
     assert picture.read_bytes()[:8] == PNG and f"picture: {picture}" in out
 
 
-def test_stream_for_programs(done: Done, scene: Path) -> None:
+def test_stream_for_programs(done, scene):
     *frames, last = json_lines(
         done("stream", "--device", f"sim:{scene}", "--mode", "raw,image,touches", "--json")
     )
@@ -93,7 +88,7 @@ def test_stream_for_programs(done: Done, scene: Path) -> None:
     assert summary["truth"]["found"] == FRAMES and summary["frames_a_second"] == pytest.approx(20.0)
 
 
-def test_raw_lines_tell_of_the_scan(done: Done, scene: Path) -> None:
+def test_raw_lines_tell_of_the_scan(done, scene):
     full = done("stream", "--device", f"sim:{scene}", "--mode", "raw", "--frames", "2").splitlines()
     assert all("raw: 208 rows in 20.78 ms" in line and "copied" not in line for line in full[:2])
     halved = done(f"stream --device sim:{scene} --mode raw --frames 2 --reciprocal 0 --tare 4")
@@ -111,9 +106,7 @@ def test_raw_lines_tell_of_the_scan(done: Done, scene: Path) -> None:
         ("--full", {"check_every": 1}),
     ],
 )
-def test_scan_options_reach_the_board(
-    options: str, expected: dict[str, int], done: Done, scene: Path, tmp_path: Path
-) -> None:
+def test_scan_options_reach_the_board(options, expected, done, scene, tmp_path):
     """What a recording says of the board was asked after the scan was set."""
     run = tmp_path / "run.eits"
     done("record", "--device", f"sim:{scene}", "-o", run, "--frames", "1", options)
@@ -121,7 +114,7 @@ def test_scan_options_reach_the_board(
     assert {name: board[name] for name in expected} == expected
 
 
-def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
+def test_solver_options_reach_the_board(done, scene):
     def infos(*options: str) -> list[dict[str, Any]]:
         # a press that fades, solved coarsely, may be called crowded
         quietly = () if "--ignore" in options else ("--ignore", "crowded")
@@ -138,9 +131,7 @@ def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
     assert all(info["diagnostics"] == [] for info in other)
 
 
-def test_findings_are_said_once_they_rise_and_stand_in_each_frame(
-    scene: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene, capsys):
     """Touches that conduct, where what insulates is looked for, are what a stale reference
     gives."""
     arguments = ["stream", "--device", f"sim:{scene}", "--sign", "decrease"]
@@ -163,12 +154,12 @@ def test_findings_are_said_once_they_rise_and_stand_in_each_frame(
     assert "--ignore stale: " in capsys.readouterr().err
 
 
-def test_every_other_frame(done: Done, scene: Path) -> None:
+def test_every_other_frame(done, scene):
     frames = json_lines(done("stream", "--device", f"sim:{scene}", "--every", "2", "--json"))[:-1]
     assert np.diff([frame["frame"] for frame in frames]).tolist() == [2] * (FRAMES // 2 - 1)
 
 
-def test_another_model_than_the_prebuilt_one(done: Done, scene: Path, tmp_path: Path) -> None:
+def test_another_model_than_the_prebuilt_one(done, scene, tmp_path):
     model = tmp_path / "small.eitm"
     model.write_bytes(small_blob())
     given = (
@@ -186,7 +177,7 @@ def test_another_model_than_the_prebuilt_one(done: Done, scene: Path, tmp_path: 
 # ---- a serial port ----
 
 
-def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_board_on_a_port(scene, capsys):
     board = board_of(scene)
     with behind_a_port(board) as port:
         device = f"serial:{port}"
@@ -212,7 +203,7 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
         assert facts["device"] == device
 
 
-def test_a_slow_line_is_not_overrun(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_slow_line_is_not_overrun(scene, capsys):
     with behind_a_port(board_of(scene)) as port:
         assert (
             main(words(f"stream --device serial:{port}?baud=115200 --mode image --frames 4 --json"))
@@ -223,9 +214,7 @@ def test_a_slow_line_is_not_overrun(scene: Path, capsys: pytest.CaptureFixture[s
         assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
 
 
-def test_devices_asks_only_what_looks_like_a_board(
-    scene: Path, done: Done, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_devices_asks_only_what_looks_like_a_board(scene, done, monkeypatch, tmp_path):
     with behind_a_port(board_of(scene)) as path:
         found = [
             Port("/dev/ttyS0", "n/a"),
@@ -248,7 +237,7 @@ def test_devices_asks_only_what_looks_like_a_board(
     assert quiet.count("a board's, not asked") == 2
 
 
-def test_no_port_at_all(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_port_at_all(done, monkeypatch):
     monkeypatch.setattr("eitskin.device.open.ports", lambda: [])
     assert done("devices").startswith("no serial port; without a board, play with")
 
@@ -256,7 +245,7 @@ def test_no_port_at_all(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
 # ---- info, tare ----
 
 
-def test_info_of_a_simulated_board(done: Done) -> None:
+def test_info_of_a_simulated_board(done):
     text = done("info", "--device", "sim:two_touch")
     assert "board       simulated" in text and "812 pixels, rank 64, f32" in text
     assert "reference   none; leave the skin untouched and run  eitskin tare" in text
@@ -266,7 +255,7 @@ def test_info_of_a_simulated_board(done: Done) -> None:
     assert found == {"scan", "demodulate", "solve", "touches", "send", "frame"}
 
 
-def test_tare(done: Done, scene: Path) -> None:
+def test_tare(done, scene):
     found = done("tare", "--device", f"sim:{scene}", "--frames", "4")
     assert found == f"sim:{scene}: reference taken from 4 frames\n"
 
@@ -274,7 +263,7 @@ def test_tare(done: Done, scene: Path) -> None:
 # ---- model upload ----
 
 
-def test_model_upload(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_model_upload(scene, tmp_path, capsys):
     model, board = tmp_path / "small.eitm", board_of(scene)
     model.write_bytes(small_blob())
     with behind_a_port(board) as port:
@@ -315,9 +304,7 @@ def image_file(path: Path) -> Path:
     return path
 
 
-def test_flash_prints_what_it_runs_and_runs_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_flash_prints_what_it_runs_and_runs_it(tmp_path, monkeypatch, capsys):
     log, image = fake_tool(tmp_path, "st-flash"), image_file(tmp_path / "firmware.bin")
     monkeypatch.setenv("PATH", str(tmp_path) + os.pathsep + "/bin")
     flash = ["flash", "--image", str(image), "--tool", "st-flash"]
@@ -344,7 +331,7 @@ def test_flash_prints_what_it_runs_and_runs_it(
 # ---- doctor ----
 
 
-def test_doctor_on_a_healthy_board(done: Done, scene: Path) -> None:
+def test_doctor_on_a_healthy_board(done, scene):
     facts = strict(done("doctor", "--device", f"sim:{scene}", "--frames", "8", "--json"))
     assert facts["healthy"] and facts["source"] == f"sim:{scene}"
     assert facts["measured"]["quiet_frames"] == 8 and facts["measured"]["board_frames_scanned"] == 8
@@ -354,10 +341,8 @@ def test_doctor_on_a_healthy_board(done: Done, scene: Path) -> None:
     assert touched["healthy"] and "numbering_by_touch" in touched["measured"]
 
 
-def test_doctor_on_a_board_that_reports_a_fault(
-    done: Done, scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    as_it_is = BoardInfo.fault_codes.fget  # type: ignore[attr-defined]
+def test_doctor_on_a_board_that_reports_a_fault(done, scene, monkeypatch, capsys):
+    as_it_is = BoardInfo.fault_codes.fget
     assert as_it_is is not None
     monkeypatch.setattr(
         BoardInfo,
@@ -373,7 +358,7 @@ def test_doctor_on_a_board_that_reports_a_fault(
 # ---- start-up ----
 
 
-def test_the_parser_imports_nothing_heavy() -> None:
+def test_the_parser_imports_nothing_heavy():
     code = (
         "import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser()\nprint([name for"
         " name in ('numpy', 'scipy', 'serial', 'cffi', 'matplotlib', 'unicorn') if name in"
@@ -382,9 +367,7 @@ def test_the_parser_imports_nothing_heavy() -> None:
     assert run_python(code).stdout.strip() == "[]"
 
 
-def test_frames_of_a_recording_give_the_boards_touches(
-    done: Done, scene: Path, tmp_path: Path
-) -> None:
+def test_frames_of_a_recording_give_the_boards_touches(done, scene, tmp_path):
     run, exported = tmp_path / "run.eits", tmp_path / "run.npz"
     done("record", "--device", f"sim:{scene}", "-o", run)
     assert done("replay", run, "--frames", exported) == f"{exported}: {FRAMES} frames, 16 quiet\n"

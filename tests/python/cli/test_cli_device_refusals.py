@@ -2,7 +2,6 @@
 traceback, no file left."""
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,13 +14,11 @@ from eitskin.device.wire.codec import encode
 from fresh_python import MAIN, run_python, without
 from small_models import small_blob
 
-Refused = Callable[..., str]
-
 USAGE, FILE, CONFIG, MODEL, FRAME, EXTRA, DEVICE = 2, 3, 4, 6, 8, 9, 12
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory) -> Path:
     return write_scene(tmp_path_factory.mktemp("scene") / "one.toml", 3)
 
 
@@ -73,7 +70,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("model upload", "required: MODEL.eitm"),
     ],
 )
-def test_arguments(refused: Refused, arguments: str, text: str) -> None:
+def test_arguments(refused, arguments, text):
     assert text in refused(USAGE, arguments)
 
 
@@ -98,13 +95,13 @@ def test_arguments(refused: Refused, arguments: str, text: str) -> None:
     ],
 )
 def test_files(
-    refused: Refused,
-    code: int,
-    arguments: str,
-    text: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    refused,
+    code,
+    arguments,
+    text,
+    tmp_path,
+    monkeypatch,
+):
     monkeypatch.chdir(tmp_path)
     assert text in refused(code, arguments)
 
@@ -118,12 +115,12 @@ def test_files(
     [b"", b"\x93NUMPY", bytes(3000), encode(0x70, 0, b"not JSON"), encode(0x70, 0, b"[1]")],
 )
 def test_what_is_no_recording(
-    command: tuple[str, ...],
-    content: bytes,
-    refused: Refused,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    command,
+    content,
+    refused,
+    tmp_path,
+    monkeypatch,
+):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "run.eits"
     path.write_bytes(content)
@@ -136,7 +133,7 @@ def test_what_is_no_recording(
     assert str(path) in line and "no eitskin recording" in line
 
 
-def test_a_recording_is_not_written_over(refused: Refused, scene: Path, tmp_path: Path) -> None:
+def test_a_recording_is_not_written_over(refused, scene, tmp_path):
     path = tmp_path / "run.eits"
     path.write_bytes(b"precious")
     for command in (["record", "-o"], ["stream", "--record"]):
@@ -144,7 +141,7 @@ def test_a_recording_is_not_written_over(refused: Refused, scene: Path, tmp_path
     assert path.read_bytes() == b"precious"
 
 
-def test_a_recording_takes_no_settings(refused: Refused, scene: Path, tmp_path: Path) -> None:
+def test_a_recording_takes_no_settings(refused, scene, tmp_path):
     path = tmp_path / "run.eits"
     assert main(["record", "--device", f"sim:{scene}", "-o", str(path), "--frames", "1"]) == 0
     for options in (["--samples", "40"], ["--iterations", "3"], ["--tare", "4"], ["--cold"]):
@@ -162,9 +159,7 @@ def write_model(folder: Path) -> Path:
     return path
 
 
-def test_settings_of_a_recorded_board_are_shown(
-    refused: Refused, scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_settings_of_a_recorded_board_are_shown(refused, scene, tmp_path, capsys):
     path = tmp_path / "run.eits"
     assert main(["record", "--device", f"sim:{scene}", "--frames", "1", "-o", str(path)]) == 0
     assert main(["board", "--device", f"file:{path}"]) == 0
@@ -172,16 +167,14 @@ def test_settings_of_a_recorded_board_are_shown(
     assert "is a recording" in refused(DEVICE, "board", "--lock", "--device", f"file:{path}")
 
 
-def test_a_recording_without_raw_frames(refused: Refused, scene: Path, tmp_path: Path) -> None:
+def test_a_recording_without_raw_frames(refused, scene, tmp_path):
     path = tmp_path / "run.eits"
     assert main(["record", "--device", f"sim:{scene}", "-o", str(path), "--mode", "touches"]) == 0
     assert "nothing to compare" in refused(FRAME, "replay", path, "--check")
     assert "no raw frames" in refused(FRAME, "replay", path, "--frames", tmp_path / "x.npz")
 
 
-def test_images_that_are_none(
-    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_images_that_are_none(refused, tmp_path, monkeypatch):
     tool = tmp_path / "pyocd"
     tool.write_text("#!/bin/sh\n", encoding="utf-8")
     tool.chmod(0o755)
@@ -197,9 +190,7 @@ def test_images_that_are_none(
         assert text in refused(DEVICE, "flash", "--image", path, "--dry-run")
 
 
-def test_no_tool_to_flash_with(
-    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_tool_to_flash_with(refused, tmp_path, monkeypatch):
     from test_cli_device import image_file
 
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -211,9 +202,7 @@ def test_no_tool_to_flash_with(
 # ---- ports ----
 
 
-def test_auto_without_a_board_and_with_two(
-    refused: Refused, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_auto_without_a_board_and_with_two(refused, monkeypatch):
     monkeypatch.setattr("eitskin.device.ports.ports", lambda: [Port("/dev/ttyS0")])
     assert "no ST-LINK port is there" in refused(DEVICE, "info")
     two = [Port(f"/dev/ttyACM{k}", "STLink", 0x0483, 0x374B) for k in range(2)]
@@ -223,12 +212,12 @@ def test_auto_without_a_board_and_with_two(
     )
 
 
-def test_ports_that_cannot_be_used(refused: Refused, tmp_path: Path) -> None:
+def test_ports_that_cannot_be_used(refused, tmp_path):
     assert "no such port" in refused(DEVICE, "info", "--device", f"serial:{tmp_path / 'gone'}")
     assert "no serial port" in refused(DEVICE, "info", "--device", "serial:/dev/null")
 
 
-def test_a_port_where_nothing_answers(refused: Refused) -> None:
+def test_a_port_where_nothing_answers(refused):
     master, slave = os.openpty()
     try:
         line = refused(DEVICE, "info", "--device", f"serial:{os.ttyname(slave)}")
@@ -238,7 +227,7 @@ def test_a_port_where_nothing_answers(refused: Refused) -> None:
         os.close(slave)
 
 
-def test_a_board_without_a_model(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_board_without_a_model(scene, capsys):
     with behind_a_port(board_of(scene, b"")) as port:
         device = f"serial:{port}"
         assert main(["info", "--device", device]) == 0
@@ -257,9 +246,7 @@ def test_a_board_without_a_model(scene: Path, capsys: pytest.CaptureFixture[str]
             assert line.startswith(f"eitskin: {port}: ") and "eitskin model upload" in line, line
 
 
-def test_a_model_that_is_not_the_boards(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_model_that_is_not_the_boards(scene, tmp_path, capsys):
     model = write_model(tmp_path)
     with behind_a_port(board_of(scene)) as port:
         assert (
@@ -275,7 +262,7 @@ def test_a_model_that_is_not_the_boards(
         assert "changing the solver needs the defaults" in capsys.readouterr().err
 
 
-def test_what_the_board_refuses(refused: Refused, scene: Path) -> None:
+def test_what_the_board_refuses(refused, scene):
     device = ["--device", f"sim:{scene}"]
     assert "the nearest that are: 80" in refused(DEVICE, "stream", *device, "--samples", "79")
     assert "frame period of at least 20800 us" in refused(
@@ -287,13 +274,13 @@ def test_what_the_board_refuses(refused: Refused, scene: Path) -> None:
 
 
 @pytest.mark.parametrize("missing", ["eitskin_emulator", "unicorn"])
-def test_without_the_emulated_board(missing: str, scene: Path) -> None:
+def test_without_the_emulated_board(missing, scene):
     done = run_python(without(missing) + MAIN, "stream", "--device", f"emu:{scene}")
     assert done.returncode == EXTRA and "run there  pip install ./python" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
-def test_pictures_without_matplotlib(scene: Path, tmp_path: Path) -> None:
+def test_pictures_without_matplotlib(scene, tmp_path):
     arguments = [
         "stream",
         "--device",

@@ -2,17 +2,13 @@
 
 import json
 import re
-from collections.abc import Callable
 from importlib.resources import files
-from pathlib import Path
 
 import pytest
 
 from eitskin.demo import demo
 from eitskin.demo.demo_board import run_board_demo, to_json, to_text
 from eitskin.scene.library_scenes import find_scene
-
-Done = Callable[..., str]
 
 OFF_BY = re.compile(r"off by (\d+\.\d\d) mm")
 IMAGE = files("eitskin.firmware").joinpath("nucleo_f767zi.bin")
@@ -22,9 +18,7 @@ needs_image = pytest.mark.skipif(
 
 
 @needs_image
-def test_two_touches_within_two_millimetres_of_the_scene(
-    done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_touches_within_two_millimetres_of_the_scene(done, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     lines = done("stream", "--device", "emu:two_touch.toml", "--frames", "20", "-v").splitlines()
     for line in lines[:20]:
@@ -39,9 +33,7 @@ def test_two_touches_within_two_millimetres_of_the_scene(
 
 
 @needs_image
-def test_images_within_two_millimetres_of_the_scene(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_images_within_two_millimetres_of_the_scene(tmp_path, capsys):
     from eitskin.cli.main import main
 
     picture = tmp_path / "images.png"
@@ -64,7 +56,7 @@ def test_images_within_two_millimetres_of_the_scene(
 
 
 @needs_image
-def test_a_scene_ends_by_itself(done: Done, tmp_path: Path) -> None:
+def test_a_scene_ends_by_itself(done, tmp_path):
     scene = tmp_path / "short.toml"
     scene.write_text('[scene]\nname = "short"\nframes = 4\nelements = 900\n', encoding="utf-8")
     *frames, _ = map(json.loads, done("stream", "--device", f"emu:{scene}", "--json").splitlines())
@@ -72,9 +64,7 @@ def test_a_scene_ends_by_itself(done: Done, tmp_path: Path) -> None:
 
 
 @needs_image
-def test_the_emulated_boards_images_are_this_hosts(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_emulated_boards_images_are_this_hosts(tmp_path, capsys):
     from eitskin.cli.main import main
 
     path = tmp_path / "run.eits"
@@ -87,7 +77,7 @@ def test_the_emulated_boards_images_are_this_hosts(
 
 
 @needs_image
-def test_the_demos_touches_on_the_emulated_board() -> None:
+def test_the_demos_touches_on_the_emulated_board():
     result = run_board_demo("emu:demo")
     assert result.check.as_dict()["same_bits"] and result.check.compared == 3
     assert result.matching.hits == 3 and max(result.matching.distances_mm) < 2.0
@@ -97,13 +87,13 @@ def test_the_demos_touches_on_the_emulated_board() -> None:
     json.dumps(to_json(result), allow_nan=False)
 
 
-def test_the_demos_touches_on_a_simulated_board() -> None:
+def test_the_demos_touches_on_a_simulated_board():
     result = run_board_demo("sim:demo")
     assert result.check.as_dict()["same_bits"] and result.matching.hits == 3
     assert to_json(result)["solve_us_p50"] is None
 
 
-def test_the_library_scene_is_the_demos() -> None:
+def test_the_library_scene_is_the_demos():
     tracks = find_scene("demo").touches
     scene = [
         (t.keyframes[0].x_mm, t.keyframes[0].y_mm, t.keyframes[0].radius_mm, t.keyframes[0].drive)
@@ -114,7 +104,7 @@ def test_the_library_scene_is_the_demos() -> None:
     assert contrasts == [t.contrast for t in demo.TOUCHES]
 
 
-def test_the_demo_goes_without_an_emulator(tmp_path: Path) -> None:
+def test_the_demo_goes_without_an_emulator(tmp_path):
     from fresh_python import MAIN, run_python, without
 
     done = run_python(

@@ -5,7 +5,6 @@ import os
 import struct
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -19,8 +18,6 @@ from eitskin.model.model import Defaults
 from eitskin.skin.skin import load_skin
 from fresh_python import run_command, run_python
 from small_models import prebuilt
-
-Done = Callable[..., str]
 
 SKIN = """
 [skin]
@@ -92,14 +89,14 @@ def write_skin(
     ],
 )
 def test_build_info_verify(
-    outline: str,
-    count: int,
-    kind: str,
-    options: str,
-    expected: dict[str, object],
-    done: Done,
-    tmp_path: Path,
-) -> None:
+    outline,
+    count,
+    kind,
+    options,
+    expected,
+    done,
+    tmp_path,
+):
     skin, model = write_skin(tmp_path, outline, count, kind), tmp_path / "palm.eitm"
     built = json.loads(done("model", "build", skin, "-o", model, "--json", *QUICK, options))
     assert tuple(built) == FACTS
@@ -118,7 +115,7 @@ def test_build_info_verify(
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["palm.eitm", "skin.toml"]
 
 
-def test_a_clockwise_outline_is_the_same_skin(done: Done, tmp_path: Path) -> None:
+def test_a_clockwise_outline_is_the_same_skin(done, tmp_path):
     """Orientation is normalised: the same area, pixels and electrodes, wherever the list of points
     begins."""
     models = {}
@@ -133,7 +130,7 @@ def test_a_clockwise_outline_is_the_same_skin(done: Done, tmp_path: Path) -> Non
     assert np.corrcoef(a.golden.image, b.golden.image)[0, 1] > 0.99
 
 
-def test_touch_change_and_regularisation_reach_the_model(done: Done, tmp_path: Path) -> None:
+def test_touch_change_and_regularisation_reach_the_model(done, tmp_path):
     skin, path = write_skin(tmp_path), tmp_path / "x.eitm"
     facts = json.loads(
         done(f"model build {skin} -o {path} --json --touch-change 2 --regularisation 0.1", *QUICK)
@@ -142,7 +139,7 @@ def test_touch_change_and_regularisation_reach_the_model(done: Done, tmp_path: P
     assert facts["lipschitz"] == pytest.approx(1 / 1.1, rel=2e-4)
 
 
-def test_the_prebuilt_model_for_people(done: Done) -> None:
+def test_the_prebuilt_model_for_people(done):
     text = done("model", "info")
     assert "protocol hash    73aa164087184d25" in text and "rank             64" in text
     assert "defaults         iterations 60" in text
@@ -152,14 +149,14 @@ def test_the_prebuilt_model_for_people(done: Done) -> None:
     assert facts["bytes"] == len(prebuilt()[1]) and facts["pixels"] == 812
 
 
-def test_building_twice_gives_the_same_bytes(done: Done, tmp_path: Path) -> None:
+def test_building_twice_gives_the_same_bytes(done, tmp_path):
     skin = write_skin(tmp_path)
     for name in ("a.eitm", "b.eitm"):
         done("model", "build", skin, "-o", tmp_path / name, *QUICK)
     assert (tmp_path / "a.eitm").read_bytes() == (tmp_path / "b.eitm").read_bytes()
 
 
-def test_building_over_an_old_model_replaces_it_whole(done: Done, tmp_path: Path) -> None:
+def test_building_over_an_old_model_replaces_it_whole(done, tmp_path):
     skin, path = write_skin(tmp_path), tmp_path / "x.eitm"
     path.write_bytes(b"old")
     done("model", "build", skin, "-o", path, *QUICK)
@@ -167,7 +164,7 @@ def test_building_over_an_old_model_replaces_it_whole(done: Done, tmp_path: Path
     assert "META" in sections_of(path.read_bytes())
 
 
-def test_in_a_process_of_its_own(tmp_path: Path) -> None:
+def test_in_a_process_of_its_own(tmp_path):
     """The module as users run it: exit codes, streams, and output in pipes."""
     command = [sys.executable, "-m", "eitskin.cli.main"]
     skin = write_skin(tmp_path)
@@ -195,7 +192,7 @@ def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     assert traced.returncode == 1 and "FileError: none.eitm: no such model" in traced.stderr
 
 
-def test_a_pipe_that_closes_early_leaves_no_traceback() -> None:
+def test_a_pipe_that_closes_early_leaves_no_traceback():
     environment = {**os.environ, "PYTHONPATH": str(Path(eitskin.__file__).parents[1])}
     with subprocess.Popen(
         [sys.executable, "-u", "-m", "eitskin.cli.main", "model", "info", "--json"],
@@ -206,7 +203,7 @@ def test_a_pipe_that_closes_early_leaves_no_traceback() -> None:
         assert b"Traceback" not in process.stderr.read()
 
 
-def test_start_up_imports_little() -> None:
+def test_start_up_imports_little():
     """Help needs no numpy; info needs neither scipy nor matplotlib."""
     code = (
         "import sys\nfrom eitskin.cli.main import main\nmain(sys.argv[1:])\nprint([name for name in"

@@ -1,7 +1,6 @@
 """``eitskin reconstruct``: frames to touches, images, files and pictures."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,8 +18,6 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import load_skin, paper_skin
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt, session
-
-Done = Callable[..., str]
 
 PNG = b"\x89PNG\r\n\x1a\n"
 TOUCH = {
@@ -42,7 +39,7 @@ SUMMARY = {
 
 
 @pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
-def test_json(engine: str, done: Done, frames_file: Path) -> None:
+def test_json(engine, done, frames_file):
     facts = json.loads(done("reconstruct", frames_file, "--engine", engine, "--json"))
     found = facts["model"], facts["engine"], len(facts["frames"])
     assert found == ("prebuilt paper skin", engine, 20)
@@ -62,9 +59,7 @@ def test_json(engine: str, done: Done, frames_file: Path) -> None:
     assert summary["miou_image"] > 0.8 and summary["miou_touches"] > 0.88
 
 
-def test_what_is_found_is_said(
-    done: Done, frames_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_found_is_said(done, frames_file, tmp_path, capsys):
     """A detached electrode in frame 1, an outlier in frame 2: by name in table and JSON; too many
     rows: refused, by name."""
     frames = load_frames(frames_file)
@@ -86,7 +81,7 @@ def test_what_is_found_is_said(
     assert "found: electrode 5 open" in capsys.readouterr().out
 
 
-def test_what_it_says_is_what_the_reconstructor_does(done: Done, frames_file: Path) -> None:
+def test_what_it_says_is_what_the_reconstructor_does(done, frames_file):
     facts = json.loads(
         done("reconstruct", frames_file, "--json", "--iterations", "25", "--sign", "both")
     )
@@ -100,9 +95,7 @@ def test_what_it_says_is_what_the_reconstructor_does(done: Done, frames_file: Pa
         assert [(t["x_mm"], t["y_mm"]) for t in listed] == [(t.x_mm, t.y_mm) for t in touches]
 
 
-def test_threads_change_nothing(
-    done: Done, frames_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_threads_change_nothing(done, frames_file, capsys):
     one, three = (
         json.loads(done("reconstruct", frames_file, "--json", *threads))
         for threads in ((), ("--threads", "3"))
@@ -120,9 +113,7 @@ def test_threads_change_nothing(
         assert text in capsys.readouterr().err
 
 
-def test_options_reach_the_solver(
-    done: Done, frames_file: Path, changed_frames: Callable[..., Path]
-) -> None:
+def test_options_reach_the_solver(done, frames_file, changed_frames):
     facts = json.loads(
         done("reconstruct", frames_file, "--json", "--gap", "0.001", "--iterations", "5000")
     )
@@ -162,7 +153,7 @@ def test_options_reach_the_solver(
     assert some["summary"]["frames"] == 2
 
 
-def test_for_people(done: Done, frames_file: Path) -> None:
+def test_for_people(done, frames_file):
     text = done("reconstruct", frames_file)
     lines = text.splitlines()
     found = " ".join(lines[0].split())
@@ -173,7 +164,7 @@ def test_for_people(done: Done, frames_file: Path) -> None:
     assert sum(line.startswith("test-s3-") for line in lines) == 20
 
 
-def test_quiet_frames_show_nothing(done: Done, changed_frames: Callable[..., Path]) -> None:
+def test_quiet_frames_show_nothing(done, changed_frames):
     quiet = session().quiet_v
     empty = dict.fromkeys(
         ["touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign"]
@@ -190,7 +181,7 @@ def test_quiet_frames_show_nothing(done: Done, changed_frames: Callable[..., Pat
     assert {frame["info"]["stop"] for frame in facts["frames"]} <= {"below-threshold", "iterations"}
 
 
-def test_output_and_picture(done: Done, frames_file: Path, tmp_path: Path) -> None:
+def test_output_and_picture(done, frames_file, tmp_path):
     output, picture = tmp_path / "out.npz", tmp_path / "out.png"
     facts = json.loads(
         done("reconstruct", frames_file, "-o", output, "--picture", picture, "--json")
@@ -203,9 +194,7 @@ def test_output_and_picture(done: Done, frames_file: Path, tmp_path: Path) -> No
         assert len(saved["touch_frame"]) == sum(len(frame["touches"]) for frame in facts["frames"])
 
 
-def test_a_bad_frame_among_good_ones(
-    changed_frames: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bad_frame_among_good_ones(changed_frames, tmp_path, capsys):
     """The others are done, written and listed; the exit code says that not all were."""
     voltage = session().frames_v.copy()
     voltage[3, :150] = np.nan
@@ -223,9 +212,7 @@ def test_a_bad_frame_among_good_ones(
         assert saved["frame"].tolist() == [k for k in range(20) if k not in (3, 5)]
 
 
-def test_a_reference_of_another_skin_is_warned_of(
-    changed_frames: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_reference_of_another_skin_is_warned_of(changed_frames, capsys):
     order = np.random.default_rng(1).permutation(208)
     path = changed_frames(
         voltage_v=session().frames_v[:, order], reference_voltage_v=session().quiet_v[:, order]
@@ -237,7 +224,7 @@ def test_a_reference_of_another_skin_is_warned_of(
     assert f"eitskin doctor {path}" in err
 
 
-def test_the_whole_way(done: Done, tmp_path: Path) -> None:
+def test_the_whole_way(done, tmp_path):
     """A description to a model to simulated frames to touches, with one's own skin: an L with 24
     electrodes."""
     skin_file = tmp_path / "hand.toml"
@@ -277,7 +264,7 @@ def test_the_whole_way(done: Done, tmp_path: Path) -> None:
     assert load_frames(frames_path).n_frames == 12
 
 
-def test_the_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_demo(tmp_path, capsys):
     assert main(["demo", "--picture", str(tmp_path / "demo.png"), "--json"]) == 0
     out, err = capsys.readouterr()
     facts = json.loads(out)
@@ -289,7 +276,7 @@ def test_the_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert facts["difference_to_numpy_over_peak"]["c_float64"] < 1e-12
 
 
-def test_tracked_frames_keep_ids_and_confirm_births(done: Done, tmp_path: Path) -> None:
+def test_tracked_frames_keep_ids_and_confirm_births(done, tmp_path):
     """A finger that moves 2 mm a frame keeps one id; each frame by itself counts on."""
     moving = tuple(TouchScene(str(k), (Put(-20.0 + 2 * k, 30.0, 9.0, 5.0),)) for k in range(8))
     made = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, moving)).as_frames()
@@ -306,7 +293,7 @@ def test_tracked_frames_keep_ids_and_confirm_births(done: Done, tmp_path: Path) 
     assert tracked[7]["touches"][0]["x_mm"] == pytest.approx(-6.0, abs=2.0)
 
 
-def test_frames_with_times_are_a_stream(done: Done, tmp_path: Path) -> None:
+def test_frames_with_times_are_a_stream(done, tmp_path):
     frames = session().as_frames()
     timed, alone = tmp_path / "timed.npz", tmp_path / "alone.npz"
     save_frames(timed, replace(frames, time_s=np.arange(frames.n_frames) / 48))

@@ -22,7 +22,6 @@ from eitskin.device.wire.link_table import PacketType
 from eitskin.model.prebuilt import load_prebuilt
 from fresh_python import INTERRUPTIBLE, MAIN, run_python, without
 
-Done = Callable[..., str]
 Change = Callable[[Packet], bytes | None]
 
 FRAMES = 6
@@ -33,12 +32,12 @@ QUIETLY = ("--ignore", "crowded")  # a press that fades, solved coarsely, may be
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory) -> Path:
     return write_scene(tmp_path_factory.mktemp("scene") / "one.toml", FRAMES)
 
 
 @pytest.fixture(scope="module")
-def run(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(scene, tmp_path_factory) -> Path:
     """A recording of everything."""
     path = tmp_path_factory.mktemp("run") / "run.eits"
     assert main(["record", "--device", f"sim:{scene}", "-o", str(path)]) == 0
@@ -76,7 +75,7 @@ def flipped(place: int) -> Callable[[bytes], bytes]:
     return lambda payload: payload[:place] + bytes([payload[place] ^ 1]) + payload[place + 1 :]
 
 
-def test_replay_shows_what_was_seen_live(done: Done, scene: Path, tmp_path: Path) -> None:
+def test_replay_shows_what_was_seen_live(done, scene, tmp_path):
     path = tmp_path / "run.eits"
     live = done("stream", "--device", f"sim:{scene}", "--mode", "image,touches", "--record", path)
     assert done("replay", path, "--mode", "image,touches") == live
@@ -84,7 +83,7 @@ def test_replay_shows_what_was_seen_live(done: Done, scene: Path, tmp_path: Path
     assert lines[:2] == live.splitlines()[:2] and lines[2].startswith("2 frames")
 
 
-def test_gestures_of_a_recording_that_has_touches_alone(done: Done, tmp_path: Path) -> None:
+def test_gestures_of_a_recording_that_has_touches_alone(done, tmp_path):
     path, tap = tmp_path / "run.eits", ("--device", "sim:tap", "--ignore", "all")
     live = [line for line in done("stream", *tap).splitlines() if "tap" in line]
     done("record", *tap, "--mode", "touches", "-o", path)
@@ -93,7 +92,7 @@ def test_gestures_of_a_recording_that_has_touches_alone(done: Done, tmp_path: Pa
     assert not any(line.split()[1].isdigit() for line in shown)
 
 
-def test_a_recording_is_a_device_too(done: Done, run: Path) -> None:
+def test_a_recording_is_a_device_too(done, run):
     shown, replayed = (
         done(*command).splitlines()[0]
         for command in (("stream", "-v", "--device", f"file:{run}"), ("replay", "-v", run))
@@ -109,7 +108,7 @@ def test_a_recording_is_a_device_too(done: Done, run: Path) -> None:
     )
 
 
-def test_record_says_how_much(done: Done, scene: Path, tmp_path: Path) -> None:
+def test_record_says_how_much(done, scene, tmp_path):
     path = tmp_path / "run.eits"
     facts = json.loads(
         done("record", "--device", f"sim:{scene}", "-o", path, "--frames", "3", "--json")
@@ -126,7 +125,7 @@ def test_record_says_how_much(done: Done, scene: Path, tmp_path: Path) -> None:
 # ---- the same bits ----
 
 
-def test_the_hosts_images_are_the_boards(done: Done, run: Path) -> None:
+def test_the_hosts_images_are_the_boards(done, run):
     found = done("replay", run, "--check")
     assert found == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
     facts = json.loads(done("replay", run, "--check", "--json"))
@@ -138,9 +137,7 @@ def test_the_hosts_images_are_the_boards(done: Done, run: Path) -> None:
     "options",
     ["--cold", "--no-track", "--iterations 9", "--sign both", "--tare 1", "--reciprocal 0"],
 )
-def test_whatever_the_solver_was_told(
-    options: str, done: Done, scene: Path, tmp_path: Path
-) -> None:
+def test_whatever_the_solver_was_told(options, done, scene, tmp_path):
     path = tmp_path / "run.eits"
     done("record", "--device", f"sim:{scene}", "-o", path, *QUIETLY, options)
     assert json.loads(done("replay", path, "--check", "--json"))["same"] == FRAMES
@@ -154,9 +151,7 @@ def test_whatever_the_solver_was_told(
         (PacketType.RAW, RAW_HEAD + 4 * 60 + 1),
     ],
 )
-def test_one_bit_that_differs_is_found(
-    kind: PacketType, place: int, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_bit_that_differs_is_found(kind, place, run, tmp_path, capsys):
     number = 16 + 2 if kind == PacketType.RAW else 2
     other = changed(run, tmp_path / "other.eits", nth(kind, number, flipped(place)))
     assert main(["replay", str(other), "--check", "--json"]) == 10
@@ -169,9 +164,7 @@ def test_one_bit_that_differs_is_found(
     assert err == f"eitskin: {other}: this host's images are not the board's\n"
 
 
-def test_a_changed_bit_in_the_reference_shows_everywhere(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_changed_bit_in_the_reference_shows_everywhere(run, tmp_path, capsys):
     other = changed(
         run, tmp_path / "other.eits", nth(PacketType.RAW, 3, flipped(RAW_HEAD + 4 * 60 + 2))
     )
@@ -179,9 +172,7 @@ def test_a_changed_bit_in_the_reference_shows_everywhere(
     assert len(json.loads(capsys.readouterr().out)["different"]) == FRAMES
 
 
-def test_frames_after_a_loss_are_not_called_different(
-    done: Done, scene: Path, tmp_path: Path
-) -> None:
+def test_frames_after_a_loss_are_not_called_different(done, scene, tmp_path):
     """A warm solve begins from the last one: without it, the host's has other bits and nobody's
     fault it is."""
     run = tmp_path / "warm.eits"
@@ -192,9 +183,7 @@ def test_frames_after_a_loss_are_not_called_different(
     assert facts["alone"] == 1
 
 
-def test_touches_after_a_loss_are_not_called_different(
-    done: Done, run: Path, scene: Path, tmp_path: Path
-) -> None:
+def test_touches_after_a_loss_are_not_called_different(done, run, scene, tmp_path):
     """Touches that are followed in time began from the frame that is lost; without tracking, every
     frame can be judged."""
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
@@ -211,9 +200,7 @@ def test_touches_after_a_loss_are_not_called_different(
     assert (facts["same"], facts["untold"], facts["alone"]) == (FRAMES - 1, 0, 1)
 
 
-def test_an_image_after_a_loss_is_judged_all_the_same(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_image_after_a_loss_is_judged_all_the_same(run, tmp_path, capsys):
     """Tracking changes touches only: an image that differs is told, whatever was lost before."""
     lost = changed(run, tmp_path / "lost.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
     other = changed(
@@ -223,17 +210,13 @@ def test_an_image_after_a_loss_is_judged_all_the_same(
     assert len(json.loads(capsys.readouterr().out)["different"]) == 1
 
 
-def test_a_loss_in_the_tare_leaves_nothing_to_compare(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_loss_in_the_tare_leaves_nothing_to_compare(run, tmp_path, capsys):
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 5, lambda payload: None))
     assert main(["replay", str(other), "--check"]) == 8
     assert "nothing to compare" in capsys.readouterr().err
 
 
-def test_without_its_note_the_models_own_options_are_taken(
-    done: Done, scene: Path, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_its_note_the_models_own_options_are_taken(done, scene, run, tmp_path, capsys):
     without = changed(
         run, tmp_path / "plain.eits", nth(PacketType.RECORDING, 1, lambda payload: None)
     )
@@ -251,9 +234,7 @@ def test_without_its_note_the_models_own_options_are_taken(
 # ---- export ----
 
 
-def test_rows_that_could_not_be_measured_are_not_exported(
-    done: Done, run: Path, tmp_path: Path
-) -> None:
+def test_rows_that_could_not_be_measured_are_not_exported(done, run, tmp_path):
     def with_nan(payload: bytes) -> bytes:
         return payload[:RAW_HEAD] + np.float32(np.nan).tobytes() + payload[RAW_HEAD + 4 :]
 
@@ -269,7 +250,7 @@ def test_rows_that_could_not_be_measured_are_not_exported(
 # ---- what a base installation can do ----
 
 
-def test_a_recording_needs_no_extra(run: Path) -> None:
+def test_a_recording_needs_no_extra(run):
     bare = without("scipy", "netgen", "matplotlib", "unicorn") + MAIN
     for arguments, expected in (
         (["replay", run], f"{FRAMES} frames"),
@@ -285,7 +266,7 @@ def test_a_recording_needs_no_extra(run: Path) -> None:
 # ---- Ctrl-C ----
 
 
-def test_ctrl_c_stops_the_board_and_sums_up(scene: Path) -> None:
+def test_ctrl_c_stops_the_board_and_sums_up(scene):
     board = board_of(scene)
     with behind_a_port(board) as port:
         source = str(Path(eitskin.__file__).parents[1])

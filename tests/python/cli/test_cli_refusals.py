@@ -4,7 +4,6 @@ traceback, no file left."""
 import io
 import struct
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,6 @@ from eitskin.errors import FileError
 from eitskin.skin.protocol import opposite
 from fresh_python import MAIN, run_python, without
 from small_models import prebuilt, session, small_blob
-
-Refused = Callable[..., str]
 
 USAGE, FILE, CONFIG, GEOMETRY, MODEL, PROTOCOL, FRAME, EXTRA, VERIFICATION = range(2, 11)
 
@@ -42,13 +39,13 @@ USAGE, FILE, CONFIG, GEOMETRY, MODEL, PROTOCOL, FRAME, EXTRA, VERIFICATION = ran
         ("reconstruct x.npz --gap 1e", "invalid float value: '1e'"),
     ],
 )
-def test_arguments_that_cannot_be_parsed(refused: Refused, arguments: str, text: str) -> None:
+def test_arguments_that_cannot_be_parsed(refused, arguments, text):
     line = refused(USAGE, arguments)
     assert text in line and line.endswith("--help")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_command_has_help(command, capsys):
     with pytest.raises(SystemExit) as end:
         main([command, "--help"])
     assert end.value.code == 0
@@ -56,7 +53,7 @@ def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]
     assert command in build_parser().format_help()
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+def test_version(capsys):
     with pytest.raises(SystemExit) as end:
         main(["--version"])
     assert end.value.code == 0 and capsys.readouterr().out == "eitskin 0.1.0\n"
@@ -92,9 +89,7 @@ MODELS = {
     [("model", "info"), ("model", "info", "--json"), ("model", "verify"), ("reconstruct",)],
 )
 @pytest.mark.parametrize("kind", MODELS)
-def test_models_that_cannot_be_read(
-    kind: str, command: tuple[str, ...], refused: Refused, tmp_path: Path, frames_file: Path
-) -> None:
+def test_models_that_cannot_be_read(kind, command, refused, tmp_path, frames_file):
     change, text = MODELS[kind]
     path = tmp_path / "bad.eitm"
     path.write_bytes(change(small_blob()))
@@ -110,9 +105,7 @@ def test_models_that_cannot_be_read(
     assert str(path) in line and text in line and ";" in line
 
 
-def test_a_golden_image_of_other_bits_fails_verification(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_golden_image_of_other_bits_fails_verification(tmp_path, capsys):
     """One bit of the stored image: read without complaint, but not what this core gives."""
     blob = bytearray(small_blob())
     place = sections_of(blob)["GOLD"]
@@ -149,10 +142,10 @@ def with_nan(count: int) -> np.ndarray:
 )
 @pytest.mark.parametrize("engine", ["c", "numpy"])
 def test_frames_that_cannot_be_used(
-    voltage: np.ndarray, text: str, engine: str, tmp_path: Path,
-    changed_frames: Callable[..., Path],
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+    voltage, text, engine, tmp_path,
+    changed_frames,
+    capsys,
+):  # fmt: skip
     """The frame is named on its one line; nothing is written where nothing could be done."""
     path = changed_frames(first=1, voltage_v=voltage)
     outputs = ["-o", str(tmp_path / "out.npz"), "--picture", str(tmp_path / "out.png")]
@@ -164,9 +157,7 @@ def test_frames_that_cannot_be_used(
     assert [entry.name for entry in tmp_path.iterdir()] == ["changed.npz"]
 
 
-def test_saturated_frames(
-    changed_frames: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_saturated_frames(changed_frames, capsys):
     """Every channel at the rail, told by --saturation-v."""
     path = changed_frames(first=1, voltage_v=np.where(FIRST < 0, -3.3, 3.3))
     assert main(["reconstruct", str(path), "--saturation-v", "3.3"]) == FRAME
@@ -182,9 +173,7 @@ def test_saturated_frames(
         (0.0, "all voltages are zero"),
     ],
 )
-def test_references_that_cannot_be_used(
-    value: float, text: str, refused: Refused, changed_frames: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_references_that_cannot_be_used(value, text, refused, changed_frames, tmp_path):
     quiet = session().quiet_v.copy()
     if value:
         quiet[7, 20] = value
@@ -215,10 +204,10 @@ def test_references_that_cannot_be_used(
     ],
 )
 def test_frames_files_that_cannot_be_read(
-    changes: dict[str, np.ndarray], code: int, text: str, refused: Refused,
-    changed_frames: Callable[..., Path],
-    tmp_path: Path,
-) -> None:  # fmt: skip
+    changes, code, text, refused,
+    changed_frames,
+    tmp_path,
+):  # fmt: skip
     empty = {
         "touch_frame": None,
         "touch_xy_mm": None,
@@ -234,15 +223,13 @@ def test_frames_files_that_cannot_be_read(
 
 
 @pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04 broken"])
-def test_what_is_no_frames_file(content: bytes, refused: Refused, tmp_path: Path) -> None:
+def test_what_is_no_frames_file(content, refused, tmp_path):
     path = tmp_path / "x.npz"
     path.write_bytes(content)
     assert str(path) in refused(FILE, "reconstruct", path)
 
 
-def test_another_protocol_names_both_hashes_and_files(
-    refused: Refused, changed_frames: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_another_protocol_names_both_hashes_and_files(refused, changed_frames, tmp_path):
     rows = prebuilt()[0].protocol.drive_measure[::-1].copy()
     path = changed_frames(drive_measure=rows)
     line = refused(PROTOCOL, "reconstruct", path, "-o", tmp_path / "out.npz")
@@ -270,7 +257,7 @@ SKINS = {
 
 
 @pytest.mark.parametrize("kind", SKINS)
-def test_skins_that_cannot_be(kind: str, refused: Refused, tmp_path: Path) -> None:
+def test_skins_that_cannot_be(kind, refused, tmp_path):
     content, code, text = SKINS[kind]
     path = tmp_path / "skin.toml"
     path.write_text(content)
@@ -278,7 +265,7 @@ def test_skins_that_cannot_be(kind: str, refused: Refused, tmp_path: Path) -> No
     assert line.startswith(str(path)) and text in line
 
 
-def test_a_description_that_is_no_text(refused: Refused, tmp_path: Path) -> None:
+def test_a_description_that_is_no_text(refused, tmp_path):
     path = tmp_path / "skin.toml"
     path.write_bytes(b"[skin]\nname = '\xff\xfe'\n")
     assert "not UTF-8" in refused(CONFIG, "model", "build", path, "-o", tmp_path / "out.eitm")
@@ -289,7 +276,7 @@ def test_a_description_that_is_no_text(refused: Refused, tmp_path: Path) -> None
 # ---- files ----
 
 
-def test_missing_files(refused: Refused, tmp_path: Path, frames_file: Path) -> None:
+def test_missing_files(refused, tmp_path, frames_file):
     none, output = tmp_path / "none", tmp_path / "out"
     assert "no such skin description; check the path" in refused(
         FILE, f"model build {none} -o {output}"
@@ -301,7 +288,7 @@ def test_missing_files(refused: Refused, tmp_path: Path, frames_file: Path) -> N
     assert "no such skin description" in refused(FILE, "compare", "--skin", none)
 
 
-def test_folders_instead_of_files(refused: Refused, tmp_path: Path, frames_file: Path) -> None:
+def test_folders_instead_of_files(refused, tmp_path, frames_file):
     for arguments in (
         ("model", "info", tmp_path),
         ("model", "build", tmp_path, "-o", tmp_path / "out.eitm"),
@@ -312,9 +299,7 @@ def test_folders_instead_of_files(refused: Refused, tmp_path: Path, frames_file:
 
 
 @pytest.mark.parametrize("place", ["none/out", "."])
-def test_outputs_are_checked_before_the_work(
-    place: str, refused: Refused, tmp_path: Path, frames_file: Path
-) -> None:
+def test_outputs_are_checked_before_the_work(place, refused, tmp_path, frames_file):
     """A folder that does not exist, and a folder where a file is wanted; nothing was read or
     computed before."""
     output = tmp_path / place
@@ -330,9 +315,7 @@ def test_outputs_are_checked_before_the_work(
         assert text in refused(FILE, "compare", "--csv", output)
 
 
-def test_a_disk_that_is_full(
-    refused: Refused, tmp_path: Path, frames_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_is_full(refused, tmp_path, frames_file, monkeypatch):
     def full(self: Path, target: Path) -> Path:
         raise OSError(28, "No space left on device")
 
@@ -342,15 +325,13 @@ def test_a_disk_that_is_full(
     assert line == f"{output}: cannot write it (No space left on device)"
 
 
-def test_a_folder_without_permission_is_refused_before_the_work(
-    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_without_permission_is_refused_before_the_work(refused, tmp_path, monkeypatch):
     monkeypatch.setattr("eitskin.fileio.os.access", lambda path, how: False)
     line = refused(FILE, "reconstruct", "unread.npz", "-o", tmp_path / "out.npz")
     assert "cannot write there (Permission denied)" in line
 
 
-def test_standard_output_on_a_full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_standard_output_on_a_full_disk(monkeypatch):
     said = io.StringIO()
     with Path("/dev/full").open("w") as full:
         monkeypatch.setattr(sys, "stdout", full)
@@ -359,7 +340,7 @@ def test_standard_output_on_a_full_disk(monkeypatch: pytest.MonkeyPatch) -> None
     assert said.getvalue() == "eitskin: output: No space left on device\n"
 
 
-def test_a_name_that_the_terminal_cannot_show(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_that_the_terminal_cannot_show(monkeypatch):
     out = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     monkeypatch.setattr(sys, "stdout", out)
     monkeypatch.setattr("eitskin.cli.main.FIRST", "eitskin stream --device sim:k\u00e9\udcff")
@@ -368,9 +349,7 @@ def test_a_name_that_the_terminal_cannot_show(monkeypatch: pytest.MonkeyPatch) -
     assert out.buffer.getvalue().endswith(rb"sim:k\xe9\udcff" + b"\n")
 
 
-def test_a_folder_that_cannot_be_written(
-    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_cannot_be_written(refused, tmp_path, monkeypatch):
     """As a plain user sees it; simulated, since tests may run as root."""
 
     def forbidden(*arguments: object, **keywords: object) -> tuple[int, str]:
@@ -402,9 +381,7 @@ def test_a_folder_that_cannot_be_written(
         ("--only test-s3-99", "no frame is named 'test-s3-99'; did you mean 'test-s3-"),
     ],
 )
-def test_options_of_reconstruct(
-    arguments: str, text: str, refused: Refused, frames_file: Path
-) -> None:
+def test_options_of_reconstruct(arguments, text, refused, frames_file):
     assert text in refused(USAGE, "reconstruct", frames_file, arguments)
 
 
@@ -423,20 +400,18 @@ def test_options_of_reconstruct(
         ("skin.toml", "name a SKIN.toml, or give --paper: one of the two"),
     ],
 )
-def test_options_of_model_build(
-    arguments: str, text: str, refused: Refused, tmp_path: Path
-) -> None:
+def test_options_of_model_build(arguments, text, refused, tmp_path):
     assert text in refused(USAGE, f"model build --paper -o {tmp_path / 'out.eitm'}", arguments)
 
 
-def test_neither_a_skin_nor_the_paper(refused: Refused, tmp_path: Path) -> None:
+def test_neither_a_skin_nor_the_paper(refused, tmp_path):
     assert "name a SKIN.toml, or give --paper" in refused(
         USAGE, f"model build -o {tmp_path / 'out.eitm'}"
     )
 
 
 @pytest.mark.parametrize("arguments", ["--snr-db -30", "--snr-db nan", "--seed -1"])
-def test_options_of_the_demo(arguments: str, refused: Refused, tmp_path: Path) -> None:
+def test_options_of_the_demo(arguments, refused, tmp_path):
     assert "demo:" in refused(USAGE, "demo", "--picture", tmp_path / "out.png", arguments)
 
 
@@ -457,8 +432,8 @@ def test_options_of_the_demo(arguments: str, refused: Refused, tmp_path: Path) -
     ids=lambda value: value[0] if isinstance(value, list) else value,
 )
 def test_missing_extras_are_named_with_the_command_to_install_them(
-    package: str, extra: str, arguments: list[str], tmp_path: Path, frames_file: Path
-) -> None:
+    package, extra, arguments, tmp_path, frames_file
+):
     files = {"OUT": tmp_path / "out", "PNG": tmp_path / "out.png", "FRAMES": frames_file}
     given = [files.get(a, a) for a in arguments]
     done = run_python(without(package) + MAIN, *given)
@@ -469,9 +444,7 @@ def test_missing_extras_are_named_with_the_command_to_install_them(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_scipy_frames_are_reconstructed_and_scored(
-    frames_file: Path, tmp_path: Path
-) -> None:
+def test_without_scipy_frames_are_reconstructed_and_scored(frames_file, tmp_path):
     output = tmp_path / "out.npz"
     done = run_python(
         without("scipy", "netgen", "matplotlib") + MAIN, "reconstruct", frames_file, "-o", output
@@ -482,7 +455,7 @@ def test_without_scipy_frames_are_reconstructed_and_scored(
     assert output.exists()
 
 
-def test_frames_with_truth_import_no_scipy_where_it_is_installed(frames_file: Path) -> None:
+def test_frames_with_truth_import_no_scipy_where_it_is_installed(frames_file):
     code = (
         "import sys\nfrom eitskin.cli.main import main\nmain(sys.argv[1:])\n"
         "print([name for name in sys.modules if name.split('.')[0] == 'scipy'], file=sys.stderr)"
@@ -495,7 +468,7 @@ def test_frames_with_truth_import_no_scipy_where_it_is_installed(frames_file: Pa
 # ---- ends ----
 
 
-def test_an_interrupt_is_said_and_coded(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_is_said_and_coded(refused, monkeypatch):
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
@@ -503,12 +476,12 @@ def test_an_interrupt_is_said_and_coded(refused: Refused, monkeypatch: pytest.Mo
     assert refused(130, "model", "info") == "stopped"
 
 
-def test_a_traceback_where_it_is_asked_for(tmp_path: Path) -> None:
+def test_a_traceback_where_it_is_asked_for(tmp_path):
     with pytest.raises(FileError):
         main(["--traceback", "model", "info", str(tmp_path / "none")])
 
 
-def test_a_reader_that_stops_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reader_that_stops_is_no_error(monkeypatch):
     def broken(*arguments: object) -> None:
         raise BrokenPipeError
 

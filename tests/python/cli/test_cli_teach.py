@@ -17,7 +17,6 @@ from eitskin.teaching.presses import save_presses
 from eitskin.teaching.teach import teach
 from simulated_presses import SKIN, presses
 
-Refused = Callable[..., str]
 Arrays = dict[str, Any]
 
 DESCRIPTION = """
@@ -112,7 +111,7 @@ BAD: dict[str, tuple[Callable[[Arrays], Arrays], int, str]] = {
 
 
 @pytest.fixture
-def files(tmp_path: Path) -> Path:
+def files(tmp_path) -> Path:
     """A folder with twelve good presses, the skin, and a taught model."""
     save_presses(tmp_path / "good.npz", presses(12))
     save_model(tmp_path / "taught.eitm", taught())
@@ -121,7 +120,7 @@ def files(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_presses_that_cannot_teach(refused: Refused, files: Path, name: str) -> None:
+def test_presses_that_cannot_teach(refused, files, name):
     change, code, words = BAD[name]
     arrays = dict(np.load(files / "good.npz"))
     changed = arrays | change(arrays)
@@ -136,16 +135,14 @@ def test_presses_that_cannot_teach(refused: Refused, files: Path, name: str) -> 
 
 
 @pytest.mark.parametrize("action", ["update", "check"])
-def test_a_model_from_physics_is_none_to_adapt(refused: Refused, files: Path, action: str) -> None:
+def test_a_model_from_physics_is_none_to_adapt(refused, files, action):
     save_model(files / "physics.eitm", load_prebuilt()[0])
     out = ("-o", files / "new.eitm") if action == "update" else ()
     line = refused(MODEL, "teach", action, files / "physics.eitm", files / "good.npz", *out)
     assert line.endswith("no press has taught; make one with  eitskin teach fit")
 
 
-def test_frames_without_a_press_leave_the_old_file(
-    files: Path, frames_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_frames_without_a_press_leave_the_old_file(files, frames_file, capsys):
     plan, old = files / "plan.csv", (files / "good.npz").read_bytes()
     plan.write_text("x_mm,y_mm\n1,2\n500,0\n")
     given = ["--plan", plan, "-o", files / "good.npz", "--frames", frames_file, "--overwrite"]
@@ -157,8 +154,6 @@ def test_frames_without_a_press_leave_the_old_file(
     assert (files / "good.npz").read_bytes() == old
 
 
-def test_frames_of_another_protocol_check_nothing(
-    refused: Refused, files: Path, frames_file: Path
-) -> None:
+def test_frames_of_another_protocol_check_nothing(refused, files, frames_file):
     line = refused(PROTOCOL, "teach", "check", files / "taught.eitm", frames_file)
     assert line.endswith("give the model of this skin")

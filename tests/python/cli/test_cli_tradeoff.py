@@ -1,8 +1,6 @@
 """``eitskin recommend``, ``tradeoff``, and ``--budget`` and ``--accuracy`` on frames and boards."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from board_cases import write_scene
@@ -18,16 +16,13 @@ from eitskin_studies.pictures.tradeoff_pictures import DRAWN
 from eitskin_studies.tradeoff.engines import ModelShop
 from small_models import prebuilt
 
-Done = Callable[..., str]
-Refused = Callable[..., str]
-
 TINY_RUN = (
     "--scenes 3 --train 2 --set-scenes 2 --sets pairs --snr-db 60 --elements 1200 --random-skins 2"
     " --no-peers --counted 0 --rounds 1 --only 'tiny,mini,standard rank 32'"
 )
 
 
-def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
+def test_run_writes_tables_and_pictures(done, tmp_path):
     out = done(
         f"tradeoff run -o {tmp_path / 'out'}", TINY_RUN, f"--front {tmp_path / 'small.json'}"
     )
@@ -41,9 +36,7 @@ def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
     assert "MIoU" in done("recommend", "--front", front, "--budget", "1s", "--board", "host")
 
 
-def test_the_recommended_model_is_the_measured_one(
-    done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_recommended_model_is_the_measured_one(done, tmp_path, monkeypatch):
     """But for its model errors, of 300 random skins."""
     monkeypatch.setattr("eitskin.model.build.with_model_errors", lambda model, *_, **__: model)
     path = tmp_path / "model.eitm"
@@ -63,7 +56,7 @@ def test_the_recommended_model_is_the_measured_one(
     assert (measured.projection == model.projection).all()
 
 
-def test_recommendations_name_what_bounds_the_rate(done: Done) -> None:
+def test_recommendations_name_what_bounds_the_rate(done):
     slow = done("recommend", "--accuracy", "0.88", "--board", "f767")
     assert "an estimate" in slow and "frames a second" in slow
     assert "measuring bounds the rate" in done("recommend", "--budget", "2ms")
@@ -75,7 +68,7 @@ def test_recommendations_name_what_bounds_the_rate(done: Done) -> None:
 
 
 @pytest.mark.parametrize("board", ["f767", "host"])
-def test_presets_are_dearer_and_better_from_fast_to_accurate(done: Done, board: str) -> None:
+def test_presets_are_dearer_and_better_from_fast_to_accurate(done, board):
     chosen = [
         json.loads(done("recommend", "--preset", name, "--board", board, "--json"))
         for name in PRESETS
@@ -106,13 +99,11 @@ def test_presets_are_dearer_and_better_from_fast_to_accurate(done: Done, board: 
         (2, "tradeoff run --elements 3", "--elements"),
     ],
 )
-def test_refusals(refused: Refused, code: int, arguments: str, said: str) -> None:
+def test_refusals(refused, code, arguments, said):
     assert said in refused(code, arguments)
 
 
-def test_reconstruct_within_a_budget(
-    done: Done, frames_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_reconstruct_within_a_budget(done, frames_file, capsys):
     usual = json.loads(done("reconstruct", frames_file, "--json"))
     assert main(["reconstruct", str(frames_file), "--accuracy", "0.87", "--json"]) == 0
     out, err = capsys.readouterr()
@@ -148,15 +139,11 @@ def test_reconstruct_within_a_budget(
         ("--budget 1Minstructions", "instructions"),
     ],
 )
-def test_reconstruct_refuses(
-    refused: Refused, frames_file: Path, arguments: str, said: str
-) -> None:
+def test_reconstruct_refuses(refused, frames_file, arguments, said):
     assert said in refused(2, "reconstruct", frames_file, arguments)
 
 
-def test_a_model_that_nothing_was_measured_with(
-    refused: Refused, done: Done, frames_file: Path, tmp_path: Path
-) -> None:
+def test_a_model_that_nothing_was_measured_with(refused, done, frames_file, tmp_path):
     path = tmp_path / "odd.eitm"
     done(f"model build --paper --rank 33 --pixels 12 --samples 0 -o {path}")
     assert "eitskin recommend" in refused(
@@ -164,7 +151,7 @@ def test_a_model_that_nothing_was_measured_with(
     )
 
 
-def test_boards_are_told_the_settings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_boards_are_told_the_settings(tmp_path, capsys):
     scene = write_scene(tmp_path / "one.toml", frames=2, elements=900)
     assert main(["stream", "--device", f"sim:{scene}", "--accuracy", "0.87", "--json"]) == 0
     out, err = capsys.readouterr()
@@ -180,9 +167,7 @@ def test_boards_are_told_the_settings(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "30 iterations (iterations), gap" in line and "MMAC" in line
 
 
-def test_a_preset_sets_the_boards_scan_too(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_preset_sets_the_boards_scan_too(tmp_path, capsys):
     scene, run = write_scene(tmp_path / "one.toml", frames=2, elements=900), tmp_path / "run.eits"
     assert main(["record", "--device", f"sim:{scene}", "-o", str(run), "--preset", "fast"]) == 0
     assert "20 samples, reciprocal scan; measured" in capsys.readouterr().err
@@ -191,7 +176,7 @@ def test_a_preset_sets_the_boards_scan_too(
     assert (board["samples"], board["check_every"]) == (20, 0)
 
 
-def test_python_takes_a_preset(tmp_path: Path) -> None:
+def test_python_takes_a_preset(tmp_path):
     scene, run = write_scene(tmp_path / "one.toml", frames=1, elements=900), tmp_path / "run.eits"
     assert len(list(eitskin.stream(f"sim:{scene}", preset="fast", record=run))) == 1
     with eitskin.open_device(f"file:{run}") as device:
@@ -204,16 +189,14 @@ def test_python_takes_a_preset(tmp_path: Path) -> None:
             next(eitskin.stream(f"sim:{scene}", **wrong))
 
 
-def test_boards_refuse(refused: Refused, tmp_path: Path) -> None:
+def test_boards_refuse(refused, tmp_path):
     scene = write_scene(tmp_path / "one.toml", frames=1)
     assert "--iterations" in refused(2, f"stream --device sim:{scene} --budget 5ms --iterations 9")
     assert "takes" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "1ms")
     assert "--budget x" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "x")
 
 
-def test_a_recording_takes_no_budget_but_keeps_what_it_chose(
-    refused: Refused, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recording_takes_no_budget_but_keeps_what_it_chose(refused, tmp_path, capsys):
     scene, run = write_scene(tmp_path / "one.toml", frames=2, elements=900), tmp_path / "run.eits"
     assert main(["record", "--device", f"sim:{scene}", "-o", str(run), "--accuracy", "0.87"]) == 0
     assert main(["replay", str(run), "--check"]) == 0

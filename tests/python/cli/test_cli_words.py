@@ -9,7 +9,7 @@ from eitskin.cli.progress import lines
 from eitskin.config import listed, nearest
 
 
-def test_long_work_says_how_long_is_left(capsys: pytest.CaptureFixture[str]) -> None:
+def test_long_work_says_how_long_is_left(capsys):
     times = iter(range(0, 400, 4))  # four seconds an item
     assert list(lines(iter("abcdefgh"), "solving", 8, lambda: next(times))) == list("abcdefgh")
     found = capsys.readouterr().err.splitlines()
@@ -19,7 +19,7 @@ def test_long_work_says_how_long_is_left(capsys: pytest.CaptureFixture[str]) -> 
     assert capsys.readouterr().err == "eitskin: scenes: 15 of 40, 00:20 left\n"
 
 
-def test_long_lists_are_cut() -> None:
+def test_long_lists_are_cut():
     names = [f"frame {k:04d}" for k in range(1000)]
     assert listed(names[:3]) == "frame 0000, frame 0001, frame 0002"
     text = nearest("xyz", names)
@@ -27,7 +27,7 @@ def test_long_lists_are_cut() -> None:
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
-def test_completion_knows_the_commands(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_completion_knows_the_commands(shell, capsys):
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
     assert "reconstruct" in script and "stream" in script and "picture" in script

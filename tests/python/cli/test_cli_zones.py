@@ -19,7 +19,7 @@ def written(tmp_path: Path, text: str) -> Path:
     return path
 
 
-def test_zones_may_touch_and_lie_in_a_rings_hole(tmp_path: Path) -> None:
+def test_zones_may_touch_and_lie_in_a_rings_hole(tmp_path):
     text = KEY.format("a", SQUARE) + KEY.format("b", "[[20, 0], [40, 0], [40, 20], [20, 20]]")
     text += RING.format("volume", 60, 80) + PAD.format("left", -30, 20)
     assert [zone.name for zone in load_zones(written(tmp_path, text))] == [
@@ -52,9 +52,7 @@ def test_zones_may_touch_and_lie_in_a_rings_hole(tmp_path: Path) -> None:
         ("[[pad", "not valid TOML"),
     ],
 )
-def test_a_zones_file_that_cannot_be_is_refused_in_a_line(
-    tmp_path: Path, text: str, says: str
-) -> None:
+def test_a_zones_file_that_cannot_be_is_refused_in_a_line(tmp_path, text, says):
     with pytest.raises(EitskinError) as error:
         load_zones(written(tmp_path, text))
     assert says in str(error.value) and "\n" not in str(error.value)

@@ -2,8 +2,6 @@
 and gain suit."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,7 +23,7 @@ def by_node_voltages(protocol: Protocol) -> np.ndarray:
 
 
 @pytest.mark.parametrize("protocol", [adjacent(16), opposite(16), adjacent(9)])
-def test_voltages_are_those_of_the_network(protocol: Protocol) -> None:
+def test_voltages_are_those_of_the_network(protocol):
     rows = protocol.drive_measure.astype(int)
     volts = resistor_ring(protocol.n_electrodes, OHM).voltages(rows, protocol.current_a)
     assert np.allclose(volts, by_node_voltages(protocol), rtol=1e-9)
@@ -41,12 +39,12 @@ def test_voltages_are_those_of_the_network(protocol: Protocol) -> None:
     ids=["healthy", "30 % too low", "one channel 50 % too high"],
 )
 def test_the_doctor_compares_with_the_ring(
-    spoil: Callable[[np.ndarray], np.ndarray],
-    named: set[str],
-    code: int,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    spoil,
+    named,
+    code,
+    tmp_path,
+    capsys,
+):
     volts = by_node_voltages(adjacent(16))
     frames = volts * np.random.default_rng(1).normal(1, 1e-3, (12, 208))
     np.savetxt(tmp_path / "ring.csv", spoil(frames), delimiter=",")
@@ -61,7 +59,7 @@ def test_the_doctor_compares_with_the_ring(
 
 
 @pytest.mark.parametrize("conductivity", [0.001, 0.01, 0.1, 1.0, 10.0])
-def test_what_is_proposed_suits(conductivity: float) -> None:
+def test_what_is_proposed_suits(conductivity):
     """A ring as conductive as skins from dry gel to saline."""
     for protocol in (adjacent(16), opposite(16)):
         transfer = resistor_ring(16, 100.0 / conductivity).transfer_ohm
@@ -71,10 +69,10 @@ def test_what_is_proposed_suits(conductivity: float) -> None:
         assert demand.suits(FrontEnd()) == (proposed == FrontEnd())
 
 
-def test_resistors_are_of_the_series() -> None:
+def test_resistors_are_of_the_series():
     assert [resistor_from(ohm) for ohm in (1000.0, 1001.0, 8300.0)] == [1000.0, 1100.0, 9100.0]
 
 
-def test_a_resistance_below_zero_is_a_mistake(refused: Callable[..., str]) -> None:
+def test_a_resistance_below_zero_is_a_mistake(refused):
     said = refused(2, "model", "voltages", "--paper", "--resistor-ring", "-5")
     assert "--resistor-ring -5 is out of range" in said

@@ -51,9 +51,7 @@ def compile_with(folder: Path, *flags: str) -> list[str]:
         (["-O2", "-DROUNDING=FE_TOWARDZERO"], ARITHMETIC),
     ],
 )  # fmt: skip
-def test_contraction_and_reordered_sums_are_found_at_the_start(
-    tmp_path: Path, flags: list[str], status: int, width: list[str]
-) -> None:
+def test_contraction_and_reordered_sums_are_found_at_the_start(tmp_path, flags, status, width):
     """``eits_init`` returns what this program does."""
     if "FUSED" in flags:
         cpu = Path("/proc/cpuinfo").read_text()
@@ -74,16 +72,14 @@ def test_contraction_and_reordered_sums_are_found_at_the_start(
         (["-D__FLT_EVAL_METHOD__=1"], "without excess precision"),
     ],
 )
-def test_what_the_compiler_says_of_its_flags_is_refused(
-    tmp_path: Path, flags: list[str], said: str
-) -> None:
+def test_what_the_compiler_says_of_its_flags_is_refused(tmp_path, flags, said):
     done = subprocess.run(
         compile_with(tmp_path, *flags), cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode != 0 and said in done.stderr
 
 
-def test_double_may_be_as_wide_as_the_processor_s_registers_of_double(tmp_path: Path) -> None:
+def test_double_may_be_as_wide_as_the_processor_s_registers_of_double(tmp_path):
     run(*compile_with(tmp_path, "-D__FLT_EVAL_METHOD__=1", "-DEITS_DOUBLE", "-fsyntax-only"))
 
 
@@ -119,8 +115,8 @@ UNFUSED = "#include <math.h>\n#define fmaf(a, b, c) ((a) * (b) + (c))\n"
     ],
 )
 def test_other_arithmetic_in_one_file_is_found_by_the_set_and_not_by_the_one_image(
-    tmp_path: Path, source: str, fused: bool, status: int
-) -> None:
+    tmp_path, source, fused, status
+):
     """Its products and sums contracted, or its fused ones taken apart: eits_init sees neither, the
     golden image has the same bits, a checksum of the set has not."""
     cpu = Path("/proc/cpuinfo").read_text()

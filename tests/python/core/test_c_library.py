@@ -86,7 +86,7 @@ def shown(library: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_asks_only_for_memory_moves_and_arithmetic(libraries: dict[str, Path], width: str) -> None:
+def test_asks_only_for_memory_moves_and_arithmetic(libraries, width):
     """No malloc, no printf, no file, no clock: nothing but what is listed here."""
     asked = asked_of_others(libraries[width])
     for forbidden in (
@@ -107,23 +107,23 @@ def test_asks_only_for_memory_moves_and_arithmetic(libraries: dict[str, Path], w
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_keeps_nothing_between_calls(libraries: dict[str, Path], width: str) -> None:
+def test_keeps_nothing_between_calls(libraries, width):
     """No writable variable, global or static: neither a symbol nor a byte."""
     assert writable(libraries[width]) == set()
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_shows_only_names_of_its_own(libraries: dict[str, Path], width: str) -> None:
+def test_shows_only_names_of_its_own(libraries, width):
     names = shown(libraries[width])
     assert {name for name in names if not name.startswith("eits_")} == set()
     assert {"eits_model_open", "eits_init", "eits_reconstruct", "eits_find_touches"} <= names
 
 
-def test_both_widths_show_the_same(libraries: dict[str, Path]) -> None:
+def test_both_widths_show_the_same(libraries):
     assert shown(libraries["f32"]) == shown(libraries["f64"])
 
 
-def test_an_offender_is_noticed(tmp_path: Path) -> None:
+def test_an_offender_is_noticed(tmp_path):
     """The judges above, on a library that does all that the core must not."""
     source, member, library = tmp_path / "bad.c", tmp_path / "bad.o", tmp_path / "libbad.a"
     source.write_text(
@@ -145,7 +145,7 @@ def test_an_offender_is_noticed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_every_source_is_built(libraries: dict[str, Path], width: str) -> None:
+def test_every_source_is_built(libraries, width):
     members = {
         name.removesuffix(".o").removesuffix(".obj")
         for name in run(tool("ar"), "t", libraries[width]).split()
@@ -156,7 +156,7 @@ def test_every_source_is_built(libraries: dict[str, Path], width: str) -> None:
 
 
 @pytest.mark.parametrize("path", [*SOURCES, *HEADERS], ids=lambda path: path.name)
-def test_files_are_short(path: Path) -> None:
+def test_files_are_short(path):
     """Lines of code: an explanation does not make a file long."""
     text = path.read_text(encoding="ascii")  # and plain
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
@@ -166,7 +166,7 @@ def test_files_are_short(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", [*SOURCES, *HEADERS], ids=lambda path: path.name)
-def test_includes_are_the_allowed_ones(path: Path) -> None:
+def test_includes_are_the_allowed_ones(path):
     """The standard library's integers, sizes, memory moves and arithmetic; and files of the
     core."""
     allowed = {"stdint.h", "stddef.h", "string.h", "math.h", "float.h"} | (
@@ -186,7 +186,7 @@ def test_includes_are_the_allowed_ones(path: Path) -> None:
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("path", HEADERS, ids=lambda path: path.name)
-def test_each_header_stands_alone(path: Path, width: str, tmp_path: Path) -> None:
+def test_each_header_stands_alone(path, width, tmp_path):
     """Included first and alone, as C11 without extensions and, where there is a C++ compiler, as
     C++."""
     program = tmp_path / "alone.c"

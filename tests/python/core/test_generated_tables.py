@@ -7,7 +7,6 @@ import shlex
 import subprocess
 import sys
 from dataclasses import asdict, fields
-from typing import Any
 
 import pytest
 from build_tools import CSRC, ROOT
@@ -24,7 +23,7 @@ WIDTHS = ("float32", "float64")
 CONSTANTS = load_toml(ROOT / "tables" / "constants.toml", "table")["room"]
 
 
-def test_what_is_written_from_the_tables_is_up_to_date() -> None:
+def test_what_is_written_from_the_tables_is_up_to_date():
     done = subprocess.run(
         [sys.executable, str(ROOT / "tables" / "make_tables.py"), "--check"],
         capture_output=True,
@@ -35,7 +34,7 @@ def test_what_is_written_from_the_tables_is_up_to_date() -> None:
 
 
 @pytest.mark.parametrize("room", CONSTANTS, ids=[room["name"] for room in CONSTANTS])
-def test_a_constant_is_used_where_its_room_has_it(room: dict[str, Any]) -> None:
+def test_a_constant_is_used_where_its_room_has_it(room):
     header = ROOT / room.get("header", f"csrc/src/{room['name']}/constants.h")
     others = [path for path in header.parent.glob("*.[ch]") if path != header]
     text = "\n".join(path.read_text(encoding="ascii") for path in others)
@@ -45,7 +44,7 @@ def test_a_constant_is_used_where_its_room_has_it(room: dict[str, Any]) -> None:
         assert re.search(rf"\b{macro}\b", text) or written_out, name
 
 
-def test_constants_have_one_name_and_a_check_that_exists() -> None:
+def test_constants_have_one_name_and_a_check_that_exists():
     groups = [group for room in CONSTANTS for group in room["group"]]
     names = [row[0] for group in groups for row in group["rows"]]
     assert len(set(names)) == len(names) > 100
@@ -68,7 +67,7 @@ def test_constants_have_one_name_and_a_check_that_exists() -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_cores_options_are_pythons(width: str) -> None:
+def test_the_cores_options_are_pythons(width):
     """Names in order, places, sizes and ranges."""
     module = load_core(width)
     ffi, count = module.ffi, module.ffi.new("uint32_t *")
@@ -89,7 +88,7 @@ def test_the_cores_options_are_pythons(width: str) -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_a_models_options_are_the_same_in_both(width: str) -> None:
+def test_a_models_options_are_the_same_in_both(width):
     module, model = load_core(width), prebuilt()[0]
     blob = encode_model(model)
     memory = module.ffi.new("uint64_t[]", len(blob) // 8 + 2)
@@ -106,7 +105,7 @@ def test_a_models_options_are_the_same_in_both(width: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["_core_f32", "_core_f64"])
-def test_python_sees_all_that_the_headers_declare(name: str) -> None:
+def test_python_sees_all_that_the_headers_declare(name):
     module = importlib.import_module(f"eitskin.core.{name}")
     text = "\n".join(path.read_text() for path in (CSRC / "include" / "eitskin").glob("*.h"))
     bare = re.sub(r"/\*.*?\*/", " ", text, flags=re.S)

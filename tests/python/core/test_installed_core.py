@@ -26,7 +26,7 @@ def prefix() -> Path:
 
 
 @pytest.fixture(scope="module")
-def programs(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def programs(prefix, tmp_path_factory) -> Path:
     """The examples, built by find_package on the installed copy."""
     build = tmp_path_factory.mktemp("examples")
     run("cmake", "-S", EXAMPLES, "-B", build, "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}")
@@ -50,7 +50,7 @@ def printed_touches(text: str) -> list[tuple[float, float, float]]:
 
 
 @pytest.mark.parametrize("program", ["minimal", "minimal_double", "minimal_cpp"])
-def test_an_example_finds_the_touches_that_python_finds(programs: Path, program: str) -> None:
+def test_an_example_finds_the_touches_that_python_finds(programs, program):
     with resources.as_file(resources.files("eitskin.model") / "paper.eitm") as model:
         found = printed_touches(run(programs / program, model))
     expected = golden_touches()
@@ -60,7 +60,7 @@ def test_an_example_finds_the_touches_that_python_finds(programs: Path, program:
         assert one == pytest.approx(other, abs=0.06)  # printed to 0.1 mm
 
 
-def test_an_example_says_what_is_wrong_with_a_file(programs: Path, tmp_path: Path) -> None:
+def test_an_example_says_what_is_wrong_with_a_file(programs, tmp_path):
     (tmp_path / "no.eitm").write_bytes(b"not a model" * 20)
     done = subprocess.run(
         [programs / "minimal", tmp_path / "no.eitm"], capture_output=True, text=True, check=False
@@ -69,7 +69,7 @@ def test_an_example_says_what_is_wrong_with_a_file(programs: Path, tmp_path: Pat
     assert "not an .eitm model" in done.stderr
 
 
-def test_pkg_config_gives_what_a_compiler_needs(prefix: Path, tmp_path: Path) -> None:
+def test_pkg_config_gives_what_a_compiler_needs(prefix, tmp_path):
     tool = shutil.which("pkg-config")
     assert tool, "pkg-config is missing; install it:  apt-get install pkgconf"
     for name in ("eitskin", "eitskin64"):
@@ -79,7 +79,7 @@ def test_pkg_config_gives_what_a_compiler_needs(prefix: Path, tmp_path: Path) ->
         run("cc", EXAMPLES / "minimal.c", "-o", tmp_path / name, *flags.split())
 
 
-def test_as_a_subproject_it_brings_neither_tests_nor_werror(tmp_path: Path) -> None:
+def test_as_a_subproject_it_brings_neither_tests_nor_werror(tmp_path):
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.25)\nproject(user LANGUAGES C)\n"
         f'add_subdirectory("{ROOT}" eitskin)\n'
@@ -94,7 +94,7 @@ def test_as_a_subproject_it_brings_neither_tests_nor_werror(tmp_path: Path) -> N
     assert "firmware" not in rules
 
 
-def test_memory_table_of_the_page_is_what_the_macros_give(programs: Path) -> None:
+def test_memory_table_of_the_page_is_what_the_macros_give(programs):
     page = (ROOT / "docs" / "reference" / "c-api.md").read_text(encoding="utf-8")
     for row in run(programs / "memory").splitlines():
         assert row in page, f"docs/reference/c-api.md lacks the row  {row}"

@@ -94,7 +94,7 @@ def strangers(text: str, room: str) -> list[str]:
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(CSRC / "src")))
-def test_a_file_keeps_to_its_room(path: Path) -> None:
+def test_a_file_keeps_to_its_room(path):
     text, room = path.read_text(encoding="ascii"), room_of(path)
     assert {name.split("/")[0] for name in includes(text)} <= set(allowed(room))
     if room != "api":
@@ -111,7 +111,7 @@ def test_a_file_keeps_to_its_room(path: Path) -> None:
     ],
     ids=["core", "firmware"],
 )
-def test_no_circle_of_files(folder: Path, read: tuple[str, str]) -> None:
+def test_no_circle_of_files(folder, read):
     """A source and its header are one file here. ``read``: one that includes another."""
     edges: dict[str, set[str]] = {}
     for path in sorted(folder.rglob("*.[ch]")):
@@ -123,13 +123,13 @@ def test_no_circle_of_files(folder: Path, read: tuple[str, str]) -> None:
 
 
 @pytest.mark.parametrize(("room", "below"), FIRMWARE.items())
-def test_the_firmwares_rooms_know_those_below(room: str, below: set[str]) -> None:
+def test_the_firmwares_rooms_know_those_below(room, below):
     for path in sorted((ROOT / "firmware" / room).rglob("*.[ch]")):
         text = path.read_text(encoding="ascii")
         assert {name.split("/")[0] for name in includes(text)} <= below, path.name
 
 
-def test_rooms_are_small() -> None:
+def test_rooms_are_small():
     counts: dict[Path, int] = {}
     for path in SOURCES:
         counts[path.parent] = counts.get(path.parent, 0) + 1
@@ -137,7 +137,7 @@ def test_rooms_are_small() -> None:
     assert max(counts.values()) <= MOST_FILES
 
 
-def test_offenders_are_noticed() -> None:
+def test_offenders_are_noticed():
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == ["a", "b", "c", "a"]
     assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
     assert "solve" not in allowed("frame")

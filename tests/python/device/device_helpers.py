@@ -138,4 +138,4 @@ def board_info(**changes: object) -> BoardInfo:
         "drive": 0, "settings": 0, "source_ua_rms": 350, "current_ua_rms": 0,
         "current_limit_ua_rms": 437,
     }  # fmt: skip
-    return BoardInfo(**(values | changes))  # type: ignore[arg-type]
+    return BoardInfo(**(values | changes))

@@ -11,7 +11,7 @@ from eitskin.errors import DeviceError
 MODEL = bytes(range(256)) * 40
 
 
-def test_a_bank_is_the_model_and_its_record_at_the_end() -> None:
+def test_a_bank_is_the_model_and_its_record_at_the_end():
     bank = bank_bytes(MODEL, 7)
     assert len(bank) == BANK_BYTES == 512 * 1024
     assert bank[: len(MODEL)] == MODEL
@@ -22,7 +22,7 @@ def test_a_bank_is_the_model_and_its_record_at_the_end() -> None:
     assert words[7] == zlib.crc32(bank[-32:-4])
 
 
-def test_a_model_that_does_not_fit_is_refused() -> None:
+def test_a_model_that_does_not_fit_is_refused():
     assert len(bank_bytes(bytes(992), 1, 1024)) == 1024
     with pytest.raises(DeviceError, match="993 bytes and a bank of the board holds 992"):
         bank_bytes(bytes(993), 1, 1024)

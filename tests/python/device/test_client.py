@@ -32,7 +32,7 @@ def clean_run() -> dict[int, bytes]:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_lossy_line_loses_frames_but_nothing_else(seed: int) -> None:
+def test_a_lossy_line_loses_frames_but_nothing_else(seed):
     """Commands get through, no frame is wrong, every loss between two packets that came is
     counted."""
     generator = random.Random(seed)
@@ -67,7 +67,7 @@ def test_a_lossy_line_loses_frames_but_nothing_else(seed: int) -> None:
     assert sent - counters.packets - missing <= 3  # lost before the first that came
 
 
-def test_what_is_lost_at_the_streams_end_does_not_hang_it() -> None:
+def test_what_is_lost_at_the_streams_end_does_not_hang_it():
     transport = SimTransport("cut", sim_board())
     seen = 0
 
@@ -83,7 +83,7 @@ def test_what_is_lost_at_the_streams_end_does_not_hang_it() -> None:
     assert 8 <= len(raws) < 12
 
 
-def test_the_stream_stops_when_it_is_left() -> None:
+def test_the_stream_stops_when_it_is_left():
     board = sim_board()
     with Device(SimTransport("left", board)) as device:
         for item in device.stream(Stream.RAW):
@@ -92,7 +92,7 @@ def test_the_stream_stops_when_it_is_left() -> None:
         assert device.info().streaming == 0
 
 
-def test_commands_within_a_stream_lose_no_frame() -> None:
+def test_commands_within_a_stream_lose_no_frame():
     with Device(SimTransport("within", sim_board())) as device:
         device.start_scene()
         frames = []
@@ -104,7 +104,7 @@ def test_commands_within_a_stream_lose_no_frame() -> None:
         assert frames == list(range(FRAMES))
 
 
-def test_a_board_that_restarts_within_a_stream_is_told_and_goes_on() -> None:
+def test_a_board_that_restarts_within_a_stream_is_told_and_goes_on():
     board = sim_board()
     with Device(SimTransport("restarts", board)) as device:
         items = []
@@ -118,7 +118,7 @@ def test_a_board_that_restarts_within_a_stream_is_told_and_goes_on() -> None:
     assert len([item for item in items if isinstance(item, RawFrame)]) == 8
 
 
-def test_a_restart_loses_the_reference_and_says_so() -> None:
+def test_a_restart_loses_the_reference_and_says_so():
     board = sim_board()
     with Device(SimTransport("restarts", board)) as device:
         device.tare(QUIET)
@@ -159,7 +159,7 @@ class Scripted:
         self.closed = True
 
 
-def test_silence_is_said_and_the_port_let_go() -> None:
+def test_silence_is_said_and_the_port_let_go():
     port = Scripted()
     with pytest.raises(
         DeviceError,
@@ -169,7 +169,7 @@ def test_silence_is_said_and_the_port_let_go() -> None:
     assert port.closed
 
 
-def test_bytes_that_are_no_packets_are_another_baud_rate() -> None:
+def test_bytes_that_are_no_packets_are_another_baud_rate():
     with pytest.raises(
         DeviceError,
         match=r"400 bytes arrive but no packet decodes at 115200 baud: .*serial:PORT\?baud=N",
@@ -177,7 +177,7 @@ def test_bytes_that_are_no_packets_are_another_baud_rate() -> None:
         Device(Scripted(bytes(random.Random(1).randrange(256) for _ in range(400))))
 
 
-def test_packets_without_an_answer_are_told_apart() -> None:
+def test_packets_without_an_answer_are_told_apart():
     chatter = [encode(PacketType.FAULT, k, bytes(36)) for k in range(5)]
     with pytest.raises(
         DeviceError,
@@ -186,7 +186,7 @@ def test_packets_without_an_answer_are_told_apart() -> None:
         Device(Scripted(*chatter))
 
 
-def test_a_board_that_talks_for_ever_without_answering_is_given_up() -> None:
+def test_a_board_that_talks_for_ever_without_answering_is_given_up():
     port = Scripted()
     numbers = iter(range(10**6))
     port.read = lambda timeout_s: encode(PacketType.FAULT, next(numbers), bytes(36))
@@ -197,7 +197,7 @@ def test_a_board_that_talks_for_ever_without_answering_is_given_up() -> None:
 @pytest.mark.parametrize(
     ("version", "advice"), [(7, "upgrade eitskin, or flash"), (1, "flash this version's firmware")]
 )
-def test_another_link_version_is_refused_with_what_to_do(version: int, advice: str) -> None:
+def test_another_link_version_is_refused_with_what_to_do(version, advice):
     import zlib
 
     head = bytes([version, 1, 0, 0, 1, 1, 1, 1])
@@ -217,7 +217,7 @@ def test_another_link_version_is_refused_with_what_to_do(version: int, advice: s
 
 
 @pytest.mark.parametrize("major", [host_major() + 1, host_major() + 7])
-def test_another_firmware_version_is_refused_with_what_to_do(major: int) -> None:
+def test_another_firmware_version_is_refused_with_what_to_do(major):
     newer = encode(PacketType.INFO, 0, pack(board_info(firmware=(major, 0, 3))))
     with pytest.raises(
         DeviceError,
@@ -228,7 +228,7 @@ def test_another_firmware_version_is_refused_with_what_to_do(major: int) -> None
         Device(Scripted(newer))
 
 
-def test_an_older_firmware_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_older_firmware_is_refused(monkeypatch):
     monkeypatch.setattr("eitskin.device.check.__version__", "3.2.1")
     with pytest.raises(
         DeviceError,
@@ -237,7 +237,7 @@ def test_an_older_firmware_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         check_board(board_info(), "COM1")
 
 
-def test_another_model_is_refused_with_what_to_do() -> None:
+def test_another_model_is_refused_with_what_to_do():
     model, blob = prebuilt()
     import zlib
 
@@ -257,7 +257,7 @@ def test_another_model_is_refused_with_what_to_do() -> None:
         check_model(replace(info, model_bytes=0), model, blob, "x")
 
 
-def test_malformed_payloads_are_counted_and_passed_over() -> None:
+def test_malformed_payloads_are_counted_and_passed_over():
     packets = [
         (PacketType.INFO, pack(board_info(request=1))),
         (PacketType.RAW, b"no raw frame"),
@@ -273,7 +273,7 @@ def test_malformed_payloads_are_counted_and_passed_over() -> None:
         assert device.counters.gaps == 0
 
 
-def test_an_excitation_that_the_generator_rounds_stays_what_was_asked() -> None:
+def test_an_excitation_that_the_generator_rounds_stays_what_was_asked():
     """INFO tells 50000.012 Hz; sent back like that it would be no whole number of periods."""
     from eitskin.device.client import _asked_millihz
 
@@ -283,7 +283,7 @@ def test_an_excitation_that_the_generator_rounds_stays_what_was_asked() -> None:
     assert found == 1000
 
 
-def test_frames_of_a_stream_are_finite() -> None:
+def test_frames_of_a_stream_are_finite():
     with Device(SimTransport("finite", sim_board())) as device:
         device.start_scene()
         assert all(

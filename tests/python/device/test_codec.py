@@ -21,14 +21,14 @@ def packets_of(wire: bytes, decoder: Decoder | None = None) -> list[Packet]:
     st.integers(0, 2**32 - 1),
     st.binary(max_size=1000),
 )
-def test_round_trip(packet_type: int, sequence: int, payload: bytes) -> None:
+def test_round_trip(packet_type, sequence, payload):
     wire = encode(packet_type, sequence, payload)
     assert wire[0] == wire[-1] == 0
     assert 0 not in wire[1:-1]
     assert packets_of(wire) == [Packet(packet_type, sequence, payload)]
 
 
-def test_the_bytes_are_the_documented_ones() -> None:
+def test_the_bytes_are_the_documented_ones():
     """Worked out by hand in docs/reference/link-protocol.md."""
     head = bytes([LINK_VERSION, 0x80, 4, 0, 7, 0, 0, 0])
     payload = bytes([1, 2, 0, 3])
@@ -52,12 +52,12 @@ def test_the_bytes_are_the_documented_ones() -> None:
     "size", [0, 1, 241, 242, 243, 253, 254, 255, 508, 1000, LINK_MAX_PAYLOAD - 1, LINK_MAX_PAYLOAD]
 )
 @pytest.mark.parametrize("fill", [0, 1, 255])
-def test_sizes_at_the_edges(size: int, fill: int) -> None:
+def test_sizes_at_the_edges(size, fill):
     payload = bytes([fill]) * size
     assert packets_of(encode(1, 1, payload)) == [Packet(1, 1, payload)]
 
 
-def test_too_long_a_payload_is_refused() -> None:
+def test_too_long_a_payload_is_refused():
     with pytest.raises(DeviceError, match="cannot carry 16385 bytes; the most is 16384"):
         encode(1, 1, bytes(LINK_MAX_PAYLOAD + 1))
 
@@ -94,9 +94,7 @@ def damaged_wires(draw: st.DrawFn) -> bytes:
 
 @settings(max_examples=300, deadline=None)
 @given(damaged_wires(), st.lists(st.integers(1, 700), min_size=1, max_size=8))
-def test_a_link_under_fire_takes_only_what_was_sent_and_in_order(
-    wire: bytes, cuts: list[int]
-) -> None:
+def test_a_link_under_fire_takes_only_what_was_sent_and_in_order(wire, cuts):
     decoder, found, place = Decoder(), [], 0
     k = 0
     while place < len(wire):
@@ -124,13 +122,13 @@ def test_a_link_under_fire_takes_only_what_was_sent_and_in_order(
 
 
 @given(st.binary(max_size=3000))
-def test_garbage_is_no_packet(garbage: bytes) -> None:
+def test_garbage_is_no_packet(garbage):
     decoder = Decoder()
     assert decoder.feed(garbage) == []
     assert decoder.counters.packets == 0
 
 
-def test_a_port_opened_in_the_middle_of_a_packet() -> None:
+def test_a_port_opened_in_the_middle_of_a_packet():
     first, second = encode(1, 1, b"half of this is gone"), encode(1, 2, b"whole")
     decoder = Decoder()
     assert [p.payload for p in decoder.feed(first[5:] + second)] == [b"whole"]
@@ -139,7 +137,7 @@ def test_a_port_opened_in_the_middle_of_a_packet() -> None:
     assert found == (0, 0, 0)
 
 
-def test_another_version_is_told_apart_from_damage() -> None:
+def test_another_version_is_told_apart_from_damage():
     from eitskin.core import _core_f32 as core
 
     plain = bytes([5, 1, 0, 0, 1, 1, 1, 1])
@@ -152,7 +150,7 @@ def test_another_version_is_told_apart_from_damage() -> None:
     assert decoder.other_version == 5
 
 
-def test_what_was_half_received_before_a_cut_is_no_error() -> None:
+def test_what_was_half_received_before_a_cut_is_no_error():
     decoder = Decoder()
     decoder.feed(encode(1, 1, b"a") + encode(1, 2, b"b")[:-4])
     decoder.link_lost()

@@ -5,7 +5,6 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import pytest
 from device_helpers import QUIET, Damaging, empty_bank, same, scene, sim_device
@@ -64,8 +63,8 @@ def faults(items: Iterable[object]) -> list[tuple[int, bool, int, int]]:
 
 @pytest.mark.parametrize("every", [1, 4])
 def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_it_is_back(
-    every: int,
-) -> None:
+    every,
+):
     with sim_device(board()) as device:
         device.tare(QUIET)
         device.start_scene()
@@ -91,7 +90,7 @@ def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_i
         assert device.info().faults == 0
 
 
-def test_it_is_told_though_nobody_wants_images() -> None:
+def test_it_is_told_though_nobody_wants_images():
     with sim_device(board()) as device:
         device.tare(QUIET)
         device.start_scene()
@@ -100,7 +99,7 @@ def test_it_is_told_though_nobody_wants_images() -> None:
     assert found == [(FaultCode.ELECTRODE_OPEN, True, OFF), (FaultCode.ELECTRODE_OPEN, False, OFF)]
 
 
-def test_what_is_not_looked_for_is_not_found() -> None:
+def test_what_is_not_looked_for_is_not_found():
     with sim_device(board()) as device:
         device.tare(QUIET)
         open_bit = 1 << DIAGNOSTICS.index("electrode open")
@@ -115,7 +114,7 @@ def test_what_is_not_looked_for_is_not_found() -> None:
     assert FaultCode.ELECTRODE_OPEN not in {fault[0] for fault in faults(items)}
 
 
-def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_path: Path) -> None:
+def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_path):
     path = tmp_path / "run.eits"
     with sim_device(board()) as device:
         options = board_options(prebuilt()[0], device.board)
@@ -141,7 +140,7 @@ def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_p
     assert (check.same, check.different) == (FRAMES, [])
 
 
-def test_the_check_tells_findings_apart(tmp_path: Path) -> None:
+def test_the_check_tells_findings_apart(tmp_path):
     """A board that hides an electrode's fate in its heads differs from the host."""
 
     def hide(data: bytes) -> bytes:
@@ -161,7 +160,7 @@ def test_the_check_tells_findings_apart(tmp_path: Path) -> None:
     assert len(check.different) == UNTIL_FRAME - FROM_FRAME
 
 
-def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path: Path) -> None:
+def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path):
     head = bytes([1, 0x70, 1, 0, 1, 1, 1, 1]) + b"{"
     plain = head + zlib.crc32(head).to_bytes(4, "little")
     stuffed = bytes([4]) + plain[:3] + bytes([len(plain) - 3]) + plain[4:]
@@ -180,7 +179,7 @@ def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path: Path) -> N
 def solved(frame: int, **found: object) -> LiveFrame:
     head = Solved(
         frame, 0, 0, 0, 0, 0, 0, "gap", 0, 1, 1, 1, 1, 0.1, 0.2, 0.0, 0.0, 0.0, 1.0, **found
-    )  # type: ignore[arg-type]
+    )
     return LiveFrame(frame, 0, 0, touches=SolvedTouches(head, ()))
 
 
@@ -188,7 +187,7 @@ def bits(*names: str) -> int:
     return sum(1 << DIAGNOSTICS.index(name) for name in names)
 
 
-def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
+def test_what_only_heads_tell_is_said_once_and_when_it_is_over():
     events = Events()
     outlier = {"diagnostics": bits("outlier"), "outliers": 1}
     assert events.lines(solved(1)) == []
@@ -203,7 +202,7 @@ def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
     assert said == [[]] * (FAULT_CLEAR_FRAMES - 1) + [[over]]
 
 
-def test_what_fault_and_head_tell_is_said_once() -> None:
+def test_what_fault_and_head_tell_is_said_once():
     events, off = Events(), {"diagnostics": bits("electrode open"), "open_electrodes": (5,)}
     rise = Fault(FaultCode.ELECTRODE_OPEN, True, 41, 5, 0)
     assert events.lines(rise) == [
@@ -219,7 +218,7 @@ def test_what_fault_and_head_tell_is_said_once() -> None:
     assert events.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == []
 
 
-def test_a_bridged_pair_is_said_once() -> None:
+def test_a_bridged_pair_is_said_once():
     events = Events()
     text = (
         "electrodes 6 and 7 bridged, frame 3: water, paste or a wire joins them; dry or part them"
@@ -236,7 +235,7 @@ def test_a_bridged_pair_is_said_once() -> None:
     assert over == ["electrode 6 bridged: over, frame 11", "electrode 7 bridged: over, frame 11"]
 
 
-def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
+def test_every_fault_says_its_name_its_frame_and_what_to_do():
     for code in FaultCode:
         text = fault_text(Fault(code, True, 17, 3, 2))
         assert ", frame 17: " in text
@@ -258,7 +257,7 @@ def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
         assert found_name(Fault(code, raised, 1, 4, value)) == name
 
 
-def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts() -> None:
+def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts():
     events, model_mismatch = (
         Events(),
         {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125},

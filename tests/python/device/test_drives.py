@@ -44,7 +44,7 @@ SETTINGS = SessionSettings(mode=Stream.RAW | Stream.TOUCHES, report="drive", tar
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("drives") / "swipe.toml"
     path.write_text(SCENE, encoding="utf-8")
     return path
@@ -56,12 +56,12 @@ def followed(url: str, settings: SessionSettings) -> list[Any]:
 
 
 @pytest.fixture(scope="module")
-def recorded(scene: Path) -> tuple[Path, list[Any]]:
+def recorded(scene) -> tuple[Path, list[Any]]:
     path = scene.with_name("swipe.eits")
     return path, followed(f"sim:{scene}", replace(SETTINGS, record=path))
 
 
-def test_they_are_told_soon_where_they_are_and_how_fast(recorded: tuple[Path, list[Any]]) -> None:
+def test_they_are_told_soon_where_they_are_and_how_fast(recorded):
     reports = [item for item in recorded[1] if isinstance(item, Report)]
     begun = reports[0].time_s - DRIVE_S / 2  # the scene's time 0
     told = [(one.time_s - begun, one.touches) for one in reports if one.touches]
@@ -79,7 +79,7 @@ def test_they_are_told_soon_where_they_are_and_how_fast(recorded: tuple[Path, li
     assert any(len(frame.touches) == 1 for frame in frames)
 
 
-def test_their_messages_keep_to_the_schema(recorded: tuple[Path, list[Any]]) -> None:
+def test_their_messages_keep_to_the_schema(recorded):
     validator = Draft202012Validator(schema())
     for item in recorded[1]:
         validator.validate(item.message())
@@ -88,7 +88,7 @@ def test_their_messages_keep_to_the_schema(recorded: tuple[Path, list[Any]]) -> 
     assert not validator.is_valid(broken)
 
 
-def test_a_recording_gives_them_again_to_the_bit(recorded: tuple[Path, list[Any]]) -> None:
+def test_a_recording_gives_them_again_to_the_bit(recorded):
     path, items = recorded
     again = followed(f"file:{path}", replace(SETTINGS, tare=None))
 
@@ -104,7 +104,7 @@ def test_a_recording_gives_them_again_to_the_bit(recorded: tuple[Path, list[Any]
     assert not any(isinstance(item, Report) for item in without) and len(without) == frames
 
 
-def test_another_bit_is_noticed(recorded: tuple[Path, list[Any]], tmp_path: Path) -> None:
+def test_another_bit_is_noticed(recorded, tmp_path):
     packets = Decoder().feed(recorded[0].read_bytes())
     (first, *_) = [one for one in packets if one.type == PacketType.FOLLOWED and
                    len(one.payload) > FollowedHead.LAYOUT.size]  # fmt: skip
@@ -121,7 +121,7 @@ def test_another_bit_is_noticed(recorded: tuple[Path, list[Any]], tmp_path: Path
 
 
 @pytest.mark.parametrize("scan", [ScanSettings(check_every=0), ScanSettings(check_every=4)])
-def test_half_scans_are_refused(scene: Path, scan: ScanSettings) -> None:
+def test_half_scans_are_refused(scene, scan):
     with pytest.raises(DeviceError, match=r"leave {2}--report drive {2}out"):
         followed(f"sim:{scene}", replace(SETTINGS, scan=scan))
 
@@ -131,7 +131,7 @@ TOUCH = FollowedTouch(1, True, 1.0, 2.0, 3.0, 4.0, 5.0)
 GOOD = pack(HEAD) + pack(TOUCH)
 
 
-def test_a_packet_of_a_drive_is_read() -> None:
+def test_a_packet_of_a_drive_is_read():
     found: Any = parse(PacketType.FOLLOWED, GOOD)
     assert (found.head, found.touches, found.frame) == (HEAD, (TOUCH,), 3)
 
@@ -147,6 +147,6 @@ def test_a_packet_of_a_drive_is_read() -> None:
         pack(HEAD) + pack(replace(TOUCH, x_mm=float("inf"))),
     ],
 )
-def test_a_malformed_packet_of_a_drive_is_refused(payload: bytes) -> None:
+def test_a_malformed_packet_of_a_drive_is_refused(payload):
     with pytest.raises(MalformedPacket, match="FOLLOWED"):
         parse(PacketType.FOLLOWED, payload)

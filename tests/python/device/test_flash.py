@@ -17,7 +17,7 @@ IMAGE = struct.pack("<II", 0x2000_4000, 0x0800_0201) + bytes(2000)
 
 
 @pytest.fixture
-def tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def tools(tmp_path, monkeypatch) -> Path:
     """A folder on the path with all three tools, which write down how they were called."""
     folder = tmp_path / "bin"
     folder.mkdir()
@@ -31,13 +31,13 @@ def tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def image(tmp_path: Path) -> Path:
+def image(tmp_path) -> Path:
     path = tmp_path / "firmware image.bin"
     path.write_bytes(IMAGE)
     return path
 
 
-def test_openocd(image: Path, tools: Path) -> None:
+def test_openocd(image, tools):
     plan = plan_flash(image, None, image.parent, tool="openocd")
     assert plan.commands == (
         (
@@ -49,7 +49,7 @@ def test_openocd(image: Path, tools: Path) -> None:
     assert plan.bank_file is None
 
 
-def test_st_flash(image: Path, tools: Path) -> None:
+def test_st_flash(image, tools):
     plan = plan_flash(image, None, image.parent, tool="st-flash", serial="0667FF")
     assert plan.commands == (
         ("st-flash", "--serial", "0667FF", "--reset", "write", str(image), "0x08000000"),
@@ -57,7 +57,7 @@ def test_st_flash(image: Path, tools: Path) -> None:
     assert plan.lines() == [f"st-flash --serial 0667FF --reset write '{image}' 0x08000000"]
 
 
-def test_pyocd(image: Path, tools: Path) -> None:
+def test_pyocd(image, tools):
     plan = plan_flash(image, None, image.parent, tool="pyocd")
     assert plan.commands == (
         (
@@ -76,9 +76,7 @@ def test_pyocd(image: Path, tools: Path) -> None:
 
 
 @pytest.mark.parametrize("tool", TOOLS)
-def test_a_model_goes_into_the_first_bank_and_the_other_loses_its_record(
-    tool: str, image: Path, tools: Path
-) -> None:
+def test_a_model_goes_into_the_first_bank_and_the_other_loses_its_record(tool, image, tools):
     plan = plan_flash(image, tiny_blob(), image.parent, tool=tool)
     assert plan.bank_file is not None
     assert plan.bank_file.read_bytes() == bank_bytes(tiny_blob(), 1)
@@ -89,7 +87,7 @@ def test_a_model_goes_into_the_first_bank_and_the_other_loses_its_record(
     assert (plan.bank_file.parent / "eitskin-no-record.bin").read_bytes() == b"\xff" * 32
 
 
-def test_the_first_tool_that_is_there_is_taken(tools: Path) -> None:
+def test_the_first_tool_that_is_there_is_taken(tools):
     assert find_tool() == "openocd"
     (tools / "openocd").unlink()
     assert find_tool() == "st-flash"
@@ -111,7 +109,7 @@ def test_the_first_tool_that_is_there_is_taken(tools: Path) -> None:
 
 
 @pytest.mark.parametrize("tool", TOOLS)
-def test_the_plan_is_what_is_run(tool: str, image: Path, tools: Path, tmp_path: Path) -> None:
+def test_the_plan_is_what_is_run(tool, image, tools, tmp_path):
     said: list[str] = []
     plan = plan_flash(image, tiny_blob(), image.parent, tool=tool)
     assert not (tmp_path / "called").exists()  # planning runs nothing
@@ -122,9 +120,7 @@ def test_the_plan_is_what_is_run(tool: str, image: Path, tools: Path, tmp_path: 
     ]
 
 
-def test_a_tool_that_fails_is_said(
-    image: Path, tools: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_tool_that_fails_is_said(image, tools, monkeypatch):
     monkeypatch.setenv("FAIL", "3")
     with pytest.raises(
         DeviceError, match=r"flashing failed: st-flash .* ended with 3; is the board plugged in"
@@ -150,25 +146,23 @@ def test_a_tool_that_fails_is_said(
         (IMAGE + bytes(256 * 1024), "but firmware has room for 262144"),
     ],
 )
-def test_what_is_no_firmware_is_refused(
-    content: bytes, message: str, tmp_path: Path, tools: Path
-) -> None:
+def test_what_is_no_firmware_is_refused(content, message, tmp_path, tools):
     (tmp_path / "bad.bin").write_bytes(content)
     with pytest.raises(DeviceError, match=message):
         plan_flash(tmp_path / "bad.bin", None, tmp_path)
 
 
-def test_an_image_that_is_not_there(tmp_path: Path, tools: Path) -> None:
+def test_an_image_that_is_not_there(tmp_path, tools):
     with pytest.raises(FileError, match="no such firmware image"):
         plan_flash(tmp_path / "none.bin", None, tmp_path)
 
 
-def test_a_model_too_large_is_refused(image: Path, tools: Path) -> None:
+def test_a_model_too_large_is_refused(image, tools):
     with pytest.raises(DeviceError, match="a bank of the board holds 524256"):
         plan_flash(image, bytes(600_000), image.parent)
 
 
-def test_the_map_is_the_firmwares() -> None:
+def test_the_map_is_the_firmwares():
     found = flash.FIRMWARE_ADDRESS, flash.BANK_ADDRESS, flash.SECOND_BANK_ADDRESS
     assert found == (0x08000000, 0x08040000, 0x080C0000)
     assert flash.FIRMWARE_ADDRESS + flash.FIRMWARE_ROOM == flash.BANK_ADDRESS

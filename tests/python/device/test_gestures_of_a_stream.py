@@ -21,7 +21,7 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "python"
 
 
 def frames_of(url: str, mode: Stream, record: Path | None = None, **more: object) -> list[Frame]:
-    settings = SessionSettings(mode=mode, record=record, **more)  # type: ignore[arg-type]
+    settings = SessionSettings(mode=mode, record=record, **more)
     with Session(url, settings) as session:
         return [item for item in session.frames() if isinstance(item, Frame)]
 
@@ -40,19 +40,19 @@ def told(frames: list[Frame]) -> list[str]:
         ("spread", ["spread", "spread"]),
     ],
 )
-def test_a_scene_tells_its_gesture(scene: str, expected: list[str]) -> None:
+def test_a_scene_tells_its_gesture(scene, expected):
     assert told(frames_of(f"sim:{scene}", Stream.TOUCHES)) == expected
 
 
 @pytest.mark.parametrize("side", ["right", "up", "left", "down"])
-def test_a_swipe_says_which_way(side: str) -> None:
+def test_a_swipe_says_which_way(side):
     frames = frames_of(f"sim:swipe_{side}", Stream.TOUCHES)
     swipes = [one for frame in frames for one in frame.events if one.kind == EventKind.SWIPE]
     assert [one.side for one in swipes] == [side]
     assert told(frames) == ["swipe"]
 
 
-def test_the_boards_events_are_the_hosts_and_a_recording_keeps_them(tmp_path: Path) -> None:
+def test_the_boards_events_are_the_hosts_and_a_recording_keeps_them(tmp_path):
     path = tmp_path / "run.eits"
     everything = Stream.RAW | Stream.TOUCHES | Stream.EVENTS
     live = frames_of("sim:double_tap", everything, record=path)
@@ -62,12 +62,12 @@ def test_the_boards_events_are_the_hosts_and_a_recording_keeps_them(tmp_path: Pa
     assert sent == [frame.events for frame in here]
     with Device(FileTransport(path)) as device:
         replayed = [item for item in follow(device, Stream.EVENTS) if getattr(item, "events", None)]
-    assert [item.events.events for item in replayed] == sent  # type: ignore[union-attr]
+    assert [item.events.events for item in replayed] == sent
     check, _ = check_recording(path, None)
     assert not check.different and check.events == sum(map(len, sent)) > 4
 
 
-def test_events_alone_can_be_asked_for() -> None:
+def test_events_alone_can_be_asked_for():
     frames = frames_of("sim:tap", Stream.EVENTS)
     assert told(frames) == ["tap"]
     message = next(frame.message() for frame in frames if told([frame]))
@@ -77,7 +77,7 @@ def test_events_alone_can_be_asked_for() -> None:
     assert event["time_s"] == message["time_s"]
 
 
-def test_zones_are_pressed_by_the_boards_events_too() -> None:
+def test_zones_are_pressed_by_the_boards_events_too():
     pad = Zone("pad", x_mm=30, y_mm=20, outer_mm=15)
     for mode in (Stream.TOUCHES, Stream.EVENTS):
         frames = frames_of("sim:tap", mode, zones=(pad,))
@@ -86,7 +86,7 @@ def test_zones_are_pressed_by_the_boards_events_too() -> None:
         assert names == ["pad", "pad"]
 
 
-def test_options_that_cannot_be_are_refused() -> None:
+def test_options_that_cannot_be_are_refused():
     with pytest.raises(UsageError, match="option tap_ms"):
         Gestures(tap_ms=3)
     with pytest.raises(UsageError, match="at least 0"):
@@ -105,7 +105,7 @@ def example(name: str) -> ModuleType:
     return module
 
 
-def test_the_examples_play_their_scenes() -> None:
+def test_the_examples_play_their_scenes():
     beats = [pad for _, pad in example("drum_pad").beats("sim:drum_beat")]
     assert beats == ["kick", "hat", "snare", "hat", "kick", "ride", "snare"]
     volumes = list(example("volume_ring").volumes("sim:ring_turn"))

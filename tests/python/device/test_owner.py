@@ -14,17 +14,17 @@ from eitskin.live.session import KEPT_ON, Session, SessionSettings
 from eitskin.model.prebuilt import load_prebuilt
 
 
-def test_a_locked_board_wants_its_button() -> None:
+def test_a_locked_board_wants_its_button():
     with open_device("sim:two_touch") as device:
         device.settings(Setting.LOCKED)
         assert device.reset().settings == Setting.LOCKED
         with pytest.raises(DeviceError, match="hold the blue button"):
             device.upload_model(load_prebuilt()[1])
-        device.transport.board.hold_button(True)  # type: ignore[attr-defined]
+        device.transport.board.hold_button(True)
         assert device.settings(Setting(0)).settings == 0
 
 
-def test_current_begins_with_a_tare_and_hashes_are_the_files() -> None:
+def test_current_begins_with_a_tare_and_hashes_are_the_files():
     with open_device("sim:two_touch") as device:
         assert device.board.drive == Drive.OFF
         device.tare(4)
@@ -32,7 +32,7 @@ def test_current_begins_with_a_tare_and_hashes_are_the_files() -> None:
         assert device.hashes().model == hashlib.sha256(load_prebuilt()[1]).digest()
 
 
-def test_a_limit_that_is_not_named_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_limit_that_is_not_named_stays(monkeypatch):
     given = []
 
     def opened(options: object) -> Device:
@@ -43,7 +43,7 @@ def test_a_limit_that_is_not_named_stays(monkeypatch: pytest.MonkeyPatch) -> Non
             given.append(one)
             return command(one, timeout_s)
 
-        device.command = noted  # type: ignore[assignment]
+        device.command = noted
         return device
 
     monkeypatch.setattr("eitskin.cli.cmd_board.open_named", opened)
@@ -56,8 +56,8 @@ def test_a_limit_that_is_not_named_stays(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_whoever_follows_a_board_hears_that_current_flows_on(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     def opened(*url: object, **how: object) -> Device:
         device = open_device("sim:two_touch")
         device.settings(Setting.KEEP_DRIVE)

@@ -4,7 +4,6 @@ back."""
 import math
 import re
 import struct
-from enum import IntEnum, IntFlag
 
 import numpy as np
 import pytest
@@ -64,19 +63,19 @@ def c_places(name: str) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_layouts_are_the_c_structs(name: str) -> None:
+def test_layouts_are_the_c_structs(name):
     assert LAYOUTS[name].size == core.ffi.sizeof(name)
     assert places(LAYOUTS[name].struct) == c_places(name)
 
 
-def test_every_payload_of_the_header_has_a_layout() -> None:
+def test_every_payload_of_the_header_has_a_layout():
     beginnings = ("eits_packet_", "eits_command_", "eits_stage_stats")
     structs = {name for name in core.ffi.list_types()[0] if name.startswith(beginnings)}
     assert structs - {"eits_packet_type"} == set(LAYOUTS)
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_fields_are_named_in_the_structs_order(name: str) -> None:
+def test_fields_are_named_in_the_structs_order(name):
     in_c = [{"lambda": "lambda_", "stage": "stages"}.get(field, field) for field, _ in
             core.ffi.typeof(name).fields]  # fmt: skip
     assert [field for field, _, _ in LAYOUTS[name].fields] == in_c
@@ -93,7 +92,7 @@ def test_fields_are_named_in_the_structs_order(name: str) -> None:
         (link.Stream, "eits_stream", "EITS_STREAM_"),
     ],
 )
-def test_enums_are_the_headers(enum: type[IntEnum] | type[IntFlag], name: str, prefix: str) -> None:
+def test_enums_are_the_headers(enum, name, prefix):
     in_c = {
         member.removeprefix(prefix): value
         for member, value in core.ffi.typeof(name).relements.items()
@@ -101,7 +100,7 @@ def test_enums_are_the_headers(enum: type[IntEnum] | type[IntFlag], name: str, p
     assert {member.name: int(member) for member in enum} == in_c
 
 
-def test_stages_and_limits_are_the_headers() -> None:
+def test_stages_and_limits_are_the_headers():
     lib = core.lib
     for name in ("LINK_VERSION", "LINK_MAX_PAYLOAD", "FAULT_RAISE_FRAMES", "FAULT_CLEAR_FRAMES"):
         assert getattr(link, name) == getattr(lib, f"EITS_{name}")
@@ -110,13 +109,13 @@ def test_stages_and_limits_are_the_headers() -> None:
     assert [number[f"EITS_STAGE_{name.upper()}"] for name in link.STAGES] == [*range(len(number))]
 
 
-def test_a_command_is_known_by_its_type() -> None:
+def test_a_command_is_known_by_its_type():
     assert {kind.TYPE for kind in link.COMMANDS.values()} == {
         kind for kind in link.PacketType if kind >= 0x80
     }
 
 
-def test_info_is_read_as_it_was_built() -> None:
+def test_info_is_read_as_it_was_built():
     info = board_info(firmware=(1, 2, 255), faults=0b10100, board="x" * 15, serial="A" * 24)
     payload = pl.pack(info)
     c = core.ffi.from_buffer("eits_packet_info *", bytearray(payload))
@@ -133,13 +132,10 @@ def test_info_is_read_as_it_was_built() -> None:
 words = st.integers(0, 2**32 - 1)
 halves = st.integers(0, 2**16 - 1)
 signed = st.integers(-(2**31), 2**31 - 1)
-singles = st.floats(width=32, allow_nan=False)
 
 
 @given(words, halves, halves, signed, signed)
-def test_replies_are_read_as_built(
-    request: int, command: int, status: int, first: int, second: int
-) -> None:
+def test_replies_are_read_as_built(request, command, status, first, second):
     reply = pk.Reply(request, command, status, (first, second))
     assert pl.parse(link.PacketType.REPLY, pl.pack(reply)) == reply
 
@@ -151,9 +147,7 @@ def test_replies_are_read_as_built(
     words,
     halves,
 )
-def test_raw_frames_are_read_bit_for_bit(
-    rows: list[tuple[float, int]], frame: int, time: int, scan: int, flags: int
-) -> None:
+def test_raw_frames_are_read_bit_for_bit(rows, frame, time, scan, flags):
     volts = np.array([v for v, _ in rows], dtype=np.float32)
     quality = np.array([q for _, q in rows], dtype=np.uint8)
     again = pl.parse(
@@ -171,7 +165,7 @@ def solved(count: int, status: int = 0) -> pk.Solved:
                      0b10111111, 3, 2, 0.375, (5, 63), (0, 1), (7,))  # fmt: skip
 
 
-def test_images_and_touches_are_read_as_built() -> None:
+def test_images_and_touches_are_read_as_built():
     image = np.linspace(-1, 1, 50, dtype=np.float32)
     again = pl.parse(link.PacketType.IMAGE, build_image(pk.SolvedImage(solved(50, -12), image)))
     assert isinstance(again, pk.SolvedImage)
@@ -188,10 +182,10 @@ def test_images_and_touches_are_read_as_built() -> None:
     ) == pk.SolvedTouches(solved(0), ())
 
 
-def test_stats_and_faults_are_read_as_built() -> None:
+def test_stats_and_faults_are_read_as_built():
     each = (link.StageStats(k, 2 * k, 3 * k, 4 * k) for k in range(1, len(link.STAGES) + 1))
     stages = dict(zip(link.STAGES, each, strict=True))
-    stats = pk.BoardStats(*range(17), stages)  # type: ignore[call-arg]
+    stats = pk.BoardStats(*range(17), stages)
     payload = pl.pack(stats)
     c = core.ffi.from_buffer("eits_packet_stats *", bytearray(payload))
     found = c.slots_repeated, c.outliers, c.workspace_used, c.stage[5].worst_us, c.stage[0].count
@@ -206,7 +200,7 @@ KNOWN = [kind for kind in link.PacketType if kind < 0x70]
 
 @pytest.mark.parametrize("kind", KNOWN)
 @given(payload=st.binary(max_size=400))
-def test_any_payload_is_read_or_refused(kind: link.PacketType, payload: bytes) -> None:
+def test_any_payload_is_read_or_refused(kind, payload):
     try:
         pl.parse(kind, payload)
     except pl.MalformedPacket:
@@ -215,7 +209,7 @@ def test_any_payload_is_read_or_refused(kind: link.PacketType, payload: bytes) -
 
 
 @pytest.mark.parametrize("extra", [-1, 1, 4])
-def test_a_payload_of_another_length_is_refused(extra: int) -> None:
+def test_a_payload_of_another_length_is_refused(extra):
     whole = {
         link.PacketType.INFO: pl.pack(board_info()),
         link.PacketType.REPLY: pl.pack(pk.Reply(1, 2, 3)),
@@ -233,14 +227,12 @@ def test_a_payload_of_another_length_is_refused(extra: int) -> None:
             pl.parse(kind, payload[:extra] if extra < 0 else payload + bytes(extra))
 
 
-def test_an_unknown_type_is_passed_over() -> None:
+def test_an_unknown_type_is_passed_over():
     assert pl.parse(0x33, b"anything") is None
 
 
 @given(words, halves, halves, words)
-def test_a_command_lies_as_its_layout_says(
-    request: int, what: int, every: int, frames: int
-) -> None:
+def test_a_command_lies_as_its_layout_says(request, what, every, frames):
     command = link.StreamCommand(what, every, frames)
     read = command.LAYOUT.struct.unpack(command.payload(request))
     assert read == (request, what, every, frames)
@@ -249,7 +241,7 @@ def test_a_command_lies_as_its_layout_says(
     assert data[link.ModelData.LAYOUT.size :] == bytes(every % 50)
 
 
-def test_floats_of_a_command_are_single() -> None:
+def test_floats_of_a_command_are_single():
     command = link.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9, 37, 1)
     request, *values = command.LAYOUT.struct.unpack(command.payload(5))
     assert (request, values[0]) == (5, 10)

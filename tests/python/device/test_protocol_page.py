@@ -28,13 +28,13 @@ PAGE = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "link-proto
         ("FAULT", "eits_packet_fault"),
     ],
 )
-def test_headings_state_the_structs_size(title: str, struct: str) -> None:
+def test_headings_state_the_structs_size(title, struct):
     """The tables below are written from the layouts (core/test_generated_tables.py)."""
     assert re.search(rf"^### {title}, {core.ffi.sizeof(struct)}\b", PAGE, flags=re.M)
     assert f"<!-- table {struct} -->" in PAGE
 
 
-def test_the_worked_example() -> None:
+def test_the_worked_example():
     match = re.search(r"^wire +((?:[0-9a-f]{2} ?)+)$", PAGE, flags=re.M)
     assert match
     assert encode(0x80, 7, bytes([1, 2, 0, 3])) == bytes.fromhex(match.group(1))
@@ -47,6 +47,6 @@ def test_the_worked_example() -> None:
     assert zlib.crc32(bytes.fromhex(head.group(1) + head.group(2))) == int(head.group(3), 16)
 
 
-def test_versions_and_limits() -> None:
+def test_versions_and_limits():
     assert f"describes **link version {LINK_VERSION}**" in PAGE
     assert f"at most {LINK_MAX_PAYLOAD:,}" in PAGE

@@ -24,7 +24,7 @@ from eitskin.device.simulated import SimTransport
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream, StreamCommand
 from eitskin.device.wire.packets import RawFrame, SolvedImage, SolvedTouches
-from eitskin.errors import DeviceError, EitskinError, FileError, FrameError
+from eitskin.errors import DeviceError, FileError, FrameError
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt, tiny_blob
@@ -64,7 +64,7 @@ def contents(item: object) -> tuple[object, ...]:
     return ("touches", item)
 
 
-def test_replay_equals_the_live_run(tmp_path: Path) -> None:
+def test_replay_equals_the_live_run(tmp_path):
     live, packets = record(tmp_path / "run.eits", tare_first=True)
     with open_device(f"file:{tmp_path / 'run.eits'}") as device:
         assert device.board.tared == 1
@@ -83,7 +83,7 @@ def test_replay_equals_the_live_run(tmp_path: Path) -> None:
     assert read[2:] == packets
 
 
-def test_the_head_says_where_it_comes_from(tmp_path: Path) -> None:
+def test_the_head_says_where_it_comes_from(tmp_path):
     record(tmp_path / "run.eits")
     head = read_head(tmp_path / "run.eits")
     assert head == {
@@ -99,13 +99,13 @@ def test_the_head_says_where_it_comes_from(tmp_path: Path) -> None:
     assert (tmp_path / "run.eits").read_bytes()[0] == 0
 
 
-def test_kinds_and_every_nth_of_a_recording(tmp_path: Path) -> None:
+def test_kinds_and_every_nth_of_a_recording(tmp_path):
     live, _ = record(tmp_path / "run.eits", tare_first=True)
     raws = [item.frame for item in live if isinstance(item, RawFrame)]
     with open_device(f"file:{tmp_path / 'run.eits'}") as device:
         touches = list(device.stream(Stream.TOUCHES, every=3, frames=2))
     assert [type(item) for item in touches] == [SolvedTouches, SolvedTouches]
-    assert [item.frame for item in touches] == [raws[0], raws[3]]  # type: ignore[union-attr]
+    assert [item.frame for item in touches] == [raws[0], raws[3]]
 
 
 KILLED = """
@@ -126,7 +126,7 @@ KILLED = """
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_killed_recorder_loses_at_most_the_last_packet(seed: int, tmp_path: Path) -> None:
+def test_a_killed_recorder_loses_at_most_the_last_packet(seed, tmp_path):
     path = tmp_path / "killed.eits"
     here = Path(__file__).resolve().parent
     script = textwrap.dedent(KILLED).format(paths=[str(here), str(here.parent)])
@@ -155,7 +155,7 @@ def test_a_killed_recorder_loses_at_most_the_last_packet(seed: int, tmp_path: Pa
     assert [contents(item) for item in replayed] == live
 
 
-def test_cut_at_any_byte_the_rest_is_read_and_the_cut_is_counted(tmp_path: Path) -> None:
+def test_cut_at_any_byte_the_rest_is_read_and_the_cut_is_counted(tmp_path):
     _, packets = record(tmp_path / "run.eits")
     whole = (tmp_path / "run.eits").read_bytes()
     all_read = Decoder().feed(whole)
@@ -178,7 +178,7 @@ def test_cut_at_any_byte_the_rest_is_read_and_the_cut_is_counted(tmp_path: Path)
     assert len(packets) > 30
 
 
-def test_damage_inside_is_counted_and_told_as_a_gap(tmp_path: Path) -> None:
+def test_damage_inside_is_counted_and_told_as_a_gap(tmp_path):
     record(tmp_path / "run.eits", tare_first=True)
     data = bytearray((tmp_path / "run.eits").read_bytes())
     data[len(data) // 2] ^= 0x55
@@ -191,7 +191,7 @@ def test_damage_inside_is_counted_and_told_as_a_gap(tmp_path: Path) -> None:
     assert 3 * FRAMES - 2 <= len(items) <= 3 * FRAMES
 
 
-def test_gaps_of_the_live_run_are_in_the_recording(tmp_path: Path) -> None:
+def test_gaps_of_the_live_run_are_in_the_recording(tmp_path):
     seen = 0
 
     def back(data: bytes) -> bytes:
@@ -209,7 +209,7 @@ def test_gaps_of_the_live_run_are_in_the_recording(tmp_path: Path) -> None:
         assert (device.counters.missing, device.counters.gaps) == (3, 1)
 
 
-def test_frames_of_a_recording_reconstruct_as_the_board_did(tmp_path: Path) -> None:
+def test_frames_of_a_recording_reconstruct_as_the_board_did(tmp_path):
     live, _ = record(tmp_path / "run.eits")
     frames = frames_of(tmp_path / "run.eits")
     assert frames.voltage_v.shape == (FRAMES, 208)
@@ -227,7 +227,7 @@ def test_frames_of_a_recording_reconstruct_as_the_board_did(tmp_path: Path) -> N
     )
 
 
-def test_frames_of_a_recording_without_raw_or_quiet_frames(tmp_path: Path) -> None:
+def test_frames_of_a_recording_without_raw_or_quiet_frames(tmp_path):
     with sim_device() as device:
         device.tare(QUIET)
         with Recorder(tmp_path / "touches.eits", device):
@@ -240,7 +240,7 @@ def test_frames_of_a_recording_without_raw_or_quiet_frames(tmp_path: Path) -> No
         frames_of(tmp_path / "unquiet.eits")
 
 
-def test_a_recording_takes_no_commands(tmp_path: Path) -> None:
+def test_a_recording_takes_no_commands(tmp_path):
     record(tmp_path / "run.eits")
     with open_device(f"file:{tmp_path / 'run.eits'}") as device:
         for act in (
@@ -253,7 +253,7 @@ def test_a_recording_takes_no_commands(tmp_path: Path) -> None:
                 act()
 
 
-def test_another_model_than_the_recorded_boards_is_refused(tmp_path: Path) -> None:
+def test_another_model_than_the_recorded_boards_is_refused(tmp_path):
     record(tmp_path / "run.eits")
     with pytest.raises(DeviceError, match="--model FILE"):
         open_device(f"file:{tmp_path / 'run.eits'}", model=tiny_blob())
@@ -287,9 +287,7 @@ def head_packet(**changes: object) -> bytes:
         (head_packet()[:-3], FileError, "cut in its first bytes"),
     ],
 )
-def test_what_is_no_recording(
-    content: bytes, kind: type[EitskinError], message: str, tmp_path: Path
-) -> None:
+def test_what_is_no_recording(content, kind, message, tmp_path):
     (tmp_path / "bad.eits").write_bytes(content)
     with pytest.raises(kind) as caught:
         open_device(f"file:{tmp_path / 'bad.eits'}")
@@ -297,7 +295,7 @@ def test_what_is_no_recording(
     assert "\n" not in str(caught.value)
 
 
-def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
+def test_files_that_cannot_be_read_or_written(tmp_path):
     with pytest.raises(FileError, match="no such recording"):
         open_device(f"file:{tmp_path / 'none.eits'}")
     with pytest.raises(FileError, match="cannot read this recording"):
@@ -312,12 +310,12 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     assert (tmp_path / "there.eits").read_bytes() != b"precious"
 
 
-def test_a_full_disk_ends_the_recording_with_an_error() -> None:
+def test_a_full_disk_ends_the_recording_with_an_error():
     with sim_device() as device, pytest.raises(FileError, match="what was recorded can be read"):
         Recorder("/dev/full", device, overwrite=True)
 
 
-def test_a_recording_of_a_recording_is_its_equal(tmp_path: Path) -> None:
+def test_a_recording_of_a_recording_is_its_equal(tmp_path):
     record(tmp_path / "one.eits")
     with (
         open_device(f"file:{tmp_path / 'one.eits'}") as device,
@@ -330,7 +328,7 @@ def test_a_recording_of_a_recording_is_its_equal(tmp_path: Path) -> None:
     assert one == two
 
 
-def test_a_second_recorder_on_the_same_file_is_refused(tmp_path: Path) -> None:
+def test_a_second_recorder_on_the_same_file_is_refused(tmp_path):
     path = tmp_path / "run.eits"
     with sim_device() as one, sim_device() as two:
         with Recorder(path, one):
@@ -342,9 +340,7 @@ def test_a_second_recorder_on_the_same_file_is_refused(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.eits"]
 
 
-def test_the_old_recording_stays_until_the_new_one_has_begun(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_old_recording_stays_until_the_new_one_has_begun(tmp_path, monkeypatch):
     path = tmp_path / "run.eits"
     path.write_bytes(b"old")
     path.chmod(0o640)
@@ -362,7 +358,7 @@ def test_the_old_recording_stays_until_the_new_one_has_begun(
     assert read_head(path)["format"] == "eits" and path.stat().st_mode & 0o777 == 0o640
 
 
-def test_recordings_follow_links_and_leave_devices_alone(tmp_path: Path) -> None:
+def test_recordings_follow_links_and_leave_devices_alone(tmp_path):
     (tmp_path / "link.eits").symlink_to(tmp_path / "run.eits")
     with sim_device() as device:
         Recorder(tmp_path / "link.eits", device, overwrite=True).close()
@@ -371,9 +367,7 @@ def test_recordings_follow_links_and_leave_devices_alone(tmp_path: Path) -> None
     assert read_head(tmp_path / "run.eits")["format"] == "eits"
 
 
-def test_a_recording_is_brought_to_the_disk_now_and_then(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_recording_is_brought_to_the_disk_now_and_then(tmp_path, monkeypatch):
     """Its clock is put forward by half a second a packet."""
     from eitskin.device.recordings import new_file
 

@@ -264,5 +264,5 @@ CALLS: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("name", CALLS)
-def test_same_results_of_devices(name: str) -> None:
+def test_same_results_of_devices(name):
     check_same(STORE, name, CALLS[name])

@@ -24,32 +24,32 @@ def judged(
 
 
 @pytest.mark.parametrize("start", [0, 5, TOP - 3, TOP - 1])
-def test_one_after_another(start: int) -> None:
+def test_one_after_another(start):
     verdicts, counters = judged([start + k for k in range(10)])
     assert verdicts == [0] * 10
     assert counters == LinkCounters()
 
 
 @pytest.mark.parametrize("start", [0, 17, TOP - 4])
-def test_gaps_are_counted_across_the_wrap(start: int) -> None:
+def test_gaps_are_counted_across_the_wrap(start):
     verdicts, counters = judged([start, start + 3, start + 4, start + 10])
     assert verdicts == [0, 2, 0, 5]
     assert (counters.gaps, counters.missing) == (2, 7)
 
 
-def test_duplicates_and_late_packets_are_refused() -> None:
+def test_duplicates_and_late_packets_are_refused():
     verdicts, counters = judged([1, 2, 2, 5, 3, 6, 5, 1])
     assert verdicts == [0, 0, None, 2, None, 0, None, None]
     assert (counters.duplicates, counters.stale, counters.gaps, counters.missing) == (3, 1, 1, 2)
 
 
-def test_duplicates_across_the_wrap() -> None:
+def test_duplicates_across_the_wrap():
     verdicts, counters = judged([TOP - 1, TOP, TOP - 1, TOP, TOP + 1])
     assert verdicts == [0, 0, None, None, 0]
     assert (counters.duplicates, counters.stale) == (2, 0)
 
 
-def test_a_restart_that_says_so() -> None:
+def test_a_restart_that_says_so():
     counters = LinkCounters()
     check = SequenceCheck(counters)
     assert [check.admit(n, n) for n in range(100, 110)] == [0] * 10
@@ -58,7 +58,7 @@ def test_a_restart_that_says_so() -> None:
     assert (counters.restarts, counters.gaps, counters.duplicates, counters.stale) == (1, 0, 0, 0)
 
 
-def test_a_loss_right_after_a_restart_is_a_gap() -> None:
+def test_a_loss_right_after_a_restart_is_a_gap():
     counters = LinkCounters()
     check = SequenceCheck(counters)
     for n in range(100, 110):
@@ -68,7 +68,7 @@ def test_a_loss_right_after_a_restart_is_a_gap() -> None:
     assert (counters.restarts, counters.gaps, counters.missing) == (1, 1, 3)
 
 
-def test_the_first_info_may_be_repeated() -> None:
+def test_the_first_info_may_be_repeated():
     """A board says once that it began; the line gives it twice, and more after it. Nothing is taken
     twice."""
     counters = LinkCounters()
@@ -82,7 +82,7 @@ def test_the_first_info_may_be_repeated() -> None:
     assert (counters.restarts, counters.duplicates, counters.gaps, counters.missing) == (0, 3, 0, 0)
 
 
-def test_a_restart_whose_info_was_lost_is_found_out() -> None:
+def test_a_restart_whose_info_was_lost_is_found_out():
     """Late numbers one after another are a new life, not a hundred late packets."""
     verdicts, counters = judged([*range(1000, 1010), *range(1, 40)], prints=list(range(49)))
     assert verdicts[:10] == [0] * 10
@@ -91,7 +91,7 @@ def test_a_restart_whose_info_was_lost_is_found_out() -> None:
     assert (counters.restarts, counters.gaps, counters.stale) == (1, 0, 0)
 
 
-def test_a_restart_within_the_remembered_numbers_is_found_out_too() -> None:
+def test_a_restart_within_the_remembered_numbers_is_found_out_too():
     numbers = [*range(30), *range(1, 30)]
     verdicts, counters = judged(numbers, prints=list(range(len(numbers))))
     assert counters.restarts == 1
@@ -99,14 +99,14 @@ def test_a_restart_within_the_remembered_numbers_is_found_out_too() -> None:
     assert verdicts[-1] == 0
 
 
-def test_a_long_stretch_that_comes_again_is_not_taken_for_a_restart() -> None:
+def test_a_long_stretch_that_comes_again_is_not_taken_for_a_restart():
     numbers = [*range(REMEMBERED), *range(REMEMBERED - 100, REMEMBERED), REMEMBERED]
     verdicts, counters = judged(numbers)
     assert (counters.duplicates, counters.restarts, counters.gaps) == (100, 0, 0)
     assert verdicts[-1] == 0
 
 
-def test_a_cut_line_counts_one_gap() -> None:
+def test_a_cut_line_counts_one_gap():
     counters = LinkCounters()
     check = SequenceCheck(counters)
     check.admit(5, 5)
@@ -122,7 +122,7 @@ def test_a_cut_line_counts_one_gap() -> None:
     assert check.admit(4, 34) == 0
 
 
-def test_nothing_of_a_new_life_is_lost_although_its_first_packets_seem_late() -> None:
+def test_nothing_of_a_new_life_is_lost_although_its_first_packets_seem_late():
     """Faults of the start may come before the INFO that reports it, or that INFO be lost: they are
     all there in the end."""
     for said in (True, False):
@@ -146,7 +146,7 @@ def packet(number: int, *, restart: bool = False) -> bytes:
     return encode(PacketType.FAULT, number, number.to_bytes(8, "little") * 4)
 
 
-def test_whole_packets_shuffled_dropped_and_doubled() -> None:
+def test_whole_packets_shuffled_dropped_and_doubled():
     """Against a plain account of the same packets: in order, each once, and what is missing is what
     is not there."""
     for seed in range(60):

@@ -36,10 +36,10 @@ def wire() -> Iterator[Wire]:
 
 
 def quick(url: str, **more: object) -> Device:
-    return open_device(url, reconnect=SOON, **more)  # type: ignore[arg-type]
+    return open_device(url, reconnect=SOON, **more)
 
 
-def test_a_board_on_a_port(wire: Wire) -> None:
+def test_a_board_on_a_port(wire):
     with quick(f"serial:{wire.path}") as device:
         assert device.board.board == "simulated"
         device.tare(8)
@@ -54,7 +54,7 @@ def test_a_board_on_a_port(wire: Wire) -> None:
         assert not device.transport.synchronous
 
 
-def test_a_slow_reader_loses_the_oldest_whole_frames_and_knows_how_many(wire: Wire) -> None:
+def test_a_slow_reader_loses_the_oldest_whole_frames_and_knows_how_many(wire):
     with quick(f"serial:{wire.path}", room=16) as device:
         stream = device.stream(Stream.RAW)
         items = [next(stream)]
@@ -79,7 +79,7 @@ def test_a_slow_reader_loses_the_oldest_whole_frames_and_knows_how_many(wire: Wi
         )  # the port itself never waited
 
 
-def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch):
     board = sim_board()
     first, there = Wire(board, frame_s=0.005), []
 
@@ -102,7 +102,7 @@ def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch: pytest.MonkeyPatc
                     first.unplug()
                     second = Wire(board, frame_s=0.005)
                     there.append(second.path)
-            assert device.transport.name == second.path  # type: ignore[union-attr]
+            assert device.transport.name == second.path
             assert events[:2] == ["unplugged", "reconnected"]
             assert device.counters.reconnects == 1
             assert frames == sorted(set(frames))
@@ -113,8 +113,8 @@ def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_command_waits_for_a_board_that_is_away_longer_than_an_answer_may_take(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     """Answers may take 3 x 0.05 s here; the board is away for 25 looks, 0.02 s apart."""
     board, there, looks = sim_board(), [], [0]
     first = Wire(board)
@@ -146,8 +146,8 @@ def test_a_command_waits_for_a_board_that_is_away_longer_than_an_answer_may_take
 
 
 def test_a_port_that_comes_back_before_it_may_be_opened_is_tried_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     board, tries = sim_board(), [0]
     wire = Wire(board)
     opened = ports_module.open_port
@@ -169,7 +169,7 @@ def test_a_port_that_comes_back_before_it_may_be_opened_is_tried_again(
         wire.unplug()
 
 
-def test_another_board_in_its_place_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_board_in_its_place_is_refused(monkeypatch):
     first, there = Wire(sim_board(), frame_s=0.005), []
     monkeypatch.setattr(
         ports_module, "ports", lambda: [Port(path, "", 0x0483, 0x374B, "SERIAL1") for path in there]
@@ -191,7 +191,7 @@ def test_another_board_in_its_place_is_refused(monkeypatch: pytest.MonkeyPatch) 
         second.unplug()
 
 
-def test_unplugged_for_good_is_an_error_and_no_hang() -> None:
+def test_unplugged_for_good_is_an_error_and_no_hang():
     wire = Wire(sim_board())
     with open_device(f"serial:{wire.path}", reconnect=Reconnect(tries=3, every_s=0.02)) as device:
         began = time.monotonic()
@@ -207,7 +207,7 @@ def test_unplugged_for_good_is_an_error_and_no_hang() -> None:
             device.info()
 
 
-def test_a_board_that_dies_on_a_port_that_stays() -> None:
+def test_a_board_that_dies_on_a_port_that_stays():
     wire = Wire(sim_board())
     try:
         with open_device(f"serial:{wire.path}") as device:
@@ -219,7 +219,7 @@ def test_a_board_that_dies_on_a_port_that_stays() -> None:
         wire.unplug()
 
 
-def test_a_wrong_baud_rate_is_recognised() -> None:
+def test_a_wrong_baud_rate_is_recognised():
     wire = Wire(None)
     over = threading.Event()
 
@@ -241,7 +241,7 @@ def test_a_wrong_baud_rate_is_recognised() -> None:
         wire.unplug()
 
 
-def test_a_port_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_is_not_there(monkeypatch):
     monkeypatch.setattr(ports_module, "ports", lambda: [Port("/dev/ttyS9", "old thing")])
     with pytest.raises(
         DeviceError, match=r"/dev/ttyNONE: no such port; there are: /dev/ttyS9 \(old thing\)"
@@ -249,7 +249,7 @@ def test_a_port_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
         open_device("serial:/dev/ttyNONE")
 
 
-def test_a_busy_port(wire: Wire) -> None:
+def test_a_busy_port(wire):
     first = SerialTransport(wire.path)
     try:
         with pytest.raises(DeviceError, match=f"{wire.path}: another program uses it; close that"):
@@ -259,7 +259,7 @@ def test_a_busy_port(wire: Wire) -> None:
     SerialTransport(wire.path).close()  # and free again
 
 
-def test_a_port_without_permission(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_without_permission(wire, monkeypatch):
     """Superusers may open anything, so the refusal itself is put in by hand."""
     import errno
 
@@ -279,7 +279,7 @@ def test_a_port_without_permission(wire: Wire, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("kind", ["file", "folder", "null"])
-def test_what_is_no_serial_port(kind: str, tmp_path: Path) -> None:
+def test_what_is_no_serial_port(kind, tmp_path):
     (tmp_path / "file").write_bytes(b"x")
     path = {"file": tmp_path / "file", "folder": tmp_path, "null": Path("/dev/null")}[kind]
     with pytest.raises(DeviceError) as caught:
@@ -303,15 +303,13 @@ OTHER = Port("/dev/ttyUSB0", "adapter", 0x0403, 0x6001, "B")
         ),
     ],
 )
-def test_auto_needs_exactly_one_board(
-    found: list[Port], message: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_auto_needs_exactly_one_board(found, message, monkeypatch):
     monkeypatch.setattr(ports_module, "ports", lambda: found)
     with pytest.raises(DeviceError, match=message):
         open_device("auto")
 
 
-def test_auto_takes_the_one_board(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_auto_takes_the_one_board(wire, monkeypatch):
     monkeypatch.setattr(
         ports_module, "ports", lambda: [OTHER, Port(wire.path, "STLink", 0x0483, 0x374B, "A")]
     )
@@ -319,7 +317,7 @@ def test_auto_takes_the_one_board(wire: Wire, monkeypatch: pytest.MonkeyPatch) -
         assert device.transport.name == wire.path
 
 
-def test_devices_are_listed_boards_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_devices_are_listed_boards_first(monkeypatch):
     monkeypatch.setattr("eitskin.device.open.ports", lambda: [Port("/dev/ttyACM9"), BOARD, OTHER])
     found = [port.path for port in list_devices()]
     assert found == ["/dev/ttyACM0", "/dev/ttyACM9", "/dev/ttyUSB0"]
@@ -343,7 +341,7 @@ def test_devices_are_listed_boards_first(monkeypatch: pytest.MonkeyPatch) -> Non
         ("serial:?baud=9600", "baud=N"),
     ],
 )
-def test_urls_that_cannot_be_read(url: str, message: str) -> None:
+def test_urls_that_cannot_be_read(url, message):
     with pytest.raises(UsageError) as caught:
         open_transport(url)
     assert message in str(caught.value)

@@ -28,7 +28,7 @@ def by_kind(items: list[object], kind: type) -> list[object]:
     return [item for item in items if isinstance(item, kind)]
 
 
-def test_frames_and_results_are_those_of_the_host_core_bit_for_bit() -> None:
+def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
     model, blob = prebuilt()
     with sim_device() as device:
         device.send_command(cmd.StreamCommand(Stream.RAW), 1.0)
@@ -54,7 +54,7 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit() -> None:
     assert np.hypot(touches[-1].touches[0].x_mm + 40, touches[-1].touches[0].y_mm - 10) < 3
 
 
-def test_frames_are_the_scenes_but_for_a_converter_of_16_bits() -> None:
+def test_frames_are_the_scenes_but_for_a_converter_of_16_bits():
     with sim_device() as device:
         device.tare(QUIET)
         device.start_scene()
@@ -70,7 +70,7 @@ def test_frames_are_the_scenes_but_for_a_converter_of_16_bits() -> None:
     assert np.sqrt(np.mean(error**2)) < 0.2 * step_v < 2e-5 * np.sqrt(np.mean(true**2))
 
 
-def test_two_runs_are_the_same_bytes() -> None:
+def test_two_runs_are_the_same_bytes():
     def run() -> bytes:
         board = sim_board()
         transport, seen = SimTransport("test", board), bytearray()
@@ -86,7 +86,7 @@ def test_two_runs_are_the_same_bytes() -> None:
     assert run() == run()
 
 
-def test_boards_in_one_process_do_not_meet() -> None:
+def test_boards_in_one_process_do_not_meet():
     """Two runs in turns give what each gives alone."""
 
     def run(board: SimBoard, frames: int) -> Iterator[bytes]:
@@ -107,7 +107,7 @@ def test_boards_in_one_process_do_not_meet() -> None:
     assert together == alone
 
 
-def test_the_skin_is_untouched_until_the_scene_begins() -> None:
+def test_the_skin_is_untouched_until_the_scene_begins():
     with sim_device() as device:
         quiet = [
             item
@@ -126,7 +126,7 @@ def test_the_skin_is_untouched_until_the_scene_begins() -> None:
     assert change.max() > 0.02 * rms > np.abs(quiet[1].voltage_v - quiet[0].voltage_v).max()
 
 
-def test_board_time_is_the_scenes_and_the_scene_ends() -> None:
+def test_board_time_is_the_scenes_and_the_scene_ends():
     with sim_device() as device:
         assert device.board.frame_period_us == 50_000
         device.start_scene()
@@ -138,7 +138,7 @@ def test_board_time_is_the_scenes_and_the_scene_ends() -> None:
         assert device.stats().frames_scanned == FRAMES  # commands are still answered
 
 
-def test_a_faster_scan_sees_scene_frames_more_than_once() -> None:
+def test_a_faster_scan_sees_scene_frames_more_than_once():
     with sim_device() as device:
         device.scan(frame_period_us=0)
         assert device.board.frame_us == 20_800
@@ -152,7 +152,7 @@ def test_a_faster_scan_sees_scene_frames_more_than_once() -> None:
     assert raws[0].scan_us == 207 * 100 + 80
 
 
-def test_every_nth_frame_and_so_many() -> None:
+def test_every_nth_frame_and_so_many():
     with sim_device() as device:
         device.start_scene()
         raws = by_kind(list(device.stream(Stream.RAW, every=3, frames=2)), RawFrame)
@@ -160,7 +160,7 @@ def test_every_nth_frame_and_so_many() -> None:
         assert device.info().streaming == 0
 
 
-def test_reciprocal_scans_copy_what_they_do_not_measure() -> None:
+def test_reciprocal_scans_copy_what_they_do_not_measure():
     model = prebuilt()[0]
     with sim_device() as device:
         device.scan(check_every=3)
@@ -177,7 +177,7 @@ def test_reciprocal_scans_copy_what_they_do_not_measure() -> None:
         assert set(raw.quality[model.fold.first]) == {0}
 
 
-def test_masked_rows_are_left_out() -> None:
+def test_masked_rows_are_left_out():
     with sim_device() as device:
         device.mask_row(5)
         device.tare(QUIET)
@@ -194,7 +194,7 @@ def test_masked_rows_are_left_out() -> None:
         assert by_kind(list(device.stream(ALL, frames=1)), SolvedImage)[0].solved.masked == 0
 
 
-def test_quiet_frames_are_streamed_and_marked_where_raw_is() -> None:
+def test_quiet_frames_are_streamed_and_marked_where_raw_is():
     with sim_device() as device:
         device.send_command(cmd.StreamCommand(Stream.RAW, 1000), 1.0)
         device.tare(QUIET)
@@ -205,7 +205,7 @@ def test_quiet_frames_are_streamed_and_marked_where_raw_is() -> None:
         assert len(kept) == QUIET
 
 
-def test_a_board_without_a_model() -> None:
+def test_a_board_without_a_model():
     with sim_device(sim_board(no_model=True)) as device:
         assert not device.board.has_model
         assert device.board.fault_codes == (FaultCode.NO_MODEL,)
@@ -225,7 +225,7 @@ def test_a_board_without_a_model() -> None:
                 act()
 
 
-def test_the_newest_valid_bank_is_taken_up() -> None:
+def test_the_newest_valid_bank_is_taken_up():
     blob, tiny = prebuilt()[1], tiny_blob()
     for banks, crc in [
         ([bank_bytes(blob, 1), bank_bytes(tiny, 2)], zlib.crc32(tiny)),
@@ -236,7 +236,7 @@ def test_the_newest_valid_bank_is_taken_up() -> None:
             assert device.board.model_crc == crc
 
 
-def test_the_scan_of_another_models_protocol() -> None:
+def test_the_scan_of_another_models_protocol():
     with sim_device(SimBoard(frames(), [bank_bytes(tiny_blob(), 1), empty_bank()])) as device:
         assert device.board.n_rows == 40
         device.tare(4)
@@ -255,9 +255,7 @@ def test_the_scan_of_another_models_protocol() -> None:
         (cmd.ModelBegin(524257, 0), ReplyStatus.MODEL_SIZE, (524256, 0)),
     ],
 )
-def test_commands_out_of_range_are_refused_and_change_nothing(
-    command: cmd.Command, status: ReplyStatus, detail: tuple[int, int]
-) -> None:
+def test_commands_out_of_range_are_refused_and_change_nothing(command, status, detail):
     """One of each kind: all limits are the firmware's, of tests/firmware/test_commands.c."""
     with sim_device() as device:
         before = replace(device.info(), request=0)
@@ -266,7 +264,7 @@ def test_commands_out_of_range_are_refused_and_change_nothing(
         assert replace(device.info(), request=0) == before
 
 
-def test_a_reset_begins_anew() -> None:
+def test_a_reset_begins_anew():
     with sim_device() as device:
         device.tare(QUIET)
         assert device.info().tared == 1
@@ -277,7 +275,7 @@ def test_a_reset_begins_anew() -> None:
         device.tare(1)
 
 
-def test_options_of_the_solver_are_taken() -> None:
+def test_options_of_the_solver_are_taken():
     options = default_options(prebuilt()[0])
     with sim_device() as device:
         device.tare(QUIET)
@@ -293,7 +291,7 @@ def test_options_of_the_solver_are_taken() -> None:
             device.solver(replace(options, iterations=2000))
 
 
-def test_a_scan_forgets_the_reference() -> None:
+def test_a_scan_forgets_the_reference():
     with sim_device() as device:
         device.tare(QUIET)
         assert device.scan(samples=100).tared == 0
@@ -304,7 +302,7 @@ def test_a_scan_forgets_the_reference() -> None:
             next(device.stream(Stream.TOUCHES))
 
 
-def test_bad_numbers_are_refused_before_they_are_sent() -> None:
+def test_bad_numbers_are_refused_before_they_are_sent():
     with sim_device() as device:
         for act in (
             lambda: device.tare(2),
@@ -321,7 +319,7 @@ def test_bad_numbers_are_refused_before_they_are_sent() -> None:
         assert device.info().tared == 0
 
 
-def test_the_self_test_runs_the_golden_frame() -> None:
+def test_the_self_test_runs_the_golden_frame():
     with sim_device() as device:
         device.tare(QUIET)
         device.self_test()

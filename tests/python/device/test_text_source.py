@@ -59,7 +59,7 @@ def lines(values: np.ndarray | None = None) -> list[str]:
 
 
 @pytest.fixture
-def layout(tmp_path: Path) -> Path:
+def layout(tmp_path) -> Path:
     path = tmp_path / "layout.toml"
     path.write_text(LAYOUT)
     return path
@@ -78,7 +78,7 @@ def streamed(url: str, what: Stream = Stream.RAW, *, tare: int = 8, count: int =
         return [*items, device.counters]
 
 
-def test_a_file_of_lines_is_streamed_as_a_board_is(tmp_path: Path, layout: Path) -> None:
+def test_a_file_of_lines_is_streamed_as_a_board_is(tmp_path, layout):
     path = written(tmp_path, "\r\n".join(lines()))
     url = f"text:{path}?layout={layout}"
     with open_device(url) as device:
@@ -96,7 +96,7 @@ def test_a_file_of_lines_is_streamed_as_a_board_is(tmp_path: Path, layout: Path)
     assert np.hypot(touches[0].x_mm + 40, touches[0].y_mm - 10) < 3
 
 
-def test_a_voltage_reaches_the_core_as_it_was_written(tmp_path: Path) -> None:
+def test_a_voltage_reaches_the_core_as_it_was_written(tmp_path):
     """No converter stands between: float32 of the line's number, whatever its size."""
     given = volts() * 1e-6
     given[:, 7] = 1.234567e-9
@@ -108,9 +108,7 @@ def test_a_voltage_reaches_the_core_as_it_was_written(tmp_path: Path) -> None:
     assert np.array_equal(np.abs(got), np.abs(given[8:].astype(np.float32)))
 
 
-def test_lines_that_are_no_frames_are_counted_told_once_and_skipped(
-    tmp_path: Path, layout: Path
-) -> None:
+def test_lines_that_are_no_frames_are_counted_told_once_and_skipped(tmp_path, layout):
     good = lines()
     short = [line.rpartition(",")[0] for line in good]
     holes = good[12].split(",")
@@ -131,7 +129,7 @@ def test_lines_that_are_no_frames_are_counted_told_once_and_skipped(
     assert unusable[:3] == [[], [], []] and len(unusable[3]) == 4 and unusable[4:] == [[]] * 5
 
 
-def test_a_tare_of_too_few_lines_is_refused_and_does_not_hang(tmp_path: Path, layout: Path) -> None:
+def test_a_tare_of_too_few_lines_is_refused_and_does_not_hang(tmp_path, layout):
     path = written(tmp_path, "\n".join(lines()[:5]))
     with pytest.raises(DeviceError, match="too few frames"):
         streamed(f"text:{path}?layout={layout}", tare=16)
@@ -173,7 +171,7 @@ def boards() -> Iterator[Callable[..., Board]]:
     made: list[Board] = []
 
     def make(*words: object, **more: object) -> Board:
-        made.append(Board(*words, **more))  # type: ignore[arg-type]
+        made.append(Board(*words, **more))
         return made[-1]
 
     yield make
@@ -182,9 +180,7 @@ def boards() -> Iterator[Callable[..., Board]]:
             board.unplug()
 
 
-def test_a_board_on_a_port_that_goes_away_and_comes_back(
-    tmp_path: Path, layout: Path, boards: Callable[..., Board]
-) -> None:
+def test_a_board_on_a_port_that_goes_away_and_comes_back(tmp_path, layout, boards):
     port, text = tmp_path / "port", lines()
     first = boards(port, text, garbage=b"\x00\xff half a line,1,2\n")
     url, soon = f"text:{port}?layout={layout}&baud=115200", Reconnect(tries=100, every_s=0.05)
@@ -203,9 +199,7 @@ def test_a_board_on_a_port_that_goes_away_and_comes_back(
         assert kinds == ["unplugged", "reconnected"] and count == 40
 
 
-def test_a_silent_board_is_a_fault_and_no_hang(
-    tmp_path: Path, layout: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_silent_board_is_a_fault_and_no_hang(tmp_path, layout, monkeypatch):
     from eitskin.device import source
 
     monkeypatch.setattr(source, "SILENT_S", 0.02)
@@ -240,7 +234,7 @@ def test_a_silent_board_is_a_fault_and_no_hang(
     ],
     ids=("garbage", "words", "nothing"),
 )
-def test_nothing_of_use_comes(tmp_path: Path, layout: Path, sent: bytes, said: str) -> None:
+def test_nothing_of_use_comes(tmp_path, layout, sent, said):
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo)
     threading.Thread(target=fifo.write_bytes, args=(sent,), daemon=True).start()
@@ -249,7 +243,7 @@ def test_nothing_of_use_comes(tmp_path: Path, layout: Path, sent: bytes, said: s
     assert "\n" not in str(caught.value)
 
 
-def test_bytes_without_a_line_name_the_baud_rate(tmp_path: Path, layout: Path) -> None:
+def test_bytes_without_a_line_name_the_baud_rate(tmp_path, layout):
     class Noise(FileLines):
         ended = False
 
@@ -264,7 +258,7 @@ def test_bytes_without_a_line_name_the_baud_rate(tmp_path: Path, layout: Path) -
         source.await_frames(1, 0.01)
 
 
-def test_a_connection_and_a_fifo(tmp_path: Path, layout: Path) -> None:
+def test_a_connection_and_a_fifo(tmp_path, layout):
     data = "\n".join([*lines(), ""]).encode()
     server = socket.create_server(("127.0.0.1", 0))
 
@@ -299,9 +293,7 @@ def test_a_connection_and_a_fifo(tmp_path: Path, layout: Path) -> None:
         ("board_of_ten_lines", "adjacent", lambda v: "frame 3: " + ",".join(map(repr, v.tolist()))),
     ],
 )
-def test_boards_of_others_as_their_sources_print(
-    tmp_path: Path, name: str, kind: str, line: Callable[[np.ndarray], str]
-) -> None:
+def test_boards_of_others_as_their_sources_print(tmp_path, name, kind, line):
     """A banner, then frames; magnitudes get the model's signs."""
     model = small_model(kind=kind)
     count = model.protocol.n_rows
@@ -317,7 +309,7 @@ def test_boards_of_others_as_their_sources_print(
         assert np.array_equal(np.sign(got[0]), np.where(model_v(model) < 0, -1, 1))
 
 
-def model_v(model) -> np.ndarray:  # type: ignore[no-untyped-def]
+def model_v(model) -> np.ndarray:
     expected = np.zeros(model.protocol.n_rows)
     expected[model.fold.first] = model.v_ref_v
     second = model.fold.second >= 0
@@ -325,7 +317,7 @@ def model_v(model) -> np.ndarray:  # type: ignore[no-untyped-def]
     return expected
 
 
-def test_the_example_of_a_source_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_example_of_a_source_is_one(monkeypatch):
     from eitskin.device import source
 
     monkeypatch.syspath_prepend(EXAMPLES)
@@ -379,7 +371,7 @@ def test_the_example_of_a_source_is_one(monkeypatch: pytest.MonkeyPatch) -> None
         ("lines = 3\n", r"lines must be a table, \[lines\]"),
     ],
 )
-def test_a_layout_that_does_not_fit_is_one_line(tmp_path: Path, content: str, said: str) -> None:
+def test_a_layout_that_does_not_fit_is_one_line(tmp_path, content, said):
     path = tmp_path / "l.toml"
     path.write_text(content)
     source = written(tmp_path, "\n".join(line.partition(",")[2] for line in lines()[:3]))
@@ -399,13 +391,13 @@ def test_a_layout_that_does_not_fit_is_one_line(tmp_path: Path, content: str, sa
         ("text:socket://nowhere?layout={layout}", "write  socket://HOST:PORT"),
     ],
 )
-def test_a_url_that_cannot_be_is_one_line(layout: Path, url: str, said: str) -> None:
+def test_a_url_that_cannot_be_is_one_line(layout, url, said):
     with pytest.raises(EitskinError, match=said) as caught:
         open_device(url.format(layout=layout))
     assert "\n" not in str(caught.value)
 
 
-def test_a_layout_comes_back_as_it_was_saved(tmp_path: Path, layout: Path) -> None:
+def test_a_layout_comes_back_as_it_was_saved(tmp_path, layout):
     given = load_layout(layout)
     save_layout(tmp_path / "again.toml", given)
     assert load_layout(tmp_path / "again.toml") == given
@@ -417,7 +409,7 @@ def test_a_layout_comes_back_as_it_was_saved(tmp_path: Path, layout: Path) -> No
     assert load_layout(tmp_path / "empty.toml") == Layout()
 
 
-def test_magnitudes_and_phases_are_turned_as_a_board_turns_them(tmp_path: Path) -> None:
+def test_magnitudes_and_phases_are_turned_as_a_board_turns_them(tmp_path):
     """Pairs with a common phase of 40 degrees: the application finds it at the tare."""
     z = volts() * np.exp(1j * np.deg2rad(40.0))
     pairs = np.stack([np.abs(z), np.rad2deg(np.angle(z))], axis=2).reshape(len(z), -1)

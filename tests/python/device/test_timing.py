@@ -29,7 +29,7 @@ class CountedClock:
         self.on_wait()
 
 
-def test_what_follows_the_question_mark() -> None:
+def test_what_follows_the_question_mark():
     assert split_timing("sim:swipe") == ("sim:swipe", Timing())
     assert split_timing("emu:a.toml?speed=0.5") == ("emu:a.toml", Timing(0.5))
     assert split_timing("file:a.eits?loop=1&speed=max") == ("file:a.eits", Timing(0.0, True))
@@ -37,12 +37,12 @@ def test_what_follows_the_question_mark() -> None:
 
 
 @pytest.mark.parametrize("query", ["speed=fast", "speed=-1", "speed=nan", "loop=2", "pace=1", ""])
-def test_what_cannot_follow(query: str) -> None:
+def test_what_cannot_follow(query):
     with pytest.raises(UsageError, match=r"device 'sim:swipe\?"):
         split_timing(f"sim:swipe?{query}")
 
 
-def test_frames_are_held_until_they_are_due() -> None:
+def test_frames_are_held_until_they_are_due():
     clock = CountedClock()
     pacer = Pacer(2.0, clock)
     due = []
@@ -60,7 +60,7 @@ def test_frames_are_held_until_they_are_due() -> None:
     assert clock.waits == waits
 
 
-def test_pause_step_and_play() -> None:
+def test_pause_step_and_play():
     clock = CountedClock()
     pacer = Pacer(1.0, clock)
     pacer.pause()
@@ -76,7 +76,7 @@ def test_pause_step_and_play() -> None:
     assert pacer.paused
 
 
-def test_slowness_is_said_once() -> None:
+def test_slowness_is_said_once():
     clock, said = CountedClock(), []
     slow = Slowness(clock)
     for frame in range(40):
@@ -86,7 +86,7 @@ def test_slowness_is_said_once() -> None:
 
 
 @pytest.fixture(scope="module")
-def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene_file(tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("timing") / "two.toml"
     path.write_text(
         "[scene]\nframes = 6\nquiet_frames = 8\nelements = 1500\nrate_hz = 20.0\n"
@@ -98,11 +98,11 @@ def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def frames_of(url: str, count: int, **more: object) -> list[Frame]:
     settings = SessionSettings(Stream.TOUCHES, frames=count)
-    with Session(url, settings, **more) as session:  # type: ignore[arg-type]
+    with Session(url, settings, **more) as session:
         return [item for item in session.frames() if isinstance(item, Frame)]
 
 
-def test_a_looped_scene_begins_again_and_the_truth_with_it(scene_file: Path) -> None:
+def test_a_looped_scene_begins_again_and_the_truth_with_it(scene_file):
     frames = frames_of(f"sim:{scene_file}?loop=1", 20)
     assert [f.live.time_us for f in frames] == [50_000 * k for k in range(20)]
     first, second, third = frames[0:6], frames[6:12], frames[12:18]
@@ -110,7 +110,7 @@ def test_a_looped_scene_begins_again_and_the_truth_with_it(scene_file: Path) -> 
     assert len({f.true for f in first}) == 6
 
 
-def test_a_looped_recording_goes_on_in_time(scene_file: Path, tmp_path: Path) -> None:
+def test_a_looped_recording_goes_on_in_time(scene_file, tmp_path):
     settings = SessionSettings(Stream.TOUCHES, record=tmp_path / "run.eits")
     with Session(f"sim:{scene_file}", settings) as session:
         recorded = [item for item in session.frames() if isinstance(item, Frame)]
@@ -121,7 +121,7 @@ def test_a_looped_recording_goes_on_in_time(scene_file: Path, tmp_path: Path) ->
     assert [f.touches for f in frames[6:12]] == [f.touches for f in recorded]
 
 
-def test_pacing_changes_nothing_but_when(scene_file: Path) -> None:
+def test_pacing_changes_nothing_but_when(scene_file):
     clock = CountedClock()
     fast = frames_of(f"sim:{scene_file}", 6)
     paced = frames_of(f"sim:{scene_file}?speed=0.5", 6, clock=clock)

@@ -103,15 +103,13 @@ def plugged() -> Iterator[tuple[Device, Port]]:
         assert isinstance(device.link, ThreadedLink)
         device.link._stopping = Clock(port)
         next_item = device.next_item
-        device.next_item = (  # type: ignore[method-assign]
-            lambda timeout_s: next_item(min(timeout_s, 0.001))
-        )
+        device.next_item = lambda timeout_s: next_item(min(timeout_s, 0.001))
         device.tare(QUIET)
         yield device, port
 
 
 @pytest.mark.parametrize("away_s", [2, 8, 60, 119])
-def test_it_is_waited_for_and_goes_on(away_s: float) -> None:
+def test_it_is_waited_for_and_goes_on(away_s):
     with plugged() as (device, port):
         port.pull_out(10, away_s)
         said, frames, touches = [], [], []
@@ -133,7 +131,7 @@ def test_it_is_waited_for_and_goes_on(away_s: float) -> None:
 
 
 @pytest.mark.parametrize("what", [Stream.RAW, Stream.TOUCHES])
-def test_one_that_lost_its_power_meanwhile_has_no_reference(what: Stream) -> None:
+def test_one_that_lost_its_power_meanwhile_has_no_reference(what):
     with plugged() as (device, port):
         port.pull_out(5, 8, restarts=True)
         kinds = []
@@ -146,7 +144,7 @@ def test_one_that_lost_its_power_meanwhile_has_no_reference(what: Stream) -> Non
             assert what == Stream.RAW and kinds.count(RawFrame) >= 18
 
 
-def test_after_two_minutes_it_is_given_up() -> None:
+def test_after_two_minutes_it_is_given_up():
     waited_s = Reconnect().tries * Reconnect().every_s
     with plugged() as (device, port):
         port.pull_out(5, waited_s + 1)

@@ -3,7 +3,6 @@ the new one is proven."""
 
 import random
 import zlib
-from pathlib import Path
 
 import pytest
 from device_helpers import (
@@ -43,7 +42,7 @@ def works(board: SimBoard, crc: int) -> bool:
         return device.board.model_crc == crc and len(raws) == 1
 
 
-def test_a_model_is_taken_up() -> None:
+def test_a_model_is_taken_up():
     tiny = new_blob()
     seen: list[tuple[int, int]] = []
     board = sim_board()
@@ -61,14 +60,14 @@ def test_a_model_is_taken_up() -> None:
     assert works(board, OLD)
 
 
-def test_into_a_board_without_a_model() -> None:
+def test_into_a_board_without_a_model():
     with sim_device(sim_board(no_model=True)) as device:
         info = device.upload_model(tiny_blob())
         assert (info.model_crc, info.bank, info.fault_codes) == (zlib.crc32(tiny_blob()), 0, ())
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed: int) -> None:
+def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed):
     generator, tiny = random.Random(seed), new_blob()
     board, whole = sim_board(), len(tiny) + 2000
     left = generator.randrange(1, whole)
@@ -79,7 +78,7 @@ def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed: i
         return passed
 
     with Device(Damaging(SimTransport("cut", board), same, same)) as device:
-        device.transport._there = there  # type: ignore[attr-defined]
+        device.transport._there = there
         try:
             device.upload_model(tiny)
             cut = False
@@ -101,7 +100,7 @@ def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed: i
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_over_a_lossy_line(seed: int) -> None:
+def test_over_a_lossy_line(seed):
     generator, tiny = random.Random(100 + seed), new_blob()
     board = sim_board()
     with Device(Damaging(SimTransport("lossy", board), same, same)) as device:
@@ -119,7 +118,7 @@ def test_over_a_lossy_line(seed: int) -> None:
     assert bank[: len(tiny)] == tiny
 
 
-def test_an_upload_goes_on_where_it_was_cut() -> None:
+def test_an_upload_goes_on_where_it_was_cut():
     tiny, board = new_blob(), sim_board()
     with sim_device(board) as device:
         assert device.send_command(cmd.ModelBegin(len(tiny), zlib.crc32(tiny)), 1.0).ok
@@ -131,7 +130,7 @@ def test_an_upload_goes_on_where_it_was_cut() -> None:
         assert device.board.model_crc == zlib.crc32(tiny)
 
 
-def test_the_scan_waits_while_a_model_comes() -> None:
+def test_the_scan_waits_while_a_model_comes():
     tiny = tiny_blob()
     with sim_device() as device:
         device.send_command(cmd.ModelBegin(len(tiny), zlib.crc32(tiny)), 1.0)
@@ -151,7 +150,7 @@ def status(device: Device, command: cmd.Command) -> tuple[ReplyStatus, int]:
     return ReplyStatus(reply.status), reply.detail[0]
 
 
-def test_data_out_of_order_or_too_long_are_refused() -> None:
+def test_data_out_of_order_or_too_long_are_refused():
     tiny = tiny_blob()[:100]
     with sim_device() as device:
         assert status(device, cmd.ModelBegin(len(tiny), zlib.crc32(tiny))) == (ReplyStatus.OK, 0)
@@ -180,12 +179,7 @@ def sent(device: Device, blob: bytes, crc: int | None = None) -> tuple[ReplyStat
     )
 
 
-def reseal(blob: bytearray) -> bytes:
-    blob[12:16] = zlib.crc32(bytes(blob[16:])).to_bytes(4, "little")
-    return bytes(blob)
-
-
-def test_the_board_itself_refuses_what_is_no_model() -> None:
+def test_the_board_itself_refuses_what_is_no_model():
     tiny = tiny_blob()
     wrong_bit = bytearray(tiny)
     wrong_bit[len(tiny) // 2] ^= 1
@@ -198,7 +192,7 @@ def test_the_board_itself_refuses_what_is_no_model() -> None:
         assert sent(device, tiny) == (ReplyStatus.OK, 0)
 
 
-def test_a_model_whose_golden_frame_gives_other_bits_is_refused() -> None:
+def test_a_model_whose_golden_frame_gives_other_bits_is_refused():
     from eitskin.model.eitm import decode_model, encode_model
 
     model = decode_model(tiny_blob(), "tiny")
@@ -219,7 +213,7 @@ def test_a_model_whose_golden_frame_gives_other_bits_is_refused() -> None:
             )
 
 
-def test_the_host_refuses_what_cannot_go_before_it_is_sent(tmp_path: Path) -> None:
+def test_the_host_refuses_what_cannot_go_before_it_is_sent(tmp_path):
     board = sim_board()
     with sim_device(board) as device:
         before = stats_of(board).packets_sent
@@ -235,7 +229,7 @@ def test_the_host_refuses_what_cannot_go_before_it_is_sent(tmp_path: Path) -> No
         assert stats_of(board).packets_sent == before + 1  # but for the first of these two
 
 
-def test_a_model_too_large_for_the_bank_is_refused_by_the_host_and_by_the_board() -> None:
+def test_a_model_too_large_for_the_bank_is_refused_by_the_host_and_by_the_board():
     room = len(tiny_blob()) + 32 - 16
     board = SimBoard(frames(), [bytes([0xFF]) * room, bytes([0xFF]) * room])
     with sim_device(board) as device:
@@ -246,14 +240,14 @@ def test_a_model_too_large_for_the_bank_is_refused_by_the_host_and_by_the_board(
         assert status(device, cmd.ModelBegin(room - 31, 0)) == (ReplyStatus.MODEL_SIZE, room - 32)
 
 
-def test_the_scan_of_more_electrodes_than_the_board_has_is_refused_by_the_board() -> None:
+def test_the_scan_of_more_electrodes_than_the_board_has_is_refused_by_the_board():
     with sim_device() as device:
         reply = sent(device, small_blob(electrodes=32))
         assert reply == (ReplyStatus.MODEL_SCAN, 32)
         assert device.info().model_crc == OLD
 
 
-def test_generations_wrap() -> None:
+def test_generations_wrap():
     banks = [bank_bytes(prebuilt()[1], 2**32 - 1), empty_bank()]
     board = SimBoard(frames(), banks)
     with sim_device(board) as device:

@@ -38,7 +38,7 @@ def blocks(page: str) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_blocks_run(page: str, tmp_path: Path) -> None:
+def test_blocks_run(page, tmp_path):
     ran = 0
     environment = {
         **os.environ,
@@ -68,7 +68,7 @@ def test_blocks_run(page: str, tmp_path: Path) -> None:
     assert ran >= 1
 
 
-def test_pages_link_to_files_that_exist() -> None:
+def test_pages_link_to_files_that_exist():
     for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]:
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
             if "://" not in target:
@@ -77,7 +77,7 @@ def test_pages_link_to_files_that_exist() -> None:
                 )
 
 
-def test_paths_that_pages_name_exist() -> None:
+def test_paths_that_pages_name_exist():
     """Files and folders of the tree, but for those with a placeholder in capitals."""
     named = re.compile(r"`((?:csrc|python|firmware|tests|scripts|examples|tables)/[\w./-]+)`")
     for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/**/*.md")]:

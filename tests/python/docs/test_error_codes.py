@@ -43,7 +43,7 @@ COMMANDS = {
 
 
 @pytest.fixture
-def taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+def taken(tmp_path, monkeypatch) -> Iterator[int]:
     """In a folder of files that have something wrong; a port that is taken."""
     monkeypatch.chdir(tmp_path)
     Path("unknown.toml").write_text("[skim]\n", encoding="utf-8")
@@ -64,9 +64,7 @@ def taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 
 @pytest.mark.parametrize("code", sorted(CODES))
-def test_a_code_is_provoked(
-    code: int, taken: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_code_is_provoked(code, taken, monkeypatch, capsys):
     raised: dict[int, type[BaseException]] = {1: errors.EitskinError, 130: KeyboardInterrupt}
     if code in raised:
         monkeypatch.setattr("eitskin.model.prebuilt.load_prebuilt", raiser(raised[code]))
@@ -81,7 +79,7 @@ def test_a_code_is_provoked(
     assert [line[:9] for line in lines] == (["eitskin: "] if code not in (0, 11) else [])
 
 
-def test_the_page_has_every_class_and_no_other() -> None:
+def test_the_page_has_every_class_and_no_other():
     kinds = [errors.EitskinError, *errors.EitskinError.__subclasses__()]
     listed = {name: code for code, name in CODES.items() if name}
     assert listed == {

@@ -75,13 +75,13 @@ def folder() -> Iterator[None]:
         yield
 
 
-def test_there_are_forty_of_many_commands() -> None:
+def test_there_are_forty_of_many_commands():
     commands = {command.split()[0] for command, _, _ in rows()}
     assert len(rows()) >= 40 and len(commands) >= 12
 
 
 @pytest.mark.parametrize(("command", "code", "answer"), rows())
-def test_a_mistake_gets_its_answer(folder: None, command: str, code: str, answer: str) -> None:
+def test_a_mistake_gets_its_answer(folder, command, code, answer):
     before = sorted(Path.cwd().iterdir())
     got, line = answered(command)
     assert (str(got), in_a_cell(line)) == (code, answer)

@@ -15,11 +15,11 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "board-cost.md
 
 
 @pytest.fixture(scope="module")
-def result(cortex_m7: Path) -> bench_board.BoardCost:
+def result(cortex_m7) -> bench_board.BoardCost:
     return bench_board.run(3, 1, frames=0, build=cortex_m7)
 
 
-def test_every_storage_by_plain_c_cold_and_warm(result: bench_board.BoardCost) -> None:
+def test_every_storage_by_plain_c_cold_and_warm(result):
     assert [(c.storage, c.kernels, c.warm) for c in result.costs] == [
         (storage, kernels, warm)
         for storage in ("f32", "f16", "i16", "i8")
@@ -37,14 +37,14 @@ def test_every_storage_by_plain_c_cold_and_warm(result: bench_board.BoardCost) -
     assert sizes == sorted(sizes)
 
 
-def test_images(result: bench_board.BoardCost) -> None:
+def test_images(result):
     nucleo, mps2 = result.images
     assert (nucleo.board, mps2.board) == ("nucleo_f767zi", "mps2_an500")
     assert 40_000 < nucleo.code_bytes < 256 * 1024 and nucleo.stack_bytes >= 8192
     assert nucleo.static_bytes < 128 * 1024
 
 
-def test_the_rate_of_the_emulated_board(cortex_m7: Path) -> None:
+def test_the_rate_of_the_emulated_board(cortex_m7):
     _, blob = bench_board.load_prebuilt()
     image = cortex_m7 / "firmware" / f"{bench_board.IMAGE}.bin"
     rate = bench_board.measure_rate(blob, "f32", image, 0, 3)
@@ -54,7 +54,7 @@ def test_the_rate_of_the_emulated_board(cortex_m7: Path) -> None:
     assert 1000 < rate.stack_used < 16384
 
 
-def test_the_page_and_json(result: bench_board.BoardCost, tmp_path: Path) -> None:
+def test_the_page_and_json(result, tmp_path):
     texts, tables = bench_board.for_page(result, "the command")
     assert "`the command`" in texts["board-run"] and set(tables) == {"cost", "images"}
     page = tmp_path / "page.md"
@@ -69,9 +69,7 @@ def test_the_page_and_json(result: bench_board.BoardCost, tmp_path: Path) -> Non
     assert facts["costs"][1]["mean"] == result.costs[1].mean and facts["scenes"] == 3
 
 
-def test_it_says_what_it_needs(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_it_says_what_it_needs(monkeypatch, tmp_path, capsys):
     assert main(["bench", "board", "--scenes", "0"]) == 2
     assert main(["bench", "board", "--frames", "1"]) == 2
     assert main(["bench", "board", "--page", str(tmp_path / "no" / "page.md")]) == 3

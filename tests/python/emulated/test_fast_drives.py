@@ -1,7 +1,5 @@
 """The fast path on the emulated Cortex-M7: the host's bits, and what a drive costs."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -59,9 +57,7 @@ def printed(touches: list[FastTouch]) -> str:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_drive_has_the_hosts_bits_and_a_bounded_cost(
-    cortex_m7: Path, tmp_path: Path, name: str
-) -> None:
+def test_a_drive_has_the_hosts_bits_and_a_bounded_cost(cortex_m7, tmp_path, name):
     model, blob = load_prebuilt()
     rng = np.random.default_rng(9)
     v0 = model.golden.reference_v.astype(np.float64)

@@ -39,7 +39,7 @@ def built(processor: str, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("processor", COMPILERS)
-def test_the_same_bits_as_the_host(processor: str, tmp_path: Path) -> None:
+def test_the_same_bits_as_the_host(processor, tmp_path):
     """Ten frames of up to three touches by three solvers, cold and warm, tracked, with an electrode
     lost and with no touch: solve, touches, their test and tracks."""
     model, blob = load_prebuilt()
@@ -69,7 +69,7 @@ def test_the_same_bits_as_the_host(processor: str, tmp_path: Path) -> None:
     assert sum(touches[0] != "0" for _, touches in expected) > len(expected) // 2
 
 
-def test_a_big_endian_processor_is_refused() -> None:
+def test_a_big_endian_processor_is_refused():
     command = ["cc", "-fsyntax-only", "-x", "c", "-", "-I", str(ROOT / "csrc" / "include")]
     command += ["-U__BYTE_ORDER__", "-D__BYTE_ORDER__=__ORDER_BIG_ENDIAN__"]
     source = "#include <eitskin/eitskin.h>\n"

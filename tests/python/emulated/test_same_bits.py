@@ -34,7 +34,7 @@ from small_models import small, small_blob, small_model
 
 
 @pytest.fixture(scope="session")
-def program(cortex_m7: Path) -> Path:
+def program(cortex_m7) -> Path:
     return cortex_m7 / PROGRAM
 
 
@@ -92,9 +92,7 @@ def session(
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("warm", [False, True])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_same_bits_as_the_host(
-    program: Path, tmp_path: Path, solver: str, storage: str, warm: bool
-) -> None:
+def test_the_same_bits_as_the_host(program, tmp_path, solver, storage, warm):
     """Warm ones after a noisy tare, which raises the regularisation."""
     model, _ = load_prebuilt()
     blob = in_storage(model, storage)
@@ -115,7 +113,7 @@ def test_the_same_bits_as_the_host(
     assert board[2].image_crc != board[1].image_crc
 
 
-def test_a_reference_that_follows_has_the_hosts_bits(program: Path, tmp_path: Path) -> None:
+def test_a_reference_that_follows_has_the_hosts_bits(program, tmp_path):
     """Between presses on a skin that drifts, and under one that stays while the sheet dries; of
     places the covariance too."""
     model = replace(teach(presses(20), SKIN).model, place_factor=4.0)
@@ -138,7 +136,7 @@ def test_a_reference_that_follows_has_the_hosts_bits(program: Path, tmp_path: Pa
     assert all(touch.x_variance_mm2 for expected, _ in both for touch in expected.touches)
 
 
-def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:
+def test_loads_have_the_hosts_bits(program, tmp_path):
     model, _ = load_prebuilt()
     table = np.linspace(0, 6, 9, dtype=np.float32)
     gain = np.array([1.0, 0.07, -0.11, 0.23, 0.05, 0.19, -0.3, 0.2, 0.11, 0.4], dtype=np.float32)
@@ -152,7 +150,7 @@ def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:
     assert sum(touch.force_n > 0 for one, _ in both for touch in one.touches) >= len(both)
 
 
-def test_instructions_are_counted_exactly(program: Path, tmp_path: Path) -> None:
+def test_instructions_are_counted_exactly(program, tmp_path):
     model, blob = load_prebuilt()
     quiet, frames = session(model, 6, 2)
     for solver in SOLVERS:
@@ -189,9 +187,7 @@ MAX_INSTRUCTIONS = {0: 2_500_000, ALL_TOUCH_FIT: 7_000_000}
 
 @pytest.mark.parametrize("warm", [False, True])
 @pytest.mark.parametrize("touch_fit", MAX_INSTRUCTIONS)
-def test_what_a_frame_costs_at_most(
-    program: Path, tmp_path: Path, warm: bool, touch_fit: int
-) -> None:
+def test_what_a_frame_costs_at_most(program, tmp_path, warm, touch_fit):
     """Solve and touches, with peaks alone and untested, and with the whole search; each frame, also
     the first and those where a touch comes: moving touches, and 20 random scenes that follow each
     other without any rest."""
@@ -218,7 +214,7 @@ def in_storage(model: Model, storage: str) -> bytes:
 MAX_TIMES_F32 = {"f32": 1.0, "f16": 1.2, "i16": 1.4, "i8": 1.45}
 
 
-def test_every_storage_costs_little_more_than_f32(program: Path, tmp_path: Path) -> None:
+def test_every_storage_costs_little_more_than_f32(program, tmp_path):
     """The mean over 20 random scenes, cold: columns in use are unpacked once, so that only the
     three looks at all of them a frame convert."""
     model, _ = load_prebuilt()
@@ -243,9 +239,7 @@ def test_every_storage_costs_little_more_than_f32(program: Path, tmp_path: Path)
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_plain_c_gives_the_same_for_more_instructions(
-    program: Path, tmp_path: Path, storage: str
-) -> None:
+def test_plain_c_gives_the_same_for_more_instructions(program, tmp_path, storage):
     model, _ = load_prebuilt()
     quiet, frames = session(model, 8, 1)
     blob, options = in_storage(model, storage), default_options(model)
@@ -260,7 +254,7 @@ def test_plain_c_gives_the_same_for_more_instructions(
 
 
 @pytest.mark.parametrize("sign", ["decrease", "both"])
-def test_the_other_signs_too(program: Path, tmp_path: Path, sign: str) -> None:
+def test_the_other_signs_too(program, tmp_path, sign):
     model, blob = load_prebuilt()
     quiet, frames = session(model, 7, 2)
     frames[0] = 2 * quiet.mean(axis=0) - frames[0]
@@ -271,9 +265,7 @@ def test_the_other_signs_too(program: Path, tmp_path: Path, sign: str) -> None:
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("rank", [5, 16, 37, 48])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_ranks_that_no_block_fits(
-    program: Path, tmp_path: Path, solver: str, rank: int, storage: str
-) -> None:
+def test_ranks_that_no_block_fits(program, tmp_path, solver, rank, storage):
     """Rows and columns that the blocks of the processor's own products leave over."""
     model, blob = small_model(storage, rank=rank), small_blob(storage, rank=rank)
     quiet, frames = small().quiet(31, 8), small().frames(30, 3)

@@ -3,7 +3,6 @@ core too."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from eitskin.skin.protocol import adjacent
@@ -19,7 +18,7 @@ def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
     return items
 
 
-def test_counts_are_exact_and_follow_every_setting(cortex_m7: Path) -> None:
+def test_counts_are_exact_and_follow_every_setting(cortex_m7):
     emulator = Emulator(cortex_m7 / "tests" / "emulated" / "frames_m7.elf")
     session = SceneFactory(paper_skin(), adjacent(16), 5, 1200).session("random", 6, plain)
     shop = ModelShop(paper_skin(), adjacent(16))

@@ -1,13 +1,11 @@
 """The firmware image, built once."""
 
-from pathlib import Path
-
 import pytest
 
 from emulated import image_of
 
 
 @pytest.fixture(scope="session")
-def image(cortex_m7: Path) -> bytes:
+def image(cortex_m7) -> bytes:
     """The image that the sources give now."""
     return image_of(cortex_m7)

@@ -65,7 +65,7 @@ def hang(board: EmulatedBoard, code: bytes) -> None:
 def board_of(device: Device) -> EmulatedBoard:
     """The emulated board behind ``device``."""
     transport: Any = device.transport
-    return transport.board  # type: ignore[no-any-return]
+    return transport.board
 
 
 def raw_frames(device: Device, count: int) -> list[RawFrame]:

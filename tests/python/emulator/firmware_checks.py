@@ -98,7 +98,7 @@ def run_session(image: bytes) -> Session:
         session.first_sample_at.append(int(times[0]))
         return sample(times, channel)
 
-    board.adc.sample = watched  # type: ignore[assignment]
+    board.adc.sample = watched
     session.link = PumpedLink(Impatient("mutant", board))
     try:
         board.run_until(

@@ -32,14 +32,14 @@ def starting(step: int, *, control: int = 0x2000, phase: int = 0) -> tuple[int, 
     return (0x2100, 0x4000 | step & 0x3FFF, 0x4000 | step >> 14, 0xC000 | phase, control)
 
 
-def test_the_data_sheet_s_words_make_400_hz() -> None:
+def test_the_data_sheet_s_words_make_400_hz():
     """AN-1070: 400 Hz at 25 MHz is 0x10C7."""
     generator = started(0x2100, 0x50C7, 0x4000, 0xC000, 0x2000)
     assert generator.frequency_hz == pytest.approx(0x10C7 * MCLK_HZ / FULL_TURN)
     assert pytest.approx(400, abs=0.05) == 0x10C7 * 25e6 / FULL_TURN
 
 
-def test_the_output_follows_the_accumulator() -> None:
+def test_the_output_follows_the_accumulator():
     generator = started(*starting(STEP), at=1000)
     times = 1000 + np.arange(0, 40 * TICKS_PER_US, 97)
     cycles = (times - 1000) // MCLK_TICKS
@@ -48,7 +48,7 @@ def test_the_output_follows_the_accumulator() -> None:
     assert abs(generator.output(times)[0]) < 1e-9
 
 
-def test_phase_register_waveforms_and_reset() -> None:
+def test_phase_register_waveforms_and_reset():
     at = np.array([10])
     assert started(*starting(STEP)).output(at)[0] == pytest.approx(0, abs=2e-3)
     assert started(*starting(0, phase=1024)).output(at)[0] == pytest.approx(1, abs=2e-3)
@@ -63,7 +63,7 @@ def test_phase_register_waveforms_and_reset() -> None:
     assert other.frequency_hz == pytest.approx((0x100 << 14) / FULL_TURN * MCLK_HZ)
 
 
-def test_halves_of_a_frequency_need_b28_or_hlb() -> None:
+def test_halves_of_a_frequency_need_b28_or_hlb():
     assert started(0x2100, 0x4001, 0x4001, 0x2000).frequency_hz == pytest.approx(
         (1 << 14 | 1) / FULL_TURN * MCLK_HZ
     )
@@ -75,7 +75,7 @@ def test_halves_of_a_frequency_need_b28_or_hlb() -> None:
     assert half.frequency_hz == pytest.approx(1000, rel=1e-3)
 
 
-def test_the_phase_goes_on_when_the_frequency_changes() -> None:
+def test_the_phase_goes_on_when_the_frequency_changes():
     generator = started(*starting(STEP))
     at = 777 * MCLK_TICKS
     before = generator.phases(np.array([at]), generator.courses[-1])[0]
@@ -87,7 +87,7 @@ def test_the_phase_goes_on_when_the_frequency_changes() -> None:
     assert generator.frequency_hz == pytest.approx(100_000, abs=0.1)
 
 
-def test_multiplexers_decode_their_lines() -> None:
+def test_multiplexers_decode_their_lines():
     muxes = Multiplexers()
     muxes.set_addresses(0, 0x3A51)
     assert muxes.joined == (None, None, None, None)
@@ -99,7 +99,7 @@ def test_multiplexers_decode_their_lines() -> None:
     assert muxes.violations == []
 
 
-def test_making_before_breaking_is_told() -> None:
+def test_making_before_breaking_is_told():
     muxes = Multiplexers()
     muxes.set_enables(0, 0xF)
     muxes.set_addresses(10, 0x0010)
@@ -113,7 +113,7 @@ def test_making_before_breaking_is_told() -> None:
     assert len(muxes.violations) == 2
 
 
-def test_rows_their_reciprocals_and_turned_pairs() -> None:
+def test_rows_their_reciprocals_and_turned_pairs():
     skin = flat_skin()
     a, b, c, d = (int(k) for k in skin.protocol.drive_measure[17])
     row, fold = 17, skin.protocol.reciprocal_pairs()
@@ -131,14 +131,14 @@ def test_rows_their_reciprocals_and_turned_pairs() -> None:
 
 
 @pytest.mark.parametrize("protocol", [adjacent(16), opposite(16)], ids=["adjacent", "opposite"])
-def test_every_row_of_a_protocol_is_found(protocol: object) -> None:
-    rows = 1e-3 * (1 + np.arange(protocol.n_rows))  # type: ignore[attr-defined]
-    skin = AnalogSkin(protocol, rows[None], rows[None], 20.0)  # type: ignore[arg-type]
+def test_every_row_of_a_protocol_is_found(protocol):
+    rows = 1e-3 * (1 + np.arange(protocol.n_rows))
+    skin = AnalogSkin(protocol, rows[None], rows[None], 20.0)
     read = [skin.amplitude_v(0, tuple(int(k) for k in row)) for row in protocol.drive_measure]
     assert np.allclose(read, rows)
 
 
-def test_frames_are_chosen_when_a_scan_begins() -> None:
+def test_frames_are_chosen_when_a_scan_begins():
     protocol = adjacent(16)
     quiet = np.arange(3)[:, None] * 1.0 + np.zeros((3, protocol.n_rows))
     frames = 100 + np.arange(5)[:, None] + np.zeros((5, protocol.n_rows))
@@ -159,7 +159,7 @@ def test_frames_are_chosen_when_a_scan_begins() -> None:
     assert skin.over(round(1.51 * TICKS_PER_S))
 
 
-def test_settling_is_first_order() -> None:
+def test_settling_is_first_order():
     skin = flat_skin()
     generator = started(*starting(0, phase=1024))  # a constant 1
     front_end = FrontEnd(generator, Multiplexers(), skin)
@@ -185,7 +185,7 @@ def test_settling_is_first_order() -> None:
     assert np.array_equal(front_end.sample(at.astype(np.int64), 4), [0, 0, 0])
 
 
-def test_codes() -> None:
+def test_codes():
     found = codes(np.array([0.0, STEP_V, -STEP_V, 0.49 * STEP_V, 1.2, -1.2])).tolist()
     assert found == [2048, 2049, 2047, 2048, 4095, 0]
     assert pytest.approx(3.3 / 4096 / 1.5) == STEP_V

@@ -1,8 +1,6 @@
 """What stops the current behind the program's back: loss of the clock or of the supply, a processor
 that hangs, a current that is not the source's; and that the monitor sees what must never be."""
 
-from collections.abc import Callable
-
 import pytest
 
 from eitskin.device.client import Device
@@ -25,7 +23,7 @@ DEAF_LOOP = bytes.fromhex("72b6fee7")  # cpsid i; b .
 
 
 @pytest.fixture
-def device(image: bytes) -> Device:
+def device(image) -> Device:
     """A board whose skin carries current right now."""
     device = connect(power_up(image, noisy=False))
     assert device.send_command(STREAM, 1.0).ok
@@ -58,7 +56,7 @@ def restarts_for(board: EmulatedBoard, cause: str, fault: FaultCode, within_s: f
     assert not board.multiplexers.log
 
 
-def test_without_its_clock(device: Device) -> None:
+def test_without_its_clock(device):
     board = board_of(device)
     board.lose_clock()
     assert opens_after_us(board, 100) < 20
@@ -68,7 +66,7 @@ def test_without_its_clock(device: Device) -> None:
     restarts_for(board, "software", FaultCode.CLOCK, 10)
 
 
-def test_without_its_supply(device: Device) -> None:
+def test_without_its_supply(device):
     board = board_of(device)
     board.drop_supply(True)
     assert opens_after_us(board, 100) < 5
@@ -79,7 +77,7 @@ def test_without_its_supply(device: Device) -> None:
     restarts_for(board, "software", FaultCode.SUPPLY)
 
 
-def test_a_program_that_hangs(device: Device) -> None:
+def test_a_program_that_hangs(device):
     """The tick opens the multiplexers, later the watchdog resets."""
     board = board_of(device)
     hang(board, WFI_LOOP)
@@ -91,7 +89,7 @@ def test_a_program_that_hangs(device: Device) -> None:
     assert not device.info().faults
 
 
-def test_a_processor_that_takes_no_interrupt(device: Device) -> None:
+def test_a_processor_that_takes_no_interrupt(device):
     board = board_of(device)
     hang(board, DEAF_LOOP)
     assert opens_after_us(board, 520_000) < 510e3
@@ -105,15 +103,11 @@ def doubled_source(board: EmulatedBoard) -> None:
 def dead_converter(board: EmulatedBoard) -> None:
     second = board.adc.second
     read = second.read
-    second.read = (  # type: ignore[method-assign]
-        lambda offset, size: 0 if offset == SR else read(offset, size)
-    )
+    second.read = lambda offset, size: 0 if offset == SR else read(offset, size)
 
 
 @pytest.mark.parametrize("fails", [doubled_source, dead_converter])
-def test_a_current_that_is_not_the_source_s(
-    device: Device, fails: Callable[[EmulatedBoard], None]
-) -> None:
+def test_a_current_that_is_not_the_source_s(device, fails):
     board = board_of(device)
     device.settings(Setting.SENSE)
     assert device.send_command(STREAM, 1.0).ok
@@ -199,7 +193,7 @@ ALONE = TICKS_PER_S + 1
         ([*SOUND, ("wait", ALONE - 1 - OFF_TICKS * 2), ("look", 0)], ""),
     ],
 )
-def test_the_monitor_sees_what_must_never_be(trace: list[tuple[str, int]], words: str) -> None:
+def test_the_monitor_sees_what_must_never_be(trace, words):
     watched = Watched()
     for step in trace:
         watched.do(*step)
@@ -207,7 +201,7 @@ def test_the_monitor_sees_what_must_never_be(trace: list[tuple[str, int]], words
     assert words in found[0] if words else not found, found
 
 
-def test_the_owner_s_setting_excuses_silence_alone() -> None:
+def test_the_owner_s_setting_excuses_silence_alone():
     watched = Watched()
     watched.may_be_silent = True
     for step in [*SOUND, ("wait", ALONE), ("look", 0)]:

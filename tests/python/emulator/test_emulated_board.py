@@ -25,7 +25,7 @@ from small_models import small
 
 
 @pytest.fixture(scope="module")
-def quiet(image: bytes) -> Device:
+def quiet(image) -> Device:
     """A board before an untouched skin without noise."""
     return connect(power_up(image, noisy=False))
 
@@ -34,7 +34,7 @@ def joined_order(board: EmulatedBoard, first: int) -> list[tuple[int | None, ...
     return [one.joined for one in board.multiplexers.log[first:] if None not in one.joined]
 
 
-def test_the_board_says_what_it_is(quiet: Device) -> None:
+def test_the_board_says_what_it_is(quiet):
     info, (model, blob) = quiet.board, load_prebuilt()
     assert (info.board, info.f_cpu_hz, info.electrodes) == ("nucleo_f767zi", 216_000_000, 16)
     assert (info.model_bytes, info.model_crc, info.bank) == (len(blob), zlib.crc32(blob), 0)
@@ -44,7 +44,7 @@ def test_the_board_says_what_it_is(quiet: Device) -> None:
     assert bytes.fromhex(info.serial.strip("\0")) != b""
 
 
-def test_the_generator_runs_at_50_khz(quiet: Device) -> None:
+def test_the_generator_runs_at_50_khz(quiet):
     generator = board_of(quiet).generator
     assert generator.words[0] == 0x2100  # in reset, until a host asks
     raw_frames(quiet, 1)
@@ -55,7 +55,7 @@ def test_the_generator_runs_at_50_khz(quiet: Device) -> None:
     assert abs(quiet.board.excitation_millihz / 1000 - generator.frequency_hz) < 0.001
 
 
-def test_rows_are_joined_in_the_order_of_the_table(quiet: Device) -> None:
+def test_rows_are_joined_in_the_order_of_the_table(quiet):
     board = board_of(quiet)
     raw_frames(quiet, 1)
     table = [tuple(int(k) for k in row) for row in load_prebuilt()[0].protocol.drive_measure]
@@ -73,7 +73,7 @@ def amplitude_errors_lsb(device: Device) -> np.ndarray:
     return np.concatenate([frame.voltage_v - exact for frame in frames]) / STEP_V
 
 
-def test_amplitudes_are_within_half_a_step(quiet: Device) -> None:
+def test_amplitudes_are_within_half_a_step(quiet):
     errors = amplitude_errors_lsb(quiet)
     print(
         f"adjacent: worst {np.abs(errors).max():.3f} LSB, rms {np.sqrt(np.mean(errors**2)):.3f} LSB"
@@ -81,7 +81,7 @@ def test_amplitudes_are_within_half_a_step(quiet: Device) -> None:
     assert np.abs(errors).max() < 0.5
 
 
-def test_times_of_samples_and_switches(quiet: Device) -> None:
+def test_times_of_samples_and_switches(quiet):
     """Every sample is taken at least the settling time after the switch before it."""
     board, info = board_of(quiet), quiet.board
     at: list[int] = []
@@ -92,7 +92,7 @@ def test_times_of_samples_and_switches(quiet: Device) -> None:
         return sample(times, channel)
 
     board.multiplexers.log.clear()
-    board.adc.sample = watched  # type: ignore[assignment]
+    board.adc.sample = watched
     board.run_until(board.clock.now + 30_000 * TICKS_PER_US)
     board.adc.sample = sample
     made = np.array([one.at for one in board.multiplexers.log if None not in one.joined])
@@ -105,7 +105,7 @@ def test_times_of_samples_and_switches(quiet: Device) -> None:
     assert set(np.round(slots, 6)) == {float(info.slot_us)}
 
 
-def test_the_same_session_gives_the_same_bytes(image: bytes) -> None:
+def test_the_same_session_gives_the_same_bytes(image):
     runs = []
     for _ in range(2):
         board = power_up(image)
@@ -117,7 +117,7 @@ def test_the_same_session_gives_the_same_bytes(image: bytes) -> None:
     assert runs[0] == runs[1]
 
 
-def test_touches_and_images_are_the_host_s_to_the_bit(image: bytes) -> None:
+def test_touches_and_images_are_the_host_s_to_the_bit(image):
     board = power_up(image)
     device = connect(board)
     check, seen, host = twin_check(device, load_prebuilt()[1], 6, quiet=16)
@@ -138,7 +138,7 @@ def test_touches_and_images_are_the_host_s_to_the_bit(image: bytes) -> None:
     clean(board)
 
 
-def test_an_opposite_protocol(image: bytes) -> None:
+def test_an_opposite_protocol(image):
     """Another protocol: the model's table is scanned, and each row has its voltage."""
     skin, protocol = (
         paper_skin(),
@@ -179,7 +179,7 @@ def periods_us(device: Device, frames: int) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(("check_every", "rows"), [(1, 208), (0, 104)])
-def test_frame_rates(image: bytes, check_every: int, rows: int) -> None:
+def test_frame_rates(image, check_every, rows):
     """208 and 104 measurements of 80 samples, the solve overlapped: the slower of scan and solve is
     what bounds the rate."""
     board = power_up(image)
@@ -202,7 +202,7 @@ def test_frame_rates(image: bytes, check_every: int, rows: int) -> None:
     clean(board)
 
 
-def test_reciprocal_scans_measure_half_and_check_now_and_then(image: bytes) -> None:
+def test_reciprocal_scans_measure_half_and_check_now_and_then(image):
     board = power_up(image, noisy=False)
     device = connect(board)
     device.scan(check_every=3)
@@ -216,7 +216,7 @@ def test_reciprocal_scans_measure_half_and_check_now_and_then(image: bytes) -> N
     clean(board)
 
 
-def test_another_frequency(image: bytes) -> None:
+def test_another_frequency(image):
     device = connect(power_up(image, noisy=False))
     board = board_of(device)
     device.scan(excitation_hz=25_000)
@@ -230,7 +230,7 @@ def test_another_frequency(image: bytes) -> None:
     clean(board)
 
 
-def test_a_saturated_row_is_told(image: bytes) -> None:
+def test_a_saturated_row_is_told(image):
     board = power_up(image, noisy=False)
     board.skin.quiet_v[:, 7] = 1.3  # the converter ends at 1.1 V
     device = connect(board)
@@ -244,7 +244,7 @@ def test_a_saturated_row_is_told(image: bytes) -> None:
     ) or (FaultCode.SATURATED in device.info().fault_codes)
 
 
-def test_no_model_no_scan_but_answers(image: bytes) -> None:
+def test_no_model_no_scan_but_answers(image):
     board = EmulatedBoard(image, power_up(image, noisy=False).skin)
     device = connect(board)
     assert device.board.model_bytes == 0
@@ -255,7 +255,7 @@ def test_no_model_no_scan_but_answers(image: bytes) -> None:
     clean(board)
 
 
-def test_without_the_8_mhz_the_red_light_blinks(image: bytes) -> None:
+def test_without_the_8_mhz_the_red_light_blinks(image):
     board = EmulatedBoard(image, power_up(image, noisy=False).skin, hse_hz=None)
     lights = set()
     for _ in range(40):
@@ -265,7 +265,7 @@ def test_without_the_8_mhz_the_red_light_blinks(image: bytes) -> None:
     assert board.receive() == b""
 
 
-def test_a_scene_for_other_electrodes_is_refused() -> None:
+def test_a_scene_for_other_electrodes_is_refused():
     with pytest.raises(
         ProtocolError, match=r"its skin has 16 electrodes, the model is for 8; build a model"
     ):

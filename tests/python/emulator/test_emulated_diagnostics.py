@@ -36,7 +36,7 @@ def taken(device: Device, frames: int) -> tuple[list[LiveFrame], list[Fault]]:
     ]
 
 
-def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
+def test_an_electrode_that_comes_off_in_mid_stream(image):
     """Named by a fault and by the head in the same frame, at the latest the first that is wholly
     without it; gone after eight frames with it; every bit, and all that was found, as the host
     finds it."""
@@ -76,7 +76,7 @@ def _faults(packet: Any) -> list[Fault]:
     return [content] if isinstance(content, Fault) else []
 
 
-def test_bridged_electrodes_are_named_with_each_other(image: bytes) -> None:
+def test_bridged_electrodes_are_named_with_each_other(image):
     protocol = load_prebuilt()[0].protocol
     whole, bridged = (
         skin_of(scene({}), protocol),
@@ -96,7 +96,7 @@ def test_bridged_electrodes_are_named_with_each_other(image: bytes) -> None:
     assert FaultCode.BRIDGED in device.info().fault_codes
 
 
-def test_a_reading_that_is_off_is_left_out_and_counted(image: bytes) -> None:
+def test_a_reading_that_is_off_is_left_out_and_counted(image):
     """One burst of one row at half its amplitude."""
     device = device_before(image, skin_of(scene({}), load_prebuilt()[0].protocol))
     device.tare(16)
@@ -113,7 +113,7 @@ def test_a_reading_that_is_off_is_left_out_and_counted(image: bytes) -> None:
         return codes
 
     bursts = [0]
-    board.adc.sample = spoil  # type: ignore[assignment]
+    board.adc.sample = spoil
     frames, faults = taken(device, 5)
     assert spoiled
     rows = [frame.solved.outliers for frame in frames if frame.solved is not None]

@@ -1,8 +1,6 @@
 """Touches after each drive on the emulated board: told while whole frames are solved, at the frame
 rate, and the bits of this host."""
 
-from pathlib import Path
-
 import numpy as np
 
 from eitskin.device.recordings.host_check import check_recording
@@ -28,14 +26,14 @@ snr_db = 60.0
 """
 
 
-def test_drives_do_not_wait_for_frames(tmp_path: Path) -> None:
+def test_drives_do_not_wait_for_frames(tmp_path):
     scene, run = tmp_path / "press.toml", tmp_path / "run.eits"
     scene.write_text(SCENE, encoding="utf-8")
     settings = SessionSettings(mode=Stream.RAW | Stream.TOUCHES, report="drive", tare=4, record=run)
     with Session(f"emu:{scene}", settings) as session:
         items = [item for item in session.frames() if isinstance(item, Frame | Report)]
         stats = session.device.stats()
-        interrupts = session.device.transport.board.record.interrupts  # type: ignore[attr-defined]
+        interrupts = session.device.transport.board.record.interrupts
     frames = [item for item in items if isinstance(item, Frame)]
     told = [item.live for item in items if isinstance(item, Report) and item.touches]
     solved = [frame.info for frame in frames if frame.info is not None]

@@ -16,7 +16,7 @@ from emulated import clean, connect, hang, power_up, restarted
 from small_models import small_blob
 
 
-def test_a_model_over_the_wire(image: bytes) -> None:
+def test_a_model_over_the_wire(image):
     """It is programmed, verified and swapped in; a restart finds it, and the bank before it is as
     it was."""
     board = power_up(image)
@@ -35,7 +35,7 @@ def test_a_model_over_the_wire(image: bytes) -> None:
     clean(board)
 
 
-def test_a_wrong_checksum_is_refused_and_the_old_model_stays(image: bytes) -> None:
+def test_a_wrong_checksum_is_refused_and_the_old_model_stays(image):
     board = power_up(image)
     device = connect(board)
     model = small_blob()
@@ -59,7 +59,7 @@ def faults_of(device: Device) -> list[Fault]:
     return told
 
 
-def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image: bytes) -> None:
+def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image):
     board = power_up(image)
     device = connect(board)
     device.send_command(commands.StreamCommand(int(Stream.RAW)), 1.0)
@@ -73,7 +73,7 @@ def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image: byt
         at_reset.append(board.multiplexers.joined)
         reset(cause)
 
-    board.reset = noted  # type: ignore[method-assign]
+    board.reset = noted
     board.run_until(board.clock.now + TICKS_PER_S, lambda: len(board.record.resets) > 1)
     assert board.record.resets == ["power", "software"] and at_reset == [(None,) * 4]
     told = [fault for fault in faults_of(device) if fault.code == FaultCode.CRASH]
@@ -85,7 +85,7 @@ def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image: byt
     assert FaultCode.CRASH in device.info().fault_codes
 
 
-def test_the_stack_is_guarded(image: bytes) -> None:
+def test_the_stack_is_guarded(image):
     """A store below the stack is a memory fault."""
     board = power_up(image)
     device = connect(board)
@@ -97,7 +97,7 @@ def test_the_stack_is_guarded(image: bytes) -> None:
     assert told[0].words[4] == 0x20000000
 
 
-def test_noise_on_the_line_is_counted_and_nothing_else(image: bytes) -> None:
+def test_noise_on_the_line_is_counted_and_nothing_else(image):
     board = power_up(image)
     device = connect(board)
     generator = np.random.default_rng(8)
@@ -110,7 +110,7 @@ def test_noise_on_the_line_is_counted_and_nothing_else(image: bytes) -> None:
     clean(board)
 
 
-def test_a_slow_line_drops_whole_packets_and_counts_them(image: bytes) -> None:
+def test_a_slow_line_drops_whole_packets_and_counts_them(image):
     """Images and raw frames of every frame are more than 1 Mbaud carries at 48 frames a second."""
     board = power_up(image)
     device = connect(board)
@@ -127,7 +127,7 @@ def test_a_slow_line_drops_whole_packets_and_counts_them(image: bytes) -> None:
     clean(board)
 
 
-def test_a_restart_on_request(image: bytes) -> None:
+def test_a_restart_on_request(image):
     board = power_up(image)
     device = connect(board)
     device.tare(4)

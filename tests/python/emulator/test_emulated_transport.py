@@ -18,12 +18,12 @@ from small_models import small_blob
 
 
 @pytest.fixture(scope="module")
-def built(cortex_m7: Path) -> Path:
+def built(cortex_m7) -> Path:
     return cortex_m7 / IMAGE
 
 
 @pytest.mark.parametrize("scene", ["two_touch", "two_touch.toml"])
-def test_a_device_by_its_url(built: Path, scene: str) -> None:
+def test_a_device_by_its_url(built, scene):
     with open_device(f"emu:{scene}", image=built) as device:
         assert device.transport.url == f"emu:{scene}"
         assert isinstance(device.transport, Transport)
@@ -38,7 +38,7 @@ def test_a_device_by_its_url(built: Path, scene: str) -> None:
         assert not device.transport.ended
 
 
-def test_time_is_the_board_s(built: Path) -> None:
+def test_time_is_the_board_s(built):
     transport = open_emulated("two_touch", image=built)
     board = transport.board
     assert transport.synchronous
@@ -51,7 +51,7 @@ def test_time_is_the_board_s(built: Path) -> None:
     assert board.skin.frame_number(board.clock.now + TICKS_PER_S) == 20
 
 
-def test_a_closed_one_is_refused(built: Path) -> None:
+def test_a_closed_one_is_refused(built):
     transport = open_emulated("two_touch", image=built)
     assert transport.reopen()
     transport.close()
@@ -62,9 +62,7 @@ def test_a_closed_one_is_refused(built: Path) -> None:
             use()
 
 
-def test_an_image_that_hangs_does_not_hang_its_user(
-    built: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_image_that_hangs_does_not_hang_its_user(built, monkeypatch):
     transport = open_emulated("two_touch", image=built)
     while transport.read(0.001):
         pass
@@ -73,7 +71,7 @@ def test_an_image_that_hangs_does_not_hang_its_user(
         transport.read(1.0)
 
 
-def test_refusals(built: Path, tmp_path: Path) -> None:
+def test_refusals(built, tmp_path):
     with pytest.raises(FileError, match="no such scene"):
         open_emulated("two_tuch", image=built)
     with pytest.raises(FileError, match="no such firmware image"):
@@ -85,7 +83,7 @@ def test_refusals(built: Path, tmp_path: Path) -> None:
         open_emulated("two_touch", image=built, model=small_blob(electrodes=8, rank=12))
 
 
-def test_the_image_that_ships_runs() -> None:
+def test_the_image_that_ships_runs():
     transport: EmulatedTransport = open_emulated("two_touch")
     assert transport.read(0.5)
     report = transport.board.report()

@@ -24,7 +24,7 @@ def flashed(body: str, s: float = 3.0, bank: bytes = b"") -> EmulatedBoard:
     return board
 
 
-def test_erase_and_program() -> None:
+def test_erase_and_program():
     board = flashed(OPEN + ERASE + "OUT[2] = DWT_CYCCNT;" + WRITE + CLOSE, bank=b"\0" * BANK_BYTES)
     word, status, cycles, done = out(board, 4)
     assert (word, status, done) == (0x12345678, 0, 1)
@@ -39,7 +39,7 @@ def test_erase_and_program() -> None:
     assert not board.record.hazards
 
 
-def test_a_word_takes_16_us() -> None:
+def test_a_word_takes_16_us():
     many = (
         "FLASH_CR = 2u << 8 | 1u; for (uint32_t k = 0; k < 100; ++k) { REG32(0x08040010u + 4 * k)"
         " = k; " + WAIT + "}"
@@ -48,13 +48,13 @@ def test_a_word_takes_16_us() -> None:
     assert 100 * 256 <= cycles <= 100 * 280
 
 
-def test_cells_only_go_to_zero() -> None:
+def test_cells_only_go_to_zero():
     board = flashed(OPEN + WRITE + "REG32(0x08040010u) = 0xFF00FF00u;" + WAIT + CLOSE)
     assert out(board, 1) == [0x12345678 & 0xFF00FF00]
     assert board.flash.not_erased == 1
 
 
-def test_what_flash_refuses() -> None:
+def test_what_flash_refuses():
     locked = flashed(ERASE.replace(WAIT, ""), bank=b"\0" * 64)
     assert out(locked, 1) == [0]
     assert "FLASH: CR written while it is locked" in locked.record.hazards
@@ -72,7 +72,7 @@ def test_what_flash_refuses() -> None:
         )
 
 
-def test_time_goes_on_while_the_processor_stands_still() -> None:
+def test_time_goes_on_while_the_processor_stands_still():
     """SysTick's interrupt waits for the erase to end; a timer has gone on."""
     source = """
     void systick(void) { ++OUT[2]; OUT[5] = DWT_CYCCNT; STK_CTRL = 0; }
@@ -94,7 +94,7 @@ def test_time_goes_on_while_the_processor_stands_still() -> None:
     assert 16_000_000 <= at <= 16_000_400
 
 
-def test_the_program_s_own_sectors_are_left_alone() -> None:
+def test_the_program_s_own_sectors_are_left_alone():
     board = flashed(OPEN + ERASE.replace("5u << 3", "1u << 3"))
     assert out(board, 4)[3] == 1
     assert board.record.unmodelled == {"FLASH: a sector of the program erased": 1}
@@ -113,7 +113,7 @@ void program(void) {
 """
 
 
-def test_a_watchdog_that_is_not_fed_resets_the_board() -> None:
+def test_a_watchdog_that_is_not_fed_resets_the_board():
     """400 periods of 32 kHz / 8: 100 ms."""
     board = run_program(WATCHDOG % "", 99_000)
     assert board.record.resets == ["power"]
@@ -123,7 +123,7 @@ def test_a_watchdog_that_is_not_fed_resets_the_board() -> None:
     assert (flag, csr >> 29 & 1, again) == (0x5A5A, 1, 1)
 
 
-def test_feeding_keeps_it_away() -> None:
+def test_feeding_keeps_it_away():
     board = run_program(
         WATCHDOG
         % "for (;;) { for (volatile uint32_t k = 0; k < 100000; ++k) ; IWDG_KR = 0xAAAA; }",
@@ -133,13 +133,13 @@ def test_feeding_keeps_it_away() -> None:
     assert board.iwdg.feeds > 3
 
 
-def test_its_registers_are_locked() -> None:
+def test_its_registers_are_locked():
     board = run_program("void program(void) { IWDG_PR = 3; OUT[0] = IWDG_PR; }", 100)
     assert out(board, 1) == [0]
     assert board.record.hazards == {"IWDG: PR or RLR written while it is locked": 1}
 
 
-def test_power_lost_and_back() -> None:
+def test_power_lost_and_back():
     source = "void program(void) { OUT[0] = RCC_CSR; OUT[1] = OUT[2]; OUT[2] = 7; }"
     board = EmulatedBoard(compile_program(source), flat_skin())
     board.run_until(100 * TICKS_PER_US)
@@ -152,7 +152,7 @@ def test_power_lost_and_back() -> None:
     assert board.record.resets == ["power", "pin", "power"]
 
 
-def test_an_image_or_bank_that_is_too_long_is_refused() -> None:
+def test_an_image_or_bank_that_is_too_long_is_refused():
     with pytest.raises(DeviceError, match="262145 bytes"):
         EmulatedBoard(bytes(262145), flat_skin())
     with pytest.raises(DeviceError, match="a bank has"):
@@ -171,16 +171,14 @@ OPTION_KEYS = "FLASH_OPTKEYR = 0x08192A3Bu; FLASH_OPTKEYR = 0x4C5D6E7Fu;"
         ("FLASH_OPTKEYR = 1u; FLASH_OPTCR = 0xFFFFAAF2u;", 0xFFFFAAFD, 2),
     ],
 )
-def test_option_bytes_want_keys_and_a_start_and_outlive_a_reset(
-    body: str, options: int, hazards: int
-) -> None:
+def test_option_bytes_want_keys_and_a_start_and_outlive_a_reset(body, options, hazards):
     board = flashed(body)
     assert sum(board.record.hazards.values()) == hazards
     board.flash.reset()
     assert board.flash.read(0x14, 4) == options
 
 
-def test_the_image_sets_the_brown_out_level_once_and_nothing_else(image: bytes) -> None:
+def test_the_image_sets_the_brown_out_level_once_and_nothing_else(image):
     """BOR_LEV, bits 2 and 3, is 0: level 3, the highest."""
     board = board_of(connect(power_up(image, noisy=False)))
     for _ in range(2):
@@ -191,7 +189,7 @@ def test_the_image_sets_the_brown_out_level_once_and_nothing_else(image: bytes) 
     assert not board.record.hazards
 
 
-def test_option_bytes_are_left_alone_while_the_supply_is_low(image: bytes) -> None:
+def test_option_bytes_are_left_alone_while_the_supply_is_low(image):
     board = EmulatedBoard(image, flat_skin(), ())
     board.drop_supply(True)
     board.run_until(round(0.1 * TICKS_PER_S))

@@ -66,11 +66,11 @@ class Workshop:
 
 
 @pytest.fixture(scope="module")
-def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
+def workshop(tmp_path_factory) -> Workshop:
     return Workshop(tmp_path_factory.mktemp("mutants"))
 
 
-def test_the_sources_as_they_are_pass(workshop: Workshop) -> None:
+def test_the_sources_as_they_are_pass(workshop):
     session = run_session(workshop.unmutated)
     assert {check.__name__: check(session) for check in CHECKS} == {
         check.__name__: None for check in CHECKS
@@ -78,7 +78,7 @@ def test_the_sources_as_they_are_pass(workshop: Workshop) -> None:
 
 
 @pytest.mark.parametrize("name", MUTATIONS)
-def test_a_mutant_is_noticed(workshop: Workshop, name: str) -> None:
+def test_a_mutant_is_noticed(workshop, name):
     mutation = MUTATIONS[name]
     session = run_session(workshop.mutant(mutation))
     found = {check.__name__: told for check in CHECKS if (told := check(session)) is not None}
@@ -86,7 +86,7 @@ def test_a_mutant_is_noticed(workshop: Workshop, name: str) -> None:
     assert mutation["noticed_by"] in found
 
 
-def test_a_stale_protocol_table_is_noticed(workshop: Workshop) -> None:
+def test_a_stale_protocol_table_is_noticed(workshop):
     model = small_blob(kind="skip")
     assert table_after_upload(workshop.unmutated, model) is None
     told = table_after_upload(workshop.mutant(STALE_TABLE), model)

@@ -58,7 +58,7 @@ def half_erased(rng: np.random.Generator) -> list[bytes]:
 
 
 @pytest.mark.parametrize("cuts", ["sample", "every word"])
-def test_a_model_is_open_after_every_cut(image: bytes, cuts: str) -> None:
+def test_a_model_is_open_after_every_cut(image, cuts):
     rng = np.random.default_rng(5)
     states = spare_at_each_write(image)
     chosen = range(WORDS)

@@ -29,8 +29,8 @@ void program(void) {
 
 
 def test_where_slices_end_changes_neither_results_nor_time_nor_counts(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     image = compile_program(MIXED)
     found = set()
     for longest in (5_000_000, 1000, 97, 13, 5, 3):
@@ -42,7 +42,7 @@ def test_where_slices_end_changes_neither_results_nor_time_nor_counts(
     assert next(iter(found))[0][3] == 77
 
 
-def test_an_instruction_takes_a_cycle() -> None:
+def test_an_instruction_takes_a_cycle():
     """CYCCNT read twice around 100 NOPs: 100, and what the read itself takes, which is found
     without them."""
     nops = '__asm volatile(".rept %d\\n nop\\n .endr");'
@@ -56,7 +56,7 @@ def test_an_instruction_takes_a_cycle() -> None:
         assert 1 <= without <= 3
 
 
-def test_an_unknown_build_of_unicorn_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_build_of_unicorn_is_refused(monkeypatch):
     counter.offsets.cache_clear()
     monkeypatch.setattr(counter, "_words", lambda engine: [0] * 512)
     with pytest.raises(DeviceError, match=r"pip install 'unicorn==2\.1\.4'"):
@@ -95,9 +95,7 @@ void program(void) {
         ("0x10", "0x20", [2, 20, 3, 30]),
     ],
 )
-def test_the_more_urgent_interrupt_preempts(
-    urgency_2: str, urgency_3: str, order: list[int]
-) -> None:
+def test_the_more_urgent_interrupt_preempts(urgency_2, urgency_3, order):
     board = run_program(TWO_TIMERS % (urgency_2, urgency_3), 200, (28, 29))
     assert out(board, 4) == order
     assert board.record.interrupts == {44: 1, 45: 1}
@@ -120,7 +118,7 @@ void program(void) {
 """
 
 
-def test_a_frame_has_8_words_or_26_after_floating_point() -> None:
+def test_a_frame_has_8_words_or_26_after_floating_point():
     board = run_program(FRAMES % ("", ""), 100)
     sp, lr, ipsr, before, after, r0, r1 = out(board, 7)
     assert (before - sp, lr, ipsr, after) == (32 + (before & 4), 0xFFFFFFF9, 11, before)
@@ -173,7 +171,7 @@ void program(void) {
 """
 
 
-def test_an_interrupt_at_any_place_changes_nothing() -> None:
+def test_an_interrupt_at_any_place_changes_nothing():
     undisturbed = out(run_program(SPOILING % (0, 100, 0), 400_000), 14)
     assert undisturbed[1:3] == [0, 1]
     for period, carry in ((60, 1), (97, 0), (100, 1), (211, 0)):
@@ -207,7 +205,7 @@ void program(void) {
         ('__asm volatile("cpsid f");', '__asm volatile("cpsie f");', True),
     ],
 )  # fmt: skip
-def test_masks_hold_interrupts_back(on: str, off: str, held: bool) -> None:
+def test_masks_hold_interrupts_back(on, off, held):
     taken, unmasked = out(run_program(CLOCK + MASKS % (on, off), 2000), 2)
     if held:
         assert unmasked < taken < unmasked + 40
@@ -215,7 +213,7 @@ def test_masks_hold_interrupts_back(on: str, off: str, held: bool) -> None:
         assert 1000 <= taken < 1030
 
 
-def test_a_sleeper_skips_to_what_wakes_it_even_behind_primask() -> None:
+def test_a_sleeper_skips_to_what_wakes_it_even_behind_primask():
     source = """
     void systick(void) { ++OUT[1]; }
     void program(void) {
@@ -233,7 +231,7 @@ def test_a_sleeper_skips_to_what_wakes_it_even_behind_primask() -> None:
     assert board.record.instructions < 2000
 
 
-def test_a_flag_that_a_handler_forgets_brings_it_back() -> None:
+def test_a_flag_that_a_handler_forgets_brings_it_back():
     source = """
     void irq_28(void) { if (++OUT[0] == 5) T_SR(TIM2_BASE) = 0; }
     void program(void) {
@@ -279,7 +277,7 @@ DENY = "SCB_SHCSR |= 7u << 16; MPU_RBAR = %s; MPU_RASR = %du << 1 | 1; MPU_CTRL 
     ],
     ids=["hard", "load", "flash", "undefined", "fetch", "null pointer", "guard"],
 )
-def test_faults_reach_their_handlers(body: str, taken: int, cfsr: int, hfsr: int) -> None:
+def test_faults_reach_their_handlers(body, taken, cfsr, hfsr):
     board = run_program(FAULT % body, 200)
     found = out(board, 10)
     assert (found[0], found[2], found[3]) == (taken, cfsr, hfsr)
@@ -292,7 +290,7 @@ def test_faults_reach_their_handlers(body: str, taken: int, cfsr: int, hfsr: int
     assert len(board.record.faults) == 1
 
 
-def test_a_fault_in_the_hard_fault_handler_locks_up() -> None:
+def test_a_fault_in_the_hard_fault_handler_locks_up():
     source = FAULT.replace(
         "TELL(hard_fault, 3)",
         "uint32_t load(uint32_t at); void hard_fault(void) { load(0x60000000); }",
@@ -307,7 +305,7 @@ def test_a_fault_in_the_hard_fault_handler_locks_up() -> None:
     assert board.record.resets.count("watchdog") >= 1
 
 
-def test_a_program_asks_for_a_reset_and_ram_stays() -> None:
+def test_a_program_asks_for_a_reset_and_ram_stays():
     source = """
     void program(void) {
         if (OUT[0] != 0x1234) {
@@ -321,7 +319,7 @@ def test_a_program_asks_for_a_reset_and_ram_stays() -> None:
     assert (first >> 26 & 0xF, second >> 26 & 0xF, cleared >> 26 & 0xF) == (0b0011, 0b0111, 0)
 
 
-def test_what_is_not_modelled_or_not_clocked_is_told() -> None:
+def test_what_is_not_modelled_or_not_clocked_is_told():
     source = """
     void program(void) {
         OUT[0] = REG32(0x40013000u);          /* SPI1, which is not modelled */
@@ -334,7 +332,7 @@ def test_what_is_not_modelled_or_not_clocked_is_told() -> None:
     assert board.record.clock_off == {"write GPIOB": 1, "read GPIOB": 1}
 
 
-def test_a_bug_in_a_peripheral_is_not_swallowed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_in_a_peripheral_is_not_swallowed(monkeypatch):
     def broken(self: object, offset: int, size: int) -> int:
         raise ZeroDivisionError("a bug")
 
@@ -343,7 +341,7 @@ def test_a_bug_in_a_peripheral_is_not_swallowed(monkeypatch: pytest.MonkeyPatch)
         run_program("void program(void) { OUT[0] = RCC_CR; }", 100)
 
 
-def test_an_unexpected_interrupt_is_seen_by_these_tests() -> None:
+def test_an_unexpected_interrupt_is_seen_by_these_tests():
     board = run_program("void program(void) { SCB_ICSR = 1u << 28; }", 100)
     assert unexpected(board) == 14
     assert STACK_TOP > RAM < OUT

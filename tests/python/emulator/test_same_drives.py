@@ -121,7 +121,7 @@ class Given:
         engine.reg_write(arm.UC_ARM_REG_PC, engine.reg_read(arm.UC_ARM_REG_LR))
 
 
-def test_both_boards_tell_the_same_of_the_same_volts(tmp_path: Path, cortex_m7: Path) -> None:
+def test_both_boards_tell_the_same_of_the_same_volts(tmp_path, cortex_m7):
     scene, runs = tmp_path / "presses.toml", (tmp_path / "sim.eits", tmp_path / "emu.eits")
     scene.write_text(SCENE, encoding="utf-8")
     image = cortex_m7 / "firmware/eitskin_nucleo_f767zi.bin"
@@ -133,7 +133,7 @@ def test_both_boards_tell_the_same_of_the_same_volts(tmp_path: Path, cortex_m7: 
         how = replace(settings, record=run, firmware=image if emulated else None)
         with Session(f"{kind}:{scene}", how) as session:
             if emulated:
-                board = session.device.transport.board  # type: ignore[attr-defined]
+                board = session.device.transport.board
                 Given(board, image.with_suffix(".elf"), Recorded.read(runs[0]))
             for _ in session.frames():
                 pass

@@ -38,7 +38,7 @@ def sending(setup: str = SERIAL, us: float = 2000) -> EmulatedBoard:
     return run_program(CLOCK + SEND % setup, us, (14,))
 
 
-def test_bytes_reach_the_host_at_a_megabaud() -> None:
+def test_bytes_reach_the_host_at_a_megabaud():
     board = EmulatedBoard(compile_program(CLOCK + SEND % SERIAL, (14,)), flat_skin())
     ends = []
     while len(ends) < 100:
@@ -64,20 +64,20 @@ def test_bytes_reach_the_host_at_a_megabaud() -> None:
     ],
     ids=["clock off", "pin mode", "pin function", "no DMAT", "DMA off"],
 )
-def test_nothing_is_sent_when_something_is_missing(change: tuple[str, str]) -> None:
+def test_nothing_is_sent_when_something_is_missing(change):
     assert change[0] in SERIAL
     board = sending(SERIAL.replace(*change))
     assert board.receive() == b""
 
 
-def test_a_wrong_baud_rate_is_garbage() -> None:
+def test_a_wrong_baud_rate_is_garbage():
     for divisor in (27, 50, 58, 108, 468):
         assert sending(SERIAL.replace("= 54", f"= {divisor}"), 9000).receive() not in (b"", SENT)
     for divisor in (53, 55):
         assert sending(SERIAL.replace("= 54", f"= {divisor}")).receive() == SENT
 
 
-def test_sampling_at_another_rate() -> None:
+def test_sampling_at_another_rate():
     assert resampled(b"\x55\xaa\x00\xff", 100, 100) == b"\x55\xaa\x00\xff"
     assert resampled(b"\x00", 200, 100) == b"\x00\x00" or resampled(b"\x00", 200, 100)[0] == 0
     assert resampled(b"\xf0" * 4, 100, 200) != b"\xf0" * 4
@@ -110,7 +110,7 @@ def receiving(chunks: list[bytes], setup: str = SERIAL, gap_us: int = 500) -> Em
     return board
 
 
-def test_bytes_from_the_host_go_round_the_ring_and_idle_is_told() -> None:
+def test_bytes_from_the_host_go_round_the_ring_and_idle_is_told():
     data = bytes(range(1, 151))
     board = receiving([data[:10], data[10:150]])
     laps, idles, first, second, *_ = out(board, 12)
@@ -122,7 +122,7 @@ def test_bytes_from_the_host_go_round_the_ring_and_idle_is_told() -> None:
     assert board.usart.bytes_lost == 0
 
 
-def test_idle_comes_a_byte_time_after_the_last_byte() -> None:
+def test_idle_comes_a_byte_time_after_the_last_byte():
     board = EmulatedBoard(compile_program(CLOCK + RECEIVE % SERIAL, (12, 39)), flat_skin())
     board.run_until(500 * TICKS_PER_US)
     began = board.clock.now
@@ -131,14 +131,14 @@ def test_idle_comes_a_byte_time_after_the_last_byte() -> None:
     assert 210 * TICKS_PER_US <= board.clock.now - began <= 211 * TICKS_PER_US
 
 
-def test_a_receiver_at_another_rate_hears_garbage_and_framing_errors() -> None:
+def test_a_receiver_at_another_rate_hears_garbage_and_framing_errors():
     data = bytes(range(1, 60))
     board = receiving([data], SERIAL.replace("= 54", "= 468").replace("3u << 6", "3u << 6 | 1"))
     assert data[:16] not in board.memories.ram[0x11000 : 0x11000 + 64]
     assert any(status & 1 << 1 for status in out(board, 10)[2:])
 
 
-def test_single_bytes_overrun() -> None:
+def test_single_bytes_overrun():
     source = (
         """
     void irq_39(void) {
@@ -193,7 +193,7 @@ def shifted(setup: str = SPI, mode: str = CPOL, shift: str = SHIFT) -> EmulatedB
     return run_program(CLOCK + shift % setup.replace("@", mode), 1000)
 
 
-def test_words_arrive_in_mode_2() -> None:
+def test_words_arrive_in_mode_2():
     board = shifted()
     assert board.generator.words == list(WORDS)
     assert board.generator.frequency_hz == pytest.approx(0x10C7 / 2**28 * 8e6)
@@ -202,13 +202,13 @@ def test_words_arrive_in_mode_2() -> None:
 
 
 @pytest.mark.parametrize("mode", ["0", "3"], ids=["mode 0", "mode 3"])
-def test_wrong_modes_garble_every_word(mode: str) -> None:
+def test_wrong_modes_garble_every_word(mode):
     words = shifted(mode=mode).generator.words
     assert len(words) == 5
     assert all(got != sent for got, sent in zip(words[1:3], WORDS[1:3], strict=True))
 
 
-def test_mode_1_clocks_too_early() -> None:
+def test_mode_1_clocks_too_early():
     generator = shifted(mode="1").generator
     assert generator.words == list(WORDS)
     assert generator.early_clocks == 5
@@ -231,7 +231,7 @@ def test_mode_1_clocks_too_early() -> None:
         "8 bits", "LSB first",
     ],
 )  # fmt: skip
-def test_what_does_not_reach_the_generator(setup: str, shift: str, words: int) -> None:
+def test_what_does_not_reach_the_generator(setup, shift, words):
     assert (setup, shift) != (SPI, SHIFT)
     board = shifted(setup, shift=shift)
     assert len(board.generator.words) == words
@@ -243,7 +243,7 @@ def test_what_does_not_reach_the_generator(setup: str, shift: str, words: int) -
         assert board.generator.words == [int(f"{word:016b}"[::-1], 2) for word in WORDS]
 
 
-def test_a_word_takes_its_time() -> None:
+def test_a_word_takes_its_time():
     """16 bits at 54 MHz / 16: 4.74 us from the write to BSY's end."""
     source = SHIFT.replace(
         "SPI_DR(SPI3_BASE) = value;", "uint32_t t = DWT_CYCCNT; SPI_DR(SPI3_BASE) = value;"
@@ -255,7 +255,7 @@ def test_a_word_takes_its_time() -> None:
     assert 1024 <= cycles <= 1040
 
 
-def test_mclk_is_what_the_pin_gives() -> None:
+def test_mclk_is_what_the_pin_gives():
     assert shifted().generator.mclk_hz == 8_000_000
     assert shifted(SPI.replace("0xA8020000u", "0xA8000000u")).generator.mclk_hz == 0
     found = shifted(SPI + "RCC_CFGR = (RCC_CFGR & ~(7u << 24)) | 4u << 24;").generator.mclk_hz

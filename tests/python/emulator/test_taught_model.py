@@ -2,7 +2,6 @@
 numpy makes of it is in teaching/test_teach.py."""
 
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,7 +45,7 @@ def simulated_presses(count: int) -> Presses:
     return Presses(opposite(8), np.repeat(made.quiet_v[:1], count, axis=0), made.frames_v, place)
 
 
-def test_a_taught_model_is_uploaded_and_streamed(image: bytes, tmp_path: Path) -> None:
+def test_a_taught_model_is_uploaded_and_streamed(image, tmp_path):
     protocol = opposite(8)
     linear = linearise(SKIN, protocol, pixels_across=14, elements=900)
     physics = encode_model(make_model(SKIN, protocol, linear, BuildSettings(rank=16, samples=0)))

@@ -12,7 +12,7 @@ from eitskin_emulator.clocktime import TICKS_PER_US
 TIMERS_ON = "RCC_APB1ENR |= 0xB; (void)RCC_APB1ENR;"
 
 
-def test_clocks_and_their_hazards() -> None:
+def test_clocks_and_their_hazards():
     board = run_program(CLOCK + "void program(void) { clock_216(); OUT[0] = RCC_CFGR; }", 1000)
     rcc = board.rcc
     found = rcc.sysclk_hz, rcc.hclk_hz, rcc.apb_hz(1), rcc.apb_hz(2), rcc.timer_hz(1)
@@ -33,7 +33,7 @@ def test_clocks_and_their_hazards() -> None:
         assert any(text in hazard for hazard in board.record.hazards), board.record.hazards
 
 
-def test_without_the_8_mhz_the_clock_is_never_ready() -> None:
+def test_without_the_8_mhz_the_clock_is_never_ready():
     waits = "while (!(RCC_CR & RCC_CR_HSERDY)) ; OUT[0] = 1;"
     source = "void program(void) { RCC_CR |= RCC_CR_HSEBYP; RCC_CR |= RCC_CR_HSEON; " + waits + " }"
     board = EmulatedBoard(compile_program(source), flat_skin(), hse_hz=None)
@@ -42,13 +42,13 @@ def test_without_the_8_mhz_the_clock_is_never_ready() -> None:
     assert run_program(source, 100).memories.ram[0x10000] == 1
 
 
-def test_a_switch_to_a_clock_that_is_not_ready_is_refused() -> None:
+def test_a_switch_to_a_clock_that_is_not_ready_is_refused():
     board = run_program("void program(void) { RCC_CFGR = 2; OUT[0] = RCC_CFGR; }", 100)
     assert out(board, 1) == [0]
     assert "RCC: SYSCLK switched to a source that is not ready" in board.record.hazards
 
 
-def test_a_counter_counts_as_its_prescaler_says() -> None:
+def test_a_counter_counts_as_its_prescaler_says():
     """TIM5 at 1 MHz against CYCCNT at 216 MHz; the prescaler works from the first update on."""
     source = f"""
     void program(void) {{
@@ -123,7 +123,7 @@ def watched(
     return board, times
 
 
-def test_bursts_are_timed_by_hardware_alone() -> None:
+def test_bursts_are_timed_by_hardware_alone():
     """The firmware's chain: a compare of TIM5 starts TIM3, TIM3's OC1REF gates TIM2, TIM2's updates
     start conversions."""
     board, times = watched(BURSTS % CHAIN, 1500)
@@ -145,7 +145,7 @@ def test_bursts_are_timed_by_hardware_alone() -> None:
     assert not board.record.unmodelled
 
 
-def test_sample_instants_follow_the_microsecond_clock() -> None:
+def test_sample_instants_follow_the_microsecond_clock():
     """Sample k of a slot is taken k + 1/2 us after TIM5 reached the slot's start, and the sampling
     time later."""
     source = BURSTS % (CHAIN + "while (TIM_CNT(TIM5_BASE) < at) ; OUT[20] = DWT_CYCCNT;")
@@ -169,9 +169,7 @@ def test_sample_instants_follow_the_microsecond_clock() -> None:
     ],
     ids=["clock off", "another trigger", "no TRGO", "interrupt off", "another master"],
 )
-def test_a_missing_link_of_the_chain(
-    change: tuple[str, str], conversions: int | None, interrupts: int
-) -> None:
+def test_a_missing_link_of_the_chain(change, conversions, interrupts):
     assert change[0] in CHAIN
     board, _ = watched(BURSTS % CHAIN.replace(*change), 800)
     if conversions is not None:
@@ -179,7 +177,7 @@ def test_a_missing_link_of_the_chain(
     assert board.record.interrupts[72] == interrupts
 
 
-def test_a_dma_flag_stays_until_it_is_cleared() -> None:
+def test_a_dma_flag_stays_until_it_is_cleared():
     source = BURSTS.replace(
         "DMA_LIFCR(DMA2_BASE) = 0x3D;",
         "if (n == 9) { DMA_LIFCR(DMA2_BASE) = 0x3D; T_CR1(TIM3_BASE) = 0; }",
@@ -193,7 +191,7 @@ def test_a_dma_flag_stays_until_it_is_cleared() -> None:
     assert told[2 * 9] - told[0] < 20  # all at once, not one a slot
 
 
-def test_an_overrun_stops_the_requests() -> None:
+def test_an_overrun_stops_the_requests():
     handler = (
         "void irq_18(void) { ++OUT[30]; OUT[31] = ADC_SR(ADC1_BASE); ADC_SR(ADC1_BASE) = 0;"
         " ADC_CR2(ADC1_BASE) = 1; }"
@@ -209,7 +207,7 @@ def test_an_overrun_stops_the_requests() -> None:
     assert sum(map(len, times)) == 2  # the second result found the first one unread
 
 
-def test_a_converter_that_is_triggered_too_fast_skips() -> None:
+def test_a_converter_that_is_triggered_too_fast_skips():
     board, times = watched(
         BURSTS % CHAIN.replace("107; TIM_CNT(TIM2_BASE) = 54", "26; TIM_CNT(TIM2_BASE) = 13"), 400
     )
@@ -220,7 +218,7 @@ def test_a_converter_that_is_triggered_too_fast_skips() -> None:
     assert board.adc.ignored_triggers > 50
 
 
-def test_dma_into_no_memory_is_an_error() -> None:
+def test_dma_into_no_memory_is_an_error():
     source = BURSTS % CHAIN.replace("0x20011000u", "0x60001000u").replace(
         "| DMA_CR_TCIE", "| DMA_CR_TEIE"
     )
@@ -232,14 +230,14 @@ def test_dma_into_no_memory_is_an_error() -> None:
     assert board.record.interrupts[72] == 1
 
 
-def test_dma_on_cached_memory_is_told() -> None:
+def test_dma_on_cached_memory_is_told():
     cached = "SCB_CCR |= 1u << 16;" + CHAIN
     assert not watched(BURSTS % cached, 300)[0].record.hazards
     hazards = watched(BURSTS % cached.replace("0x20011000u", "0x20031000u"), 300)[0].record.hazards
     assert hazards == {"DMA2: stream 0 on cached memory": 1}
 
 
-def test_a_pin_that_is_not_analog_reads_nothing() -> None:
+def test_a_pin_that_is_not_analog_reads_nothing():
     source = CLOCK + BURSTS % CHAIN.replace("GPIO_MODER(GPIOA_BASE) |= 3u << 6;", "")
     board = EmulatedBoard(compile_program(source, (56,)), flat_skin())
     board.run_until(300 * TICKS_PER_US)

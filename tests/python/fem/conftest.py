@@ -24,7 +24,7 @@ def l_skin() -> Skin:
 
 
 @pytest.fixture(scope="session")
-def l_mesh(l_skin: Skin) -> Mesh:
+def l_mesh(l_skin) -> Mesh:
     return build_mesh(l_skin, max_size_mm=5.0)
 
 

@@ -3,8 +3,6 @@
 import subprocess
 import sys
 from math import pi
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,9 +31,7 @@ def _slope(sizes: list[float], errors: list[float]) -> float:
 @pytest.mark.parametrize(
     ("radius_mm", "inside"), [(48.5, 0.09), (48.5, 0.001), (80.0, 0.05), (48.5, 0.01)]
 )
-def test_concentric_inclusion_converges_to_the_exact_series(
-    radius_mm: float, inside: float
-) -> None:
+def test_concentric_inclusion_converges_to_the_exact_series(radius_mm, inside):
     """Second order in the size, on meshes that follow the inclusion's rim."""
     skin = Skin("turned", disk(194.0), Electrodes(16, 194 * pi / 64, start_angle_deg=360 / 128))
     protocol = adjacent(16)
@@ -59,7 +55,7 @@ def test_concentric_inclusion_converges_to_the_exact_series(
     assert 1.7 < _slope(sizes, errors) < 2.4
 
 
-def test_netgen_meshes_converge_to_the_exact_series() -> None:
+def test_netgen_meshes_converge_to_the_exact_series():
     skin, protocol = paper_skin(), adjacent(16)
     exact = exact_voltages(skin, protocol, 9.0, 0.01)
     counts, errors = [], []
@@ -77,7 +73,7 @@ def test_netgen_meshes_converge_to_the_exact_series() -> None:
     assert _relative(smaller, forward.voltages(0.01)) < 1e-4  # the impedance no longer enters
 
 
-def test_32_electrodes_opposite_drive_against_the_series() -> None:
+def test_32_electrodes_opposite_drive_against_the_series():
     skin = Skin(
         "many",
         disk(100.0),
@@ -92,7 +88,7 @@ def test_32_electrodes_opposite_drive_against_the_series() -> None:
     assert _relative(forward.voltages(1.3), exact) < 2e-3
 
 
-def test_driven_electrodes_see_their_contacts(paper_mesh: Mesh) -> None:
+def test_driven_electrodes_see_their_contacts(paper_mesh):
     """Under a large impedance, a driven pair's voltage rises by 2 dz / area per ampere."""
     protocol = table(16, [[0, 5, 0, 5], [0, 5, 5, 0]], current_a=1e-3)
     forward = ForwardModel(paper_mesh, paper_skin(), protocol)
@@ -167,9 +163,7 @@ def _solved_by_scikit_fem(
 
 @pytest.mark.parametrize("impedance", [0.01, 1e-4, 10.0, 0.0, "mixed", "mixed, ground shunted"])
 @pytest.mark.parametrize("shape", ["disk", "l"])
-def test_against_scikit_fem(
-    impedance: Any, shape: str, paper_mesh: Mesh, l_skin: Skin, l_mesh: Mesh
-) -> None:
+def test_against_scikit_fem(impedance, shape, paper_mesh, l_skin, l_mesh):
     skin, mesh = (paper_skin(), paper_mesh) if shape == "disk" else (l_skin, l_mesh)
     rng = np.random.default_rng(5)
     count = skin.electrodes.count
@@ -192,7 +186,7 @@ def test_against_scikit_fem(
 
 
 @pytest.mark.parametrize("impedance", [0.0, 1e-3, 1.0])
-def test_reciprocity_to_rounding(impedance: float, paper_mesh: Mesh) -> None:
+def test_reciprocity_to_rounding(impedance, paper_mesh):
     rng = np.random.default_rng(6)
     conductivity = 10 ** rng.uniform(-3, -1, paper_mesh.n_elements)
     for protocol in (adjacent(16), skip(16, 3)):
@@ -204,7 +198,7 @@ def test_reciprocity_to_rounding(impedance: float, paper_mesh: Mesh) -> None:
         assert np.abs(difference).max() < 1e-11 * np.abs(voltages).max()
 
 
-def test_every_protocol_reads_the_same_potentials(paper_mesh: Mesh) -> None:
+def test_every_protocol_reads_the_same_potentials(paper_mesh):
     """A table with more pairs than electrodes sums neighbours' pairs up; each row must agree with
     itself alone."""
     pairs = [(a, b) for a in range(16) for b in range(a + 1, 16)]
@@ -231,7 +225,7 @@ def test_every_protocol_reads_the_same_potentials(paper_mesh: Mesh) -> None:
             assert voltages[row] == pytest.approx(float(alone.voltages(0.01)[0]), rel=1e-8)
 
 
-def test_work_is_counted_and_patterns_kept(paper_mesh: Mesh) -> None:
+def test_work_is_counted_and_patterns_kept(paper_mesh):
     forward = ForwardModel(paper_mesh, paper_skin(), adjacent(16))
     assert forward.counters == Counters(1, 0, 0)
     first = forward.voltages(0.01)
@@ -244,7 +238,7 @@ def test_work_is_counted_and_patterns_kept(paper_mesh: Mesh) -> None:
     assert forward.counters.patterns == 3
 
 
-def test_scaling_laws(paper_mesh: Mesh) -> None:
+def test_scaling_laws(paper_mesh):
     """Voltages go with the current, and inversely with the thickness."""
     skin = paper_skin()
     base = ForwardModel(paper_mesh, skin, adjacent(16)).voltages(0.01)
@@ -256,7 +250,7 @@ def test_scaling_laws(paper_mesh: Mesh) -> None:
     assert (base[:13] < 0).all()  # towards the current's exit the potential falls
 
 
-def test_impedance_tends_to_the_shunt(paper_mesh: Mesh) -> None:
+def test_impedance_tends_to_the_shunt(paper_mesh):
     forward = ForwardModel(paper_mesh, paper_skin(), adjacent(16), 0.0)
     shunt = forward.voltages(0.01)
     gaps = [_relative(forward.voltages(0.01, z), shunt) for z in (1e-4, 1e-5, 1e-6)]
@@ -283,17 +277,17 @@ def test_impedance_tends_to_the_shunt(paper_mesh: Mesh) -> None:
         (0.01, np.full(3, 0.1), "shape"),
     ],
 )
-def test_refused(conductivity: Any, impedance: Any, message: str, paper_mesh: Mesh) -> None:
+def test_refused(conductivity, impedance, message, paper_mesh):
     with pytest.raises(UsageError, match=message):
         ForwardModel(paper_mesh, paper_skin(), adjacent(16)).voltages(conductivity, impedance)
 
 
-def test_refused_protocol(paper_mesh: Mesh) -> None:
+def test_refused_protocol(paper_mesh):
     with pytest.raises(ProtocolError, match="8 electrodes, but skin 'paper' has 16"):
         ForwardModel(paper_mesh, paper_skin(), adjacent(8))
 
 
-def test_kit4_reference_frame(shared_data: Path) -> None:
+def test_kit4_reference_frame(shared_data):
     """The tank's measured saline frame: the voltages' shape, scale left free as the conductivity is
     not stated."""
     with np.load(shared_data / "kit4_dev.npz") as data:
@@ -317,7 +311,7 @@ def test_kit4_reference_frame(shared_data: Path) -> None:
     assert misfit[5e-3] < 1.2 * noise  # about the measurement's own lack of reciprocity
 
 
-def test_polygons_end_to_end(rounded_skin: Skin, l_skin: Skin) -> None:
+def test_polygons_end_to_end(rounded_skin, l_skin):
     """Refining the mesh of a custom outline changes its voltages little, and ever less."""
     for skin in (rounded_skin, l_skin):
         protocol = adjacent(skin.electrodes.count)
@@ -333,7 +327,7 @@ def test_polygons_end_to_end(rounded_skin: Skin, l_skin: Skin) -> None:
         assert fine < 0.006  # the L's inner corner slows it down
 
 
-def test_without_scipy() -> None:
+def test_without_scipy():
     """Skins, grids and meshes do without scipy; the model says how to get it."""
     code = (
         "import sys; sys.modules['scipy'] = None\n"

@@ -23,7 +23,7 @@ def ends_mm(mesh: Mesh, electrode: int) -> np.ndarray:
     return mesh.nodes_mm[[edges[0, 0], edges[-1, 1]]]
 
 
-def test_nothing_moves_by_nothing() -> None:
+def test_nothing_moves_by_nothing():
     mesh = mesh_of(ELL)
     d = Deformation(mesh)
     assert d.rim.length_mm == pytest.approx(ELL.perimeter_mm)
@@ -31,7 +31,7 @@ def test_nothing_moves_by_nothing() -> None:
     assert still.nodes_mm == pytest.approx(mesh.nodes_mm, abs=1e-9)
 
 
-def test_electrodes_of_a_disk_turn_along_the_rim() -> None:
+def test_electrodes_of_a_disk_turn_along_the_rim():
     mesh = mesh_of(disk(100.0))
     d = Deformation(mesh)
     shift, widths = np.linspace(-1, 1, 8), np.linspace(0.8, 1.2, 8)
@@ -44,7 +44,7 @@ def test_electrodes_of_a_disk_turn_along_the_rim() -> None:
     assert np.hypot(*moved.nodes_mm[d.rim.nodes].T) == pytest.approx(50, abs=0.05)
 
 
-def test_a_disk_grows_with_its_rim() -> None:
+def test_a_disk_grows_with_its_rim():
     """The movement inside is linear where the rim's is."""
     mesh = mesh_of(disk(100.0))
     d = Deformation(mesh)
@@ -53,7 +53,7 @@ def test_a_disk_grows_with_its_rim() -> None:
 
 
 @pytest.mark.parametrize("outline", [ELL, COMB], ids=["ell", "comb"])
-def test_corners_and_fingers_stay_whole(outline: Outline) -> None:
+def test_corners_and_fingers_stay_whole(outline):
     mesh = mesh_of(outline, 16)
     d, draw = Deformation(mesh), np.random.default_rng(3)
     for _ in range(5):
@@ -64,7 +64,7 @@ def test_corners_and_fingers_stay_whole(outline: Outline) -> None:
         assert 0.3 < np.sqrt(np.mean(step**2)) < 1.2
 
 
-def test_electrodes_never_meet() -> None:
+def test_electrodes_never_meet():
     mesh = mesh_of(disk(100.0))
     d = Deformation(mesh)
     shift = np.where(np.arange(8) % 2, 60.0, -60.0)
@@ -75,7 +75,7 @@ def test_electrodes_never_meet() -> None:
 
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("aspect", [1.0, 2.2])
-def test_shapes_change_as_much_as_their_disc(profile: str, aspect: float) -> None:
+def test_shapes_change_as_much_as_their_disc(profile, aspect):
     mesh = mesh_of(disk(100.0), elements=4000)
     cover = TouchCover(mesh)
     touch = ShapedTouch(8.0, -5.0, 12.0, 4.0, aspect, 0.7, profile)

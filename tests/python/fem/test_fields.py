@@ -13,7 +13,7 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import Skin
 
 
-def test_fields_are_those_of_the_jacobian() -> None:
+def test_fields_are_those_of_the_jacobian():
     """Differences of electrodes are the patterns' fields, to rounding; the product of the pixels'
     means is the mean of products but for what the fields change within a pixel."""
     skin = Skin(

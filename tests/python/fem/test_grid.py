@@ -6,11 +6,10 @@ import pytest
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.skin.outline import disk, polygon
-from eitskin.skin.skin import Skin
 
 
 @pytest.mark.parametrize(("across", "kept"), [(20, 316), (27, 577), (32, 812), (40, 1264)])
-def test_disk_counts(across: int, kept: int) -> None:
+def test_disk_counts(across, kept):
     grid = grid_for(disk(194.0), across)
     assert (grid.nx, grid.ny, grid.n_pixels) == (across, across, kept)
     assert grid.pixel_mm == pytest.approx(194 / across)
@@ -18,7 +17,7 @@ def test_disk_counts(across: int, kept: int) -> None:
     assert (np.hypot(*grid.centres_mm().T) <= 97).all()
 
 
-def test_order_is_row_by_row_from_below() -> None:
+def test_order_is_row_by_row_from_below():
     grid = grid_for(disk(194.0))
     flat = grid.index[:, 1] * grid.nx + grid.index[:, 0]
     assert (np.diff(flat) > 0).all()
@@ -30,7 +29,7 @@ def test_order_is_row_by_row_from_below() -> None:
     assert np.isnan(image).sum() == 32 * 32 - 812
 
 
-def test_image_there_and_back() -> None:
+def test_image_there_and_back():
     grid = grid_for(disk(100.0), 16)
     values = np.random.default_rng(1).normal(size=grid.n_pixels)
     assert np.array_equal(grid.values(grid.image(values)), values)
@@ -40,7 +39,7 @@ def test_image_there_and_back() -> None:
         grid.values(np.zeros((3, 3)))
 
 
-def test_a_place_is_in_the_pixel_around_it() -> None:
+def test_a_place_is_in_the_pixel_around_it():
     grid = grid_for(disk(100.0), 16)
     centres, kept = grid.centres_mm(), set(map(tuple, grid.index.tolist()))
     for step in [(-1, 0), (1, 0), (0, -1), (0, 1)]:
@@ -52,7 +51,7 @@ def test_a_place_is_in_the_pixel_around_it() -> None:
     assert grid.locate([(1e6, 0), (-50.1, 0), (0, 50.1)]).tolist() == [-1, -1, -1]
 
 
-def test_oblong_and_concave(l_skin: Skin) -> None:
+def test_oblong_and_concave(l_skin):
     grid = grid_for(polygon([(0, 0), (100, 0), (100, 33), (0, 33)]), 10)
     assert (grid.nx, grid.ny, grid.pixel_mm) == (10, 4, 10.0)
     assert grid.origin_mm == pytest.approx((0, -3.5))
@@ -63,6 +62,6 @@ def test_oblong_and_concave(l_skin: Skin) -> None:
 
 
 @pytest.mark.parametrize("across", [0, 3, 513, -1])
-def test_refused(across: int) -> None:
+def test_refused(across):
     with pytest.raises(UsageError, match="use 4 to 512"):
         grid_for(disk(10.0), across)

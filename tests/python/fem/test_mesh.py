@@ -64,7 +64,7 @@ def _check(mesh: Mesh, skin: Skin) -> None:
         seen |= nodes
 
 
-def test_disk(paper_mesh: Mesh) -> None:
+def test_disk(paper_mesh):
     skin = paper_skin()
     _check(paper_mesh, skin)
     rim = {n for edge in _rim_edges(paper_mesh) for n in edge}
@@ -76,19 +76,19 @@ def test_disk(paper_mesh: Mesh) -> None:
         np.testing.assert_allclose(ends, skin.outline.points_at(span), atol=1e-9)
 
 
-def test_l_shape(l_skin: Skin, l_mesh: Mesh) -> None:
+def test_l_shape(l_skin, l_mesh):
     _check(l_mesh, l_skin)
     assert l_mesh.areas_mm2.sum() == pytest.approx(5100, rel=1e-12)
     assert l_skin.outline.contains(l_mesh.centroids_mm()).all()
 
 
-def test_rounded_rectangle_given_clockwise(rounded_skin: Skin) -> None:
+def test_rounded_rectangle_given_clockwise(rounded_skin):
     mesh = build_mesh(rounded_skin, max_size_mm=6.0)
     _check(mesh, rounded_skin)
     assert mesh.areas_mm2.sum() == pytest.approx(rounded_skin.outline.area_mm2, rel=1e-12)
 
 
-def test_electrode_around_a_corner_and_ending_on_one() -> None:
+def test_electrode_around_a_corner_and_ending_on_one():
     square = polygon([(0, 0), (60, 0), (60, 60), (0, 60)])
     around = Skin("around", square, Electrodes(4, 10, start_angle_deg=45))
     mesh = build_mesh(around, max_size_mm=6.0)
@@ -105,7 +105,7 @@ def test_electrode_around_a_corner_and_ending_on_one() -> None:
     assert mesh.areas_mm2.min() > 0.05
 
 
-def test_electrodes_on_a_quarter_of_a_disk() -> None:
+def test_electrodes_on_a_quarter_of_a_disk():
     """The bare arc is longer than half of the rim: its nodes lie on the circle all the same."""
     places = tuple(2.5 + 5.0 * k for k in range(16))
     skin = Skin(
@@ -121,7 +121,7 @@ def test_electrodes_on_a_quarter_of_a_disk() -> None:
     assert np.count_nonzero(rim > 50 - 1e-3) > 314 / 6
 
 
-def test_sizes_are_obeyed_and_repeatable() -> None:
+def test_sizes_are_obeyed_and_repeatable():
     skin = paper_skin()
     coarse = build_mesh(skin, max_size_mm=12.0, electrode_size_mm=2.0)
     fine = build_mesh(skin, max_size_mm=12.0, electrode_size_mm=0.5)
@@ -145,9 +145,7 @@ def test_sizes_are_obeyed_and_repeatable() -> None:
     ids=lambda skin: skin.name,
 )
 @pytest.mark.parametrize("elements", [1000, 3000, 10500])
-def test_element_counts_in_one_go(
-    skin: Skin, elements: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_element_counts_in_one_go(skin, elements, monkeypatch):
     calls = []
     monkeypatch.setattr(
         mesh_module, "build_mesh", lambda *a, **k: (calls.append(k), build_mesh(*a, **k))[1]
@@ -157,7 +155,7 @@ def test_element_counts_in_one_go(
     assert len(calls) == 1
 
 
-def test_more_electrodes_than_elements_will_carry() -> None:
+def test_more_electrodes_than_elements_will_carry():
     skin = Skin("dense", disk(194), Electrodes(64, 4.0))
     mesh = mesh_for_elements(skin, 1000)
     assert abs(mesh.n_elements - 1000) < 400
@@ -165,7 +163,7 @@ def test_more_electrodes_than_elements_will_carry() -> None:
 
 
 @pytest.mark.parametrize("elements", [0, 199, 10**9])
-def test_refused_counts(elements: int) -> None:
+def test_refused_counts(elements):
     with pytest.raises(UsageError, match="use 200 to 200000"):
         mesh_for_elements(paper_skin(), elements)
 
@@ -174,7 +172,7 @@ def test_refused_counts(elements: int) -> None:
     ("size", "at_electrodes"),
     [(0.0, 1.0), (-1.0, 1.0), (5.0, 0.0), (1e-3, 1e-3), (float("nan"), 1.0)],
 )
-def test_refused_sizes(size: float, at_electrodes: float) -> None:
+def test_refused_sizes(size, at_electrodes):
     with pytest.raises(UsageError, match="mesh: sizes of"):
         build_mesh(paper_skin(), max_size_mm=size, electrode_size_mm=at_electrodes)
 
@@ -189,7 +187,7 @@ class _Recorded(subprocess.Popen[bytes]):
         self.started.append(self)
 
 
-def test_a_mesher_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesher_that_hangs_is_killed(monkeypatch):
     """Netgen never returns on a clockwise outline; ``polygon`` turns those, so the request is made
     by hand."""
     monkeypatch.setattr(_Recorded, "started", [], raising=False)
@@ -206,24 +204,24 @@ def test_a_mesher_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
         os.kill(child.pid, 0)
 
 
-def test_build_mesh_passes_its_time_on() -> None:
+def test_build_mesh_passes_its_time_on():
     with pytest.raises(GeometryError, match=r"skin 'paper': meshing took longer than 0\.001 s"):
         build_mesh(paper_skin(), max_size_mm=9.0, timeout_s=0.001)
 
 
-def test_a_mesher_that_fails_gives_one_line() -> None:
+def test_a_mesher_that_fails_gives_one_line():
     with pytest.raises(GeometryError, match=r"the mesher failed .*KeyError.*simplify") as caught:
         run_mesher({"pieces": []}, 30, "bad")
     assert "\n" not in str(caught.value)
 
 
-def test_without_netgen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_netgen(monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"netgen-mesher.*eitskin\[model\]"):
         build_mesh(paper_skin(), max_size_mm=9.0)
 
 
-def test_the_worker_starts_light() -> None:
+def test_the_worker_starts_light():
     code = (
         "import sys, eitskin.fem.mesh_worker, netgen.geom2d\nprint([m for m in ('scipy',"
         " 'matplotlib', 'eitskin.fem.mesh', 'eitskin.skin') if m in sys.modules])"
@@ -232,9 +230,7 @@ def test_the_worker_starts_light() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_files_in_the_working_directory_do_not_disturb(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_in_the_working_directory_do_not_disturb(tmp_path, monkeypatch):
     (tmp_path / "numpy.py").write_text("raise SystemExit('the wrong numpy')")
     (tmp_path / "netgen.py").write_text("raise SystemExit('the wrong netgen')")
     monkeypatch.chdir(tmp_path)

@@ -13,7 +13,7 @@ from eitskin.fem.grid import Grid, grid_for
 from eitskin.fem.mesh import Mesh, build_mesh
 from eitskin.fem.sensitivity import element_to_pixel, sensitivity
 from eitskin.skin.protocol import Protocol, adjacent, opposite, table
-from eitskin.skin.skin import Skin, paper_skin
+from eitskin.skin.skin import paper_skin
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def _check_pixels(forward: ForwardModel, sigma: FloatArray, grid: Grid, *pixels:
 
 @pytest.mark.parametrize("impedance", [0.01, 0.0])
 @pytest.mark.parametrize("protocol", ["adjacent", "opposite", "flipped", "all pairs"])
-def test_against_finite_differences(protocol: str, impedance: float, paper_mesh: Mesh) -> None:
+def test_against_finite_differences(protocol, impedance, paper_mesh):
     pairs = [(a, b) for a in range(16) for b in range(a + 1, 16)]
     made: Protocol = {
         "adjacent": adjacent(16),
@@ -57,13 +57,13 @@ def test_against_finite_differences(protocol: str, impedance: float, paper_mesh:
     _check_pixels(forward, sigma, grid_for(paper_skin().outline, 16), 0, 7, 60, 104)
 
 
-def test_custom_outline_against_finite_differences(l_skin: Skin, l_mesh: Mesh) -> None:
+def test_custom_outline_against_finite_differences(l_skin, l_mesh):
     sigma = np.full(l_mesh.n_elements, l_skin.conductivity_s_per_m)
     forward = ForwardModel(l_mesh, l_skin, adjacent(12))
     _check_pixels(forward, sigma, grid_for(l_skin.outline, 20), 0, 55, 130)
 
 
-def test_predicts_a_touch(paper_mesh: Mesh) -> None:
+def test_predicts_a_touch(paper_mesh):
     """A conductive spot of one pixel lowers the voltages near it as V + J ds says, to second order
     in ds."""
     grid = grid_for(paper_skin().outline)
@@ -79,7 +79,7 @@ def test_predicts_a_touch(paper_mesh: Mesh) -> None:
     assert errors[1] / errors[2] == pytest.approx(4, rel=0.15)
 
 
-def test_euler_identity_with_shunts(paper_mesh: Mesh) -> None:
+def test_euler_identity_with_shunts(paper_mesh):
     """Without contact impedance V is homogeneous of degree -1 in the conductivity, so the whole
     skin's J sigma = -V."""
     grid = _whole(grid_for(paper_skin().outline, 24))
@@ -88,7 +88,7 @@ def test_euler_identity_with_shunts(paper_mesh: Mesh) -> None:
     np.testing.assert_allclose(jacobian.sum(axis=1) * 0.01, -voltages, rtol=1e-9)
 
 
-def test_reciprocal_rows_and_chosen_rows(paper_mesh: Mesh) -> None:
+def test_reciprocal_rows_and_chosen_rows(paper_mesh):
     grid = grid_for(paper_skin().outline)
     protocol = adjacent(16)
     forward = ForwardModel(paper_mesh, paper_skin(), protocol)
@@ -106,7 +106,7 @@ def test_reciprocal_rows_and_chosen_rows(paper_mesh: Mesh) -> None:
     assert np.array_equal(weights.data, kept.data)
 
 
-def test_one_factorisation_and_each_pair_once(paper_mesh: Mesh) -> None:
+def test_one_factorisation_and_each_pair_once(paper_mesh):
     forward = ForwardModel(paper_mesh, paper_skin(), adjacent(16))
     sensitivity(forward, 0.01, grid_for(paper_skin().outline))
     assert forward.counters == Counters(1, 1, 16)
@@ -117,7 +117,7 @@ def test_one_factorisation_and_each_pair_once(paper_mesh: Mesh) -> None:
     assert forward.counters.solves == 3
 
 
-def test_a_symmetric_skin_has_a_symmetric_jacobian() -> None:
+def test_a_symmetric_skin_has_a_symmetric_jacobian():
     """A quarter turn of a skin with 16 electrodes turns pixels and rows alike, to the mesh's own
     asymmetry."""
     skin, protocol = paper_skin(), adjacent(16)
@@ -151,7 +151,7 @@ def _clipped_area(triangle: FloatArray, low: FloatArray, side: float) -> float:
     )
 
 
-def test_areas_against_clipping(l_mesh: Mesh, l_skin: Skin) -> None:
+def test_areas_against_clipping(l_mesh, l_skin):
     grid = grid_for(l_skin.outline, 23)
     weights = element_to_pixel(l_mesh, grid).toarray()
     low = np.asarray(grid.origin_mm) + grid.index * grid.pixel_mm
@@ -164,7 +164,7 @@ def test_areas_against_clipping(l_mesh: Mesh, l_skin: Skin) -> None:
 
 
 @pytest.mark.parametrize("across", [4, 32, 150])
-def test_areas_add_up(across: int, paper_mesh: Mesh) -> None:
+def test_areas_add_up(across, paper_mesh):
     grid = grid_for(paper_skin().outline, across)
     whole = element_to_pixel(paper_mesh, _whole(grid))
     np.testing.assert_allclose(np.asarray(whole.sum(axis=1)).ravel(), 1, rtol=1e-9)
@@ -178,7 +178,7 @@ def test_areas_add_up(across: int, paper_mesh: Mesh) -> None:
     assert covered.min() > 0.4
 
 
-def test_triangles_with_edges_along_the_grid() -> None:
+def test_triangles_with_edges_along_the_grid():
     """Right-angled triangles whose legs run exactly along pixel borders."""
     nodes = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0]])
     mesh = Mesh(nodes, np.array([[0, 1, 2], [1, 3, 2]]), ())
@@ -189,7 +189,7 @@ def test_triangles_with_edges_along_the_grid() -> None:
     )
 
 
-def test_refused_conductivity(paper_mesh: Mesh) -> None:
+def test_refused_conductivity(paper_mesh):
     forward = ForwardModel(paper_mesh, paper_skin(), adjacent(16))
     with pytest.raises(UsageError, match="above 0"):
         sensitivity(forward, 0.0, grid_for(paper_skin().outline))

@@ -66,11 +66,11 @@ class Capture:
 
 
 @pytest.fixture(scope="module")
-def elf(cortex_m7: Path) -> Path:
+def elf(cortex_m7) -> Path:
     return cortex_m7 / "firmware" / "eitskin_nucleo_f767zi.elf"
 
 
-def test_start_arms_everything(elf: Path) -> None:
+def test_start_arms_everything(elf):
     capture = Capture(elf, now=5000)
     image = capture.image
     assert capture.first - 5000 >= 20
@@ -81,7 +81,7 @@ def test_start_arms_everything(elf: Path) -> None:
     assert image.read(TIM3 + 0x2C) == SLOT_US - 1 and image.read(TIM3 + 0x34) == BURST_US
 
 
-def test_bursts_in_time_alternate_between_the_buffers(elf: Path) -> None:
+def test_bursts_in_time_alternate_between_the_buffers(elf):
     capture = Capture(elf)
     for slot in range(7):
         start = capture.first + SLOT_US * slot
@@ -93,8 +93,8 @@ def test_bursts_in_time_alternate_between_the_buffers(elf: Path) -> None:
 @pytest.mark.parametrize("missed", range(6))
 @pytest.mark.parametrize("late_us", [-1, 0, 4, 40, 97])
 def test_a_late_interrupt_tells_each_slot_once_and_only_the_last_is_whole(
-    elf: Path, now: int, missed: int, late_us: int
-) -> None:
+    elf, now, missed, late_us
+):
     capture = Capture(elf, now=now)
     slot = 0
     for skipped in (0, missed, 0, missed):
@@ -111,23 +111,21 @@ def test_a_late_interrupt_tells_each_slot_once_and_only_the_last_is_whole(
 
 
 @pytest.mark.parametrize("late_us", [-49, 0, 60])
-def test_at_a_slow_rate_too_where_a_burst_ends_before_its_last_period(
-    elf: Path, late_us: int
-) -> None:
+def test_at_a_slow_rate_too_where_a_burst_ends_before_its_last_period(elf, late_us):
     capture = Capture(elf, rate=10_000, slot_us=8100)
     told = capture.interrupt(2, capture.first + 8100 + 8000 + late_us)
     found = [(start - capture.first, lost) for start, _, _, lost in told]
     assert found == [(0, True), (8100, False)]
 
 
-def test_where_clock_and_buffer_disagree_the_buffer_is_believed(elf: Path) -> None:
+def test_where_clock_and_buffer_disagree_the_buffer_is_believed(elf):
     capture = Capture(elf)
     told = capture.interrupt(2, capture.first + BURST_US + 1)
     assert [lost for *_, lost in told] == [True, False] and told[-1][2] == 1
 
 
 @pytest.mark.parametrize("cause", ["transfer error", "overrun"])
-def test_a_failure_is_told_and_the_scan_goes_on_in_the_same_grid(elf: Path, cause: str) -> None:
+def test_a_failure_is_told_and_the_scan_goes_on_in_the_same_grid(elf, cause):
     capture = Capture(elf)
     image = capture.image
     capture.interrupt(1, capture.first + BURST_US)
@@ -148,14 +146,14 @@ def test_a_failure_is_told_and_the_scan_goes_on_in_the_same_grid(elf: Path, caus
     assert told == [(next_start, next_start + SLOT_US, 0, False)]
 
 
-def test_an_interrupt_of_the_converter_without_an_overrun_is_nothing(elf: Path) -> None:
+def test_an_interrupt_of_the_converter_without_an_overrun_is_nothing(elf):
     capture = Capture(elf)
     capture.image.write(ADC_SR, 1 << 1)
     capture.image.call("nucleo_adc_irq")
     assert capture.bursts == []
 
 
-def test_an_overrun_after_stop_does_not_interrupt_for_ever(elf: Path) -> None:
+def test_an_overrun_after_stop_does_not_interrupt_for_ever(elf):
     capture = Capture(elf)
     capture.stop()
     capture.image.write(ADC_SR, OVR)
@@ -163,7 +161,7 @@ def test_an_overrun_after_stop_does_not_interrupt_for_ever(elf: Path) -> None:
     assert capture.bursts == [] and capture.image.read(ADC_SR) == 0
 
 
-def test_after_stop_nothing_is_told(elf: Path) -> None:
+def test_after_stop_nothing_is_told(elf):
     capture = Capture(elf)
     capture.stop()
     assert capture.interrupt(1, capture.first + BURST_US) == []
@@ -188,11 +186,11 @@ def test_after_stop_nothing_is_told(elf: Path) -> None:
         (1_000_000, 80, 65_537, RANGE),
     ],
 )
-def test_settings(elf: Path, rate: int, samples: int, slot_us: int, status: int) -> None:
+def test_settings(elf, rate, samples, slot_us, status):
     capture = Capture(elf)
     capture.stop()
     assert capture.configure(rate, samples, slot_us) == status
 
 
-def test_no_settings_while_it_runs(elf: Path) -> None:
+def test_no_settings_while_it_runs(elf):
     assert Capture(elf).configure(1_000_000, 80, 100) == -1

@@ -2,7 +2,6 @@
 it."""
 
 import struct
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ FRAME = struct.pack(
 
 
 @pytest.fixture
-def image(cortex_m7: Path) -> BareImage:
+def image(cortex_m7) -> BareImage:
     return BareImage(cortex_m7 / "firmware" / "eitskin_nucleo_f767zi.elf")
 
 
@@ -41,7 +40,7 @@ def last_reset(image: BareImage) -> tuple[int, ...]:
 
 
 @pytest.mark.parametrize(("cfsr", "address"), [(0x82, 0x111), (0x8200, 0x222), (0x10000, 0)])
-def test_a_fault_is_told_once_after_the_reset(image: BareImage, cfsr: int, address: int) -> None:
+def test_a_fault_is_told_once_after_the_reset(image, cfsr, address):
     frame = image.symbols["stack_top"] - 64
     image.write_bytes(frame, FRAME)
     crash(image, frame, cfsr, 1 << 30)
@@ -49,7 +48,7 @@ def test_a_fault_is_told_once_after_the_reset(image: BareImage, cfsr: int, addre
     assert last_reset(image) == (0, 0, 0, 0, 0, 0, 0)
 
 
-def test_an_unexpected_interrupt_is_told_by_its_number(image: BareImage) -> None:
+def test_an_unexpected_interrupt_is_told_by_its_number(image):
     frame = image.symbols["stack_top"] - 64
     image.write_bytes(frame, FRAME)
     crash(image, frame, 0)
@@ -57,7 +56,7 @@ def test_an_unexpected_interrupt_is_told_by_its_number(image: BareImage) -> None
 
 
 @pytest.mark.parametrize("frame", ["below the guard", "above the stack", "stacking failed"])
-def test_no_frame_is_read_where_none_is(image: BareImage, frame: str) -> None:
+def test_no_frame_is_read_where_none_is(image, frame):
     """A stack that overflowed: reading there would be a second fault."""
     bottom, top = image.symbols["stack_bottom"], image.symbols["stack_top"]
     at = {
@@ -71,7 +70,7 @@ def test_no_frame_is_read_where_none_is(image: BareImage, frame: str) -> None:
     assert last_reset(image)[:5] == (1, 0, 0, 0, cfsr)
 
 
-def test_random_memory_after_power_up_is_no_crash(image: BareImage) -> None:
+def test_random_memory_after_power_up_is_no_crash(image):
     rng = np.random.default_rng(1)
     for _ in range(20):
         image.write_bytes(image.symbols["crash"], rng.bytes(28))
@@ -80,7 +79,7 @@ def test_random_memory_after_power_up_is_no_crash(image: BareImage) -> None:
     assert last_reset(image)[0] == 0
 
 
-def test_the_watchdog_is_told_and_its_flag_cleared(image: BareImage) -> None:
+def test_the_watchdog_is_told_and_its_flag_cleared(image):
     image.write(RCC_CSR, 1 << 29)
     assert last_reset(image)[:2] == (0, 1)
     assert image.read(RCC_CSR) & 1 << 24, "RMVF"

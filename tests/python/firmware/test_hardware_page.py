@@ -44,7 +44,7 @@ def place(wire: Wire) -> str:
     return ", ".join(filter(None, (wire.pin, wire.zio, wire.morpho)))
 
 
-def test_the_page_has_both_tables() -> None:
+def test_the_page_has_both_tables():
     at = {wire.to: place(wire) for wire in WIRES}
     table = ["| ADG1206 | A0 | A1 | A2 | A3 | EN |", f"|{6 * '---|'}"]
     for name in MULTIPLEXERS:
@@ -57,7 +57,7 @@ def test_the_page_has_both_tables() -> None:
     assert "\n".join(table) + "\n\n" in PAGE
 
 
-def test_the_firmware_uses_these_pins_and_no_others() -> None:
+def test_the_firmware_uses_these_pins_and_no_others():
     expected = {
         wire.pin: MODES.get(wire.function.split(",")[0].split()[0], ("PIN_OUTPUT", 0))
         for wire in WIRES
@@ -65,7 +65,7 @@ def test_the_firmware_uses_these_pins_and_no_others() -> None:
     assert firmware_pins() == expected
 
 
-def test_the_lines_are_in_the_order_of_the_hal() -> None:
+def test_the_lines_are_in_the_order_of_the_hal():
     """Lines 0-3 are A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V-
     (firmware/hal/hal.h)."""
     to = {wire.pin: wire.to for wire in WIRES}
@@ -75,7 +75,7 @@ def test_the_lines_are_in_the_order_of_the_hal() -> None:
             assert to[f"PE{4 * number + address}"] == f"ADG1206 {name} A{address}"
 
 
-def test_no_place_is_taken_twice() -> None:
+def test_no_place_is_taken_twice():
     for places in (
         [w.pin for w in WIRES],
         [w.zio for w in WIRES if w.zio],
@@ -84,7 +84,7 @@ def test_no_place_is_taken_twice() -> None:
         assert len(places) == len(set(places))
 
 
-def test_the_flash_map_is_the_linkers_and_the_stores() -> None:
+def test_the_flash_map_is_the_linkers_and_the_stores():
     script = (BOARD / "nucleo_f767zi.ld").read_text(encoding="utf-8")
     store = (BOARD / "store.c").read_text(encoding="utf-8")
     assert "ORIGIN = 0x08000000, LENGTH = 256K" in script and "| 0x08000000 | 256 KB" in PAGE
@@ -92,7 +92,7 @@ def test_the_flash_map_is_the_linkers_and_the_stores() -> None:
     assert "| 0x08040000 | 512 KB" in PAGE and "| 0x080C0000 | 512 KB" in PAGE
 
 
-def test_the_drawing_repeats_byte_for_byte(tmp_path: Path) -> None:
+def test_the_drawing_repeats_byte_for_byte(tmp_path):
     from eitskin_studies.pictures.wiring_picture import draw_wiring
 
     files = [tmp_path / "a.png", tmp_path / "b.png"]

@@ -36,12 +36,12 @@ def arm(tool: str, *arguments: object) -> str:
 
 
 @pytest.fixture(scope="session")
-def elf(cortex_m7: Path) -> Path:
+def elf(cortex_m7) -> Path:
     return cortex_m7 / "firmware" / f"{IMAGE}.elf"
 
 
 @pytest.fixture(scope="session")
-def symbols(elf: Path) -> dict[str, int]:
+def symbols(elf) -> dict[str, int]:
     return {
         name: int(value, 16)
         for value, name in re.findall(r"^([0-9a-f]{8}) \w (\S+)$", arm("nm", elf), re.M)
@@ -49,13 +49,13 @@ def symbols(elf: Path) -> dict[str, int]:
 
 
 @pytest.fixture(scope="session")
-def sections(elf: Path) -> dict[str, tuple[int, int]]:
+def sections(elf) -> dict[str, tuple[int, int]]:
     """Size and address of each section that is loaded or set up."""
     found = re.findall(r"^(\.\S+)\s+(\d+)\s+(\d+)$", arm("size", "-A", elf), re.M)
     return {name: (int(size), int(address)) for name, size, address in found if int(address)}
 
 
-def test_vectors(elf: Path, symbols: dict[str, int]) -> None:
+def test_vectors(elf, symbols):
     image = elf.with_suffix(".bin").read_bytes()
     vectors = struct.unpack(
         "<126I", image[: 4 * 126]
@@ -74,7 +74,7 @@ def test_vectors(elf: Path, symbols: dict[str, int]) -> None:
     )  # VTOR: aligned to the table's size, a power of two
 
 
-def test_places_in_memory(sections: dict[str, tuple[int, int]], symbols: dict[str, int]) -> None:
+def test_places_in_memory(sections, symbols):
     for name, (size, address) in sections.items():
         ends = [start + room for start, room in MEMORIES if start <= address < start + room]
         assert ends and address + size <= ends[0], name
@@ -91,7 +91,7 @@ def test_places_in_memory(sections: dict[str, tuple[int, int]], symbols: dict[st
     assert symbols["workspace_start"] % 16 == 0 and symbols["workspace_start"] >= symbols["bss_end"]
 
 
-def test_what_the_image_does_without(symbols: dict[str, int]) -> None:
+def test_what_the_image_does_without(symbols):
     for name in symbols:
         assert not re.search(r"alloc|printf|sbrk|^free$|^exit$|fwrite|fopen", name), name
         assert not re.search(r"__aeabi_d(?!iv0)|df[23]$|df$|f2d", name), (
@@ -99,7 +99,7 @@ def test_what_the_image_does_without(symbols: dict[str, int]) -> None:
         )
 
 
-def test_sizes(elf: Path, sections: dict[str, tuple[int, int]], symbols: dict[str, int]) -> None:
+def test_sizes(elf, sections, symbols):
     image = elf.with_suffix(".bin").stat().st_size
     stack, workspace = (
         symbols["stack_top"] - symbols["stack_bottom"],
@@ -119,7 +119,7 @@ def test_sizes(elf: Path, sections: dict[str, tuple[int, int]], symbols: dict[st
     assert f"0x{symbols['stack_top']:08x}" in elf.with_suffix(".map").read_text(encoding="utf-8")
 
 
-def test_the_same_bytes_wherever_it_is_built(elf: Path, tmp_path: Path) -> None:
+def test_the_same_bytes_wherever_it_is_built(elf, tmp_path):
     """In a copy of the checkout with another path, in a folder of another name."""
     copy = tmp_path / "a checkout elsewhere"
     for name in ("csrc", "firmware", "cmake", "tests/emulated", "tests/soak"):

@@ -1,7 +1,5 @@
 """The multiplexers' lines on their ports: one store a port, nothing but what was asked for."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from bare_image import BareImage
@@ -12,7 +10,7 @@ ADDRESSES, ENABLES = 0x0000FFFF, 0x000F0000
 
 
 @pytest.fixture(scope="module")
-def image(cortex_m7: Path) -> BareImage:
+def image(cortex_m7) -> BareImage:
     return BareImage(cortex_m7 / "firmware" / "eitskin_nucleo_f767zi.elf")
 
 
@@ -24,7 +22,7 @@ def write(image: BareImage, mask: int, levels: int) -> tuple[int, int, int]:
     return status, image.read(PORT_E_BSRR), image.read(PORT_F_BSRR)
 
 
-def test_lines_take_their_levels(image: BareImage) -> None:
+def test_lines_take_their_levels(image):
     rng = np.random.default_rng(2)
     for mask in (ADDRESSES, ENABLES, ADDRESSES | ENABLES, 0x00010, 0x80000, 0):
         for levels in map(int, rng.integers(0, 2**20, 8)):
@@ -35,11 +33,11 @@ def test_lines_take_their_levels(image: BareImage) -> None:
             assert port_f == (high >> 16) << ENABLE_PIN | (low >> 16) << (ENABLE_PIN + 16)
 
 
-def test_lines_that_are_not_there_are_refused(image: BareImage) -> None:
+def test_lines_that_are_not_there_are_refused(image):
     assert write(image, 1 << 20, 0) == (-1, 0, 0)
 
 
-def test_nothing_is_connected_before_the_pins_are_outputs(image: BareImage) -> None:
+def test_nothing_is_connected_before_the_pins_are_outputs(image):
     image.call("nucleo_multiplexers_start")
     assert image.read(PORT_F_BSRR) == 0xF000 << 16
     assert image.read(0x40021400) >> 24 == 0x55 and image.read(0x40021000) == 0x55555555

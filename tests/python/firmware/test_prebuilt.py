@@ -5,7 +5,6 @@ import hashlib
 import json
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -31,7 +30,7 @@ def compiler() -> str:
     ).stdout.strip()
 
 
-def test_it_is_what_the_source_builds(cortex_m7: Path) -> None:
+def test_it_is_what_the_source_builds(cortex_m7):
     folder = ROOT / "python" / "eitskin" / "firmware"
     manifest = Manifest(**json.loads((folder / MANIFEST).read_text(encoding="utf-8")))
     image = (folder / IMAGE).read_bytes()
@@ -49,13 +48,13 @@ def test_it_is_what_the_source_builds(cortex_m7: Path) -> None:
         )
 
 
-def test_the_installed_one_is_the_same() -> None:
+def test_the_installed_one_is_the_same():
     image, manifest = load_image()
     assert image == (ROOT / "python" / "eitskin" / "firmware" / IMAGE).read_bytes()
     assert len(image) == manifest.image_bytes
 
 
-def test_ship_writes_both_and_a_changed_source_shows(tmp_path: Path) -> None:
+def test_ship_writes_both_and_a_changed_source_shows(tmp_path):
     for name in SOURCES:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, tmp_path / name)
@@ -71,9 +70,7 @@ def test_ship_writes_both_and_a_changed_source_shows(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["image", "manifest", "absent"])
-def test_a_damaged_installation_is_refused(
-    damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_damaged_installation_is_refused(damage, tmp_path, monkeypatch):
     image, _ = load_image()
     folder = ROOT / "python" / "eitskin" / "firmware"
     manifest = (folder / MANIFEST).read_text(encoding="utf-8")

@@ -60,7 +60,7 @@ def volts() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def image(cortex_m7: Path) -> Path:
+def image(cortex_m7) -> Path:
     return cortex_m7 / "firmware" / "eitskin_mps2_an500.elf"
 
 
@@ -82,17 +82,17 @@ def files() -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def run(image: Path, files: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory) -> Run:
+def run(image, files, tmp_path_factory) -> Run:
     return run_board(image, tmp_path_factory.mktemp("run"), files)
 
 
-def test_every_packet_arrives_and_every_command_succeeds(run: Run) -> None:
+def test_every_packet_arrives_and_every_command_succeeds(run):
     assert vars(run.counters) | {"bytes": 0, "packets": 0} == dict.fromkeys(vars(run.counters), 0)
     assert [reply.request for reply in of(Reply, run.packets) if reply.ok] == [2, 3, 4]
     assert of(Fault, run.packets) == []
 
 
-def test_the_scan_keeps_its_time(run: Run) -> None:
+def test_the_scan_keeps_its_time(run):
     (stats,) = of(BoardStats, run.packets)
     info = of(BoardInfo, run.packets)[-1]
     assert info.board == "mps2_an500" and info.slot_us == 100
@@ -106,7 +106,7 @@ def test_the_scan_keeps_its_time(run: Run) -> None:
     assert stats.stack_used < 18 * 1024  # the F767 has 24 KB
 
 
-def test_the_voltages_are_the_skins(run: Run) -> None:
+def test_the_voltages_are_the_skins(run):
     """Amplitudes within half a step of the converter, signs and order as the protocol has them."""
     quiet = [raw for raw in of(RawFrame, run.packets) if raw.quiet]
     assert len(quiet) == 8
@@ -116,7 +116,7 @@ def test_the_voltages_are_the_skins(run: Run) -> None:
         assert np.abs(raw.voltage_v - expected).max() < LSB_V / 2
 
 
-def test_the_same_bits_as_the_host(run: Run) -> None:
+def test_the_same_bits_as_the_host(run):
     model, blob = load_prebuilt()
     host = CoreEngine(blob)
     host.set_options(board_options(model, of(BoardInfo, run.packets)[-1]))
@@ -145,13 +145,11 @@ def test_the_same_bits_as_the_host(run: Run) -> None:
     assert found >= 4
 
 
-def test_runs_are_alike_to_the_bit(
-    image: Path, files: dict[str, bytes], run: Run, tmp_path: Path
-) -> None:
+def test_runs_are_alike_to_the_bit(image, files, run, tmp_path):
     assert run_board(image, tmp_path, files).output == run.output
 
 
-def test_a_model_is_uploaded_into_an_empty_board(image: Path, tmp_path: Path) -> None:
+def test_a_model_is_uploaded_into_an_empty_board(image, tmp_path):
     _, blob = load_prebuilt()
     script, each, step_us = Script(), 4096, 2_000
     script.at(10_000, GetInfo())

@@ -99,7 +99,7 @@ def register_of(name: str) -> tuple[str, Register] | None:
     return ours, source.peripherals[key].registers[RENAMED.get(ours, parts[1])]
 
 
-def test_everything_in_the_header_was_read() -> None:
+def test_everything_in_the_header_was_read():
     defined = set(re.findall(r"^#define (\w+)", TEXT, re.M)) - {"STM32F767_H", "REG32", "REG16"}
     read = (
         {f"{name}_BASE" for name in BASES}
@@ -113,7 +113,7 @@ def test_everything_in_the_header_was_read() -> None:
     assert len(REGISTERS) > 80 and len(BITS) > 80 and len(POSITIONS) > 20
 
 
-def test_everything_in_the_header_is_used() -> None:
+def test_everything_in_the_header_is_used():
     program = "".join(path.read_text(encoding="utf-8") for path in sorted(BOARD.glob("*.c")))
     program += (BOARD / "nucleo.h").read_text(encoding="utf-8")
     lines = TEXT.splitlines()
@@ -125,7 +125,7 @@ def test_everything_in_the_header_is_used() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(BASES))
-def test_base(name: str) -> None:
+def test_base(name):
     if name in ADDRESSES:
         assert BASES[name] == ADDRESSES[name]
         return
@@ -134,7 +134,7 @@ def test_base(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(REGISTERS))
-def test_register(name: str) -> None:
+def test_register(name):
     owner, offset = REGISTERS[name]
     if name in DWT_OFFSETS:
         assert (owner, offset) == ("DWT_BASE", DWT_OFFSETS[name])
@@ -151,7 +151,7 @@ def test_register(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(BITS | POSITIONS))
-def test_field(name: str) -> None:
+def test_field(name):
     bit = (BITS | POSITIONS)[name]
     if name in ONLY_F7:
         assert bit == ONLY_F7[name]
@@ -169,24 +169,24 @@ def test_field(name: str) -> None:
     assert name in RENAMED or (width == 1) == (name in BITS), f"{field} has {width} bits"
 
 
-def test_registers_of_one_stream_are_0x18_apart() -> None:
+def test_registers_of_one_stream_are_0x18_apart():
     registers = device(F4).peripherals["DMA2"].registers
     for stream in range(4):
         assert registers[f"S{stream}CR"].offset == 0x10 + 0x18 * stream
     assert TEXT.count("+ 0x18u * (stream)") == 6
 
 
-def test_access_control_of_the_fpu() -> None:
+def test_access_control_of_the_fpu():
     assert BASES["SCB"] + REGISTERS["SCB_CPACR"][1] == device(L4).peripherals["FPU_CPACR"].base
 
 
-def test_reset_request() -> None:
+def test_reset_request():
     """The key 0x05FA in the upper half, and SYSRESETREQ (PM0253 4.3.5)."""
     bit = device(L4).peripherals["SCB"].registers["AIRCR"].fields["SYSRESETREQ"][0]
     assert f"0x05FA0000u | (1u << {bit})" in TEXT
 
 
-def test_interrupts() -> None:
+def test_interrupts():
     numbers = {
         name: int(value) for name, value in re.findall(r"^#define IRQ_(\w+) (\d+)u", TEXT, re.M)
     }

@@ -60,11 +60,11 @@ class Serial:
 
 
 @pytest.fixture(scope="module")
-def elf(cortex_m7: Path) -> Path:
+def elf(cortex_m7) -> Path:
     return cortex_m7 / "firmware" / "eitskin_nucleo_f767zi.elf"
 
 
-def test_baud_rate_and_directions(elf: Path) -> None:
+def test_baud_rate_and_directions(elf):
     image = Serial(elf).image
     assert 54_000_000 / image.read(0x4000480C) == 1_000_000
     assert image.read(RX + CR) & EN and not image.read(TX + CR) & EN
@@ -72,7 +72,7 @@ def test_baud_rate_and_directions(elf: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_byte_is_sent_once_and_in_order(elf: Path, seed: int) -> None:
+def test_every_byte_is_sent_once_and_in_order(elf, seed):
     serial, rng = Serial(elf), np.random.default_rng(seed)
     accepted, sent, refused = b"", b"", 0
     for _ in range(60):
@@ -92,14 +92,14 @@ def test_every_byte_is_sent_once_and_in_order(elf: Path, seed: int) -> None:
     assert sent == accepted and refused > 0
 
 
-def test_a_write_fits_wholly_or_not_at_all(elf: Path) -> None:
+def test_a_write_fits_wholly_or_not_at_all(elf):
     serial = Serial(elf)
     assert serial.write(bytes(TX_BYTES)) and not serial.write(b"x")
     assert len(serial.send()) == TX_BYTES
     assert serial.write(b"x") and serial.send() == b"x"
 
 
-def test_the_link_goes_on_after_a_failed_transfer(elf: Path) -> None:
+def test_the_link_goes_on_after_a_failed_transfer(elf):
     serial = Serial(elf)
     assert serial.write(b"lost") and serial.write(b"kept")
     assert serial.send(TEIF3) == b"lost"
@@ -107,7 +107,7 @@ def test_the_link_goes_on_after_a_failed_transfer(elf: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_byte_is_received_once_and_in_order(elf: Path, seed: int) -> None:
+def test_every_byte_is_received_once_and_in_order(elf, seed):
     serial, rng = Serial(elf), np.random.default_rng(seed)
     came, taken = b"", b""
     for _ in range(60):
@@ -121,7 +121,7 @@ def test_every_byte_is_received_once_and_in_order(elf: Path, seed: int) -> None:
     assert taken == came and len(came) > 2 * RX_BYTES
 
 
-def test_a_wrap_before_its_interrupt_is_waited_for(elf: Path) -> None:
+def test_a_wrap_before_its_interrupt_is_waited_for(elf):
     serial = Serial(elf)
     serial.receive(bytes(RX_BYTES - 2))
     assert len(serial.read(RX_BYTES)) == RX_BYTES - 2
@@ -131,7 +131,7 @@ def test_a_wrap_before_its_interrupt_is_waited_for(elf: Path) -> None:
     assert serial.read(100) == b"abcd"
 
 
-def test_after_an_overrun_only_what_comes_later_is_read(elf: Path) -> None:
+def test_after_an_overrun_only_what_comes_later_is_read(elf):
     serial = Serial(elf)
     serial.receive(bytes(RX_BYTES + 100))
     assert serial.read(100) == b""

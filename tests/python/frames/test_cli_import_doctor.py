@@ -4,7 +4,6 @@ import argparse
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -85,7 +84,7 @@ FAULTS: dict[str, Callable[[], Frames]] = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_the_advice_mends(tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str) -> None:
+def test_the_advice_mends(tmp_path, capsys, fault):
     path, repaired = write(tmp_path / "s.npz", FAULTS[fault]()), tmp_path / "repaired.npz"
     assert run("doctor", path, *NPZ, *ADJACENT, "--json") == 11
     advice = json.loads(capsys.readouterr().out)["repair"].split()
@@ -94,9 +93,7 @@ def test_the_advice_mends(tmp_path: Path, capsys: pytest.CaptureFixture[str], fa
     assert run("doctor", repaired, "--json") == 0, capsys.readouterr().out
 
 
-def test_numbering_is_advised_by_known_touches_and_mends(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_numbering_is_advised_by_known_touches_and_mends(tmp_path, capsys):
     (tmp_path / "skin.toml").write_text(SKIN)
     turned = as_if_electrodes(healthy_frames(13), electrode_map(16, 5, True), seed=13)
     path, repaired = (
@@ -120,7 +117,7 @@ def test_numbering_is_advised_by_known_touches_and_mends(
     assert run("doctor", tmp_path / "m2.npz", *touch) == 0
 
 
-def test_import_says_what_it_wrote(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_import_says_what_it_wrote(tmp_path, capsys):
     path = write(tmp_path / "s.npz", healthy_frames(14))
     words = ("import", path, "-o", tmp_path / "o.npz", *NPZ, *ADJACENT)
     assert run(*words, "--current-a", "0.002", "--json") == 0
@@ -135,9 +132,7 @@ def test_import_says_what_it_wrote(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "next: eitskin doctor" in capsys.readouterr().out
 
 
-def test_the_doctor_examines_frames_files_and_prints_evidence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_doctor_examines_frames_files_and_prints_evidence(tmp_path, capsys):
     path = tmp_path / "f.npz"
     save_frames(path, rotating(quiet_only(healthy_frames(15))))
     assert run("doctor", path) == 11
@@ -150,9 +145,7 @@ def test_the_doctor_examines_frames_files_and_prints_evidence(
     assert "0 faults, 0 notes: nothing must be repaired" in capsys.readouterr().out
 
 
-def test_sources_with_all_pairs_are_recognised_by_their_number(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_sources_with_all_pairs_are_recognised_by_their_number(tmp_path, capsys):
     frames = quiet_only(healthy_frames(16))
     rows = source_table("rotating-all", frames.protocol)
     values = np.full((len(rows), 2), 0.5)
@@ -167,7 +160,7 @@ def test_sources_with_all_pairs_are_recognised_by_their_number(
     assert report["repair"] == "--order rotating-all"
 
 
-def test_the_picture_is_drawn(tmp_path: Path) -> None:
+def test_the_picture_is_drawn(tmp_path):
     path = tmp_path / "f.npz"
     save_frames(path, dead(quiet_only(healthy_frames(17)), 3))
     assert run("doctor", path, "--picture", tmp_path / "p.png") == 11
@@ -194,9 +187,7 @@ def test_the_picture_is_drawn(tmp_path: Path) -> None:
         ((*ADJACENT, "--touch", "5,0"), "--touch needs --skin FILE"),
     ],
 )  # fmt: skip
-def test_bad_words_are_refused_in_one_line(
-    tmp_path: Path, words: tuple[Any, ...], said: str
-) -> None:
+def test_bad_words_are_refused_in_one_line(tmp_path, words, said):
     (tmp_path / "skin.toml").write_text(SKIN)
     path = write(tmp_path / "s.npz", healthy_frames(18))
     given = [tmp_path / "skin.toml" if word == "SKIN" else word for word in words]

@@ -4,7 +4,6 @@ named."""
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -72,7 +71,7 @@ def with_reference(frames: Frames, reference: FloatArray) -> Frames:
 
 
 @by_protocol
-def test_fifty_healthy_frames_raise_no_alarm(protocol: Protocol) -> None:
+def test_fifty_healthy_frames_raise_no_alarm(protocol):
     skin = skin_for(protocol)
     for seed in range(50):
         report = report_of(healthy_frames(seed, protocol, skin), skin)
@@ -82,7 +81,7 @@ def test_fifty_healthy_frames_raise_no_alarm(protocol: Protocol) -> None:
         assert report.measured["gain_spread"] == pytest.approx(0.02, abs=0.012)
 
 
-def test_noiseless_and_digitised_frames_raise_no_alarm() -> None:
+def test_noiseless_and_digitised_frames_raise_no_alarm():
     assert named(report_of(healthy_frames(1, gain=0, snr_db=300))) == []
     frames = healthy_frames(2)
     step = 2 * np.abs(frames.reference_voltage_v).max() / 4096
@@ -92,7 +91,7 @@ def test_noiseless_and_digitised_frames_raise_no_alarm() -> None:
     assert named(report_of(changed(frames, reference, voltage))) == []
 
 
-def test_finite_element_frames_with_uneven_contacts_raise_no_alarm() -> None:
+def test_finite_element_frames_with_uneven_contacts_raise_no_alarm():
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.mesh import mesh_for_elements
 
@@ -109,7 +108,7 @@ def test_finite_element_frames_with_uneven_contacts_raise_no_alarm() -> None:
 
 
 @by_protocol
-def test_rotating_order_is_recognised(protocol: Protocol) -> None:
+def test_rotating_order_is_recognised(protocol):
     skin = skin_for(protocol)
     index = match_rows(protocol.drive_measure, source_table("rotating", protocol)).index
     finding = only(permuted(healthy_frames(3, protocol, skin), index), "order", skin=skin)
@@ -119,7 +118,7 @@ def test_rotating_order_is_recognised(protocol: Protocol) -> None:
 
 
 @by_protocol
-def test_reversed_polarity_is_recognised(protocol: Protocol) -> None:
+def test_reversed_polarity_is_recognised(protocol):
     skin = skin_for(protocol)
     frames = times(healthy_frames(4, protocol, skin), np.float64(-1))
     one_sign = protocol.drive_measure[:, :2].tolist() != protocol.drive_measure[
@@ -129,7 +128,7 @@ def test_reversed_polarity_is_recognised(protocol: Protocol) -> None:
     assert finding.repair == "--sign reversed"
 
 
-def test_reversed_polarity_is_certain_once_a_channel_crosses_zero() -> None:
+def test_reversed_polarity_is_certain_once_a_channel_crosses_zero():
     frames = healthy_frames(4)
     voltage = -frames.voltage_v.copy()
     voltage[0, 6] = -0.2 * rms(frames)
@@ -140,13 +139,13 @@ def test_reversed_polarity_is_certain_once_a_channel_crosses_zero() -> None:
 
 
 @pytest.mark.parametrize("protocol", (opposite(16), skip(16, 2)), ids=("opposite", "skip2"))
-def test_magnitudes_are_recognised_where_signs_differ(protocol: Protocol) -> None:
+def test_magnitudes_are_recognised_where_signs_differ(protocol):
     frames = healthy_frames(5, protocol)
     magnitudes = changed(frames, np.abs(frames.reference_voltage_v), np.abs(frames.voltage_v))
     assert only(magnitudes, "magnitude").repair == "--sign magnitude"
 
 
-def test_magnitudes_of_adjacent_patterns_cannot_be_told_from_reversed() -> None:
+def test_magnitudes_of_adjacent_patterns_cannot_be_told_from_reversed():
     frames = healthy_frames(5)
     magnitudes = changed(frames, np.abs(frames.reference_voltage_v), np.abs(frames.voltage_v))
     finding = only(magnitudes, "reversed-or-magnitude")
@@ -157,14 +156,14 @@ def test_magnitudes_of_adjacent_patterns_cannot_be_told_from_reversed() -> None:
     ("rotate", "mirror", "option"),
     [(3, False, "--rotate 3"), (0, True, "--mirror"), (5, True, "--rotate 5 --mirror")],
 )
-def test_numbering_is_told_by_two_known_touches(rotate: int, mirror: bool, option: str) -> None:
+def test_numbering_is_told_by_two_known_touches(rotate, mirror, option):
     frames = as_if_electrodes(healthy_frames(6), electrode_map(16, rotate, mirror), seed=6)
     finding = only(frames, "numbering")
     assert finding.repair == option
     assert finding.evidence[option] > 0.98 > finding.evidence["as given"] + 0.05
 
 
-def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch() -> None:
+def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch():
     frames = as_if_electrodes(healthy_frames(6), electrode_map(16, 5, True), seed=6)
     report = report_of(quiet_only(frames))
     assert named(report) == []
@@ -177,13 +176,13 @@ def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch() -> N
     )
 
 
-def test_one_touch_leaves_its_mirror_image_and_says_so() -> None:
+def test_one_touch_leaves_its_mirror_image_and_says_so():
     report = report_of(healthy_frames(7, touches_mm=((0.0, 60.0),)))
     assert named(report) == []
     assert any("fits as given, but --mirror too" in text for text in report.untold)
 
 
-def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame() -> None:
+def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame():
     corners = [(-60.0, -40.0), (70.0, -40.0), (70.0, 30.0), (10.0, 60.0), (-60.0, 40.0)]
     skin = Skin("odd", polygon(corners), Electrodes(count=8))
     transfer = homogeneous(skin, 8).transfer_ohm
@@ -202,7 +201,7 @@ def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame() -> None:
 
 
 @pytest.mark.parametrize("firsts", [(0, 5), range(16)], ids=["two", "all"])
-def test_every_pair_of_exchanged_wires_is_named(firsts: Sequence[int]) -> None:
+def test_every_pair_of_exchanged_wires_is_named(firsts):
     frames = healthy_frames(9)
     for i, j in combinations(range(16), 2):
         if i not in firsts:
@@ -211,7 +210,7 @@ def test_every_pair_of_exchanged_wires_is_named(firsts: Sequence[int]) -> None:
         assert only(exchanged, "swapped-electrodes").repair == f"--swap {i},{j}"
 
 
-def test_two_exchanges_in_rotating_order_and_reversed_are_untangled() -> None:
+def test_two_exchanges_in_rotating_order_and_reversed_are_untangled():
     swapped = as_if_electrodes(healthy_frames(10), swap_map(16, [(3, 9), (1, 14)]), seed=10)
     index = match_rows(ROWS, source_table("rotating", adjacent(16))).index
     report = report_of(times(permuted(swapped, index), np.float64(-1)))
@@ -221,7 +220,7 @@ def test_two_exchanges_in_rotating_order_and_reversed_are_untangled() -> None:
 
 
 @pytest.mark.parametrize(("width_mm", "known"), [(4.0, True), (20.0, True), (1.5, False)])
-def test_joined_electrodes_are_named_whatever_their_width(width_mm: float, known: bool) -> None:
+def test_joined_electrodes_are_named_whatever_their_width(width_mm, known):
     skin = replace(PAPER, electrodes=replace(PAPER.electrodes, width_mm=width_mm))
     transfer = homogeneous(skin, 16).transfer_ohm
     for i, j in combinations(range(16), 2):
@@ -233,7 +232,7 @@ def test_joined_electrodes_are_named_whatever_their_width(width_mm: float, known
 
 
 @pytest.mark.parametrize(("driving", "measuring"), [(True, True), (True, False), (False, True)])
-def test_every_dead_electrode_is_named_with_its_side(driving: bool, measuring: bool) -> None:
+def test_every_dead_electrode_is_named_with_its_side(driving, measuring):
     for electrode in range(16):
         rng = np.random.default_rng(electrode)
         frames = healthy_frames(electrode)
@@ -253,7 +252,7 @@ def test_every_dead_electrode_is_named_with_its_side(driving: bool, measuring: b
         assert ("driving" in finding.text, "measuring" in finding.text) == (driving, measuring)
 
 
-def test_an_electrode_lost_in_a_frame_is_named() -> None:
+def test_an_electrode_lost_in_a_frame_is_named():
     frames = quiet_only(healthy_frames(11))
     voltage = frames.voltage_v.copy()
     voltage[:, (ROWS[:, :2] == 7).any(axis=1)] *= 1e-3
@@ -268,7 +267,7 @@ def test_an_electrode_lost_in_a_frame_is_named() -> None:
 
 
 @pytest.mark.parametrize("quantile", (0.9, 0.99))
-def test_saturated_channels_are_named(quantile: float) -> None:
+def test_saturated_channels_are_named(quantile):
     frames = healthy_frames(12)
     rail = float(np.quantile(np.abs(frames.reference_voltage_v), quantile))
     reference = np.clip(frames.reference_voltage_v, -rail, rail)
@@ -280,7 +279,7 @@ def test_saturated_channels_are_named(quantile: float) -> None:
     assert finding.evidence["rail_v"] == [pytest.approx(-rail)]
 
 
-def test_a_noisy_channel_a_stuck_one_and_a_noisy_electrode_are_named() -> None:
+def test_a_noisy_channel_a_stuck_one_and_a_noisy_electrode_are_named():
     frames, rng = healthy_frames(13), np.random.default_rng(13)
     sigma = 20e-3 * rms(frames)
     reference = frames.reference_voltage_v.copy()
@@ -300,14 +299,14 @@ def test_a_noisy_channel_a_stuck_one_and_a_noisy_electrode_are_named() -> None:
 
 
 @pytest.mark.parametrize(("snr_db", "severity"), [(40.0, "note"), (20.0, "fault")])
-def test_the_snr_is_measured_and_judged(snr_db: float, severity: str) -> None:
+def test_the_snr_is_measured_and_judged(snr_db, severity):
     report = report_of(quiet_only(healthy_frames(14, snr_db=snr_db, quiet=60, gain=0.0)))
     assert named(report) == [("snr", severity)]
     assert report.measured["snr_db"] == pytest.approx(snr_db, abs=0.5)
 
 
 @pytest.mark.parametrize(("drift", "severity"), [(0.01, "note"), (-0.03, "fault")])
-def test_drift_is_measured_and_judged(drift: float, severity: str) -> None:
+def test_drift_is_measured_and_judged(drift, severity):
     frames = healthy_frames(15)
     ramp = 1 + np.linspace(-drift / 2, drift / 2, len(frames.reference_voltage_v))
     finding = only(
@@ -316,7 +315,7 @@ def test_drift_is_measured_and_judged(drift: float, severity: str) -> None:
     assert finding.evidence["drift"] == pytest.approx(drift, rel=0.05)
 
 
-def test_gain_faults_are_told_apart() -> None:
+def test_gain_faults_are_told_apart():
     frames, rng = healthy_frames(16), np.random.default_rng(16)
     one = np.ones(208)
     one[40] = 1.4
@@ -335,7 +334,7 @@ def test_gain_faults_are_told_apart() -> None:
     assert found == [("gain-spread", "note"), ("reciprocity", "note")]
 
 
-def test_a_pair_that_breaks_reciprocity_is_named() -> None:
+def test_a_pair_that_breaks_reciprocity_is_named():
     frames = healthy_frames(17, gain=0.005)
     gains = np.ones(208)
     gains[[3, 65]] = 1.18, 0.86
@@ -346,7 +345,7 @@ def test_a_pair_that_breaks_reciprocity_is_named() -> None:
     assert finding.evidence["off"] == [3]
 
 
-def test_channels_of_the_wrong_sign_are_named() -> None:
+def test_channels_of_the_wrong_sign_are_named():
     frames = healthy_frames(18)
     some = np.ones(208)
     some[[17, 90]] = -1
@@ -357,7 +356,7 @@ def test_channels_of_the_wrong_sign_are_named() -> None:
     assert finding.evidence["channels"] == np.flatnonzero(of_pair).tolist()
 
 
-def test_values_that_are_no_numbers_are_counted_and_named() -> None:
+def test_values_that_are_no_numbers_are_counted_and_named():
     frames = healthy_frames(19)
     reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
     reference[3, 13], voltage[0, 100] = np.nan, np.inf
@@ -365,7 +364,7 @@ def test_values_that_are_no_numbers_are_counted_and_named() -> None:
     assert finding.evidence == {"channels": [13, 100], "frames": ["0"], "quiet_frames": [3]}
 
 
-def test_frames_that_cannot_be_examined_say_only_that() -> None:
+def test_frames_that_cannot_be_examined_say_only_that():
     frames, rng = healthy_frames(20), np.random.default_rng(20)
     only(times(frames, np.float64(0)), "no-signal")
     noise = changed(quiet_only(frames), np.abs(rng.normal(size=208))[None], np.zeros((0, 208)))
@@ -375,18 +374,18 @@ def test_frames_that_cannot_be_examined_say_only_that() -> None:
     assert finding.evidence["frames"] == ["0"] and "--complex-part" in finding.text
 
 
-def test_a_wrong_unit_is_noted() -> None:
+def test_a_wrong_unit_is_noted():
     finding = only(times(healthy_frames(21), np.float64(1000)), "unit", "note")
     assert finding.evidence["reference_per_predicted"] == pytest.approx(1000, rel=0.05)
 
 
-def test_one_quiet_frame_leaves_noise_untold() -> None:
+def test_one_quiet_frame_leaves_noise_untold():
     report = report_of(healthy_frames(22, quiet=1))
     assert named(report) == [] and "snr_db" not in report.measured
     assert any(text.startswith("noise, SNR and drift: 1 quiet frame(s)") for text in report.untold)
 
 
-def test_several_remedies_become_one() -> None:
+def test_several_remedies_become_one():
     frames = healthy_frames(23)
     gains = np.ones(208)
     gains[[0, 26, 100]] = 1.5, 0.5, 1.4
@@ -397,7 +396,7 @@ def test_several_remedies_become_one() -> None:
     assert report.repair == "--impute-channels 50,100 --drop-channels 0,26"
 
 
-def test_a_round_skin_needs_no_scipy() -> None:
+def test_a_round_skin_needs_no_scipy():
     program = (
         "import sys; from injected import healthy_frames; from eitskin.skin.skin import"
         " paper_skin\nfrom eitskin.frames.doctor import examine, subject_from_frames\nassert not"
@@ -429,8 +428,8 @@ def test_a_round_skin_needs_no_scipy() -> None:
         ),
     ],
 )
-def test_remedies_become_one(remedies: list[str], combined: str) -> None:
+def test_remedies_become_one(remedies, combined):
     """Channel 26 is the reciprocal of channel 0: neither is filled from the other where both are
     bad, and the channels of an electrode that goes are not named."""
     case = SimpleNamespace(rows=adjacent(16).drive_measure, n_electrodes=16)
-    assert combined_remedy(case, remedies) == combined  # type: ignore[arg-type]
+    assert combined_remedy(case, remedies) == combined

@@ -29,7 +29,7 @@ STEPS = 12
 
 
 @pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def exported(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("eidors")
     golden = MODEL.golden
     still, pressed = (np.array([v], dtype=float) for v in (golden.reference_v, golden.frame_v))
@@ -45,7 +45,7 @@ def imported(path: Path, *words: str) -> Frames:
     return load_frames(out)
 
 
-def test_the_fields_are_eidors_own(exported: Path) -> None:
+def test_the_fields_are_eidors_own(exported):
     content = loadmat(exported, simplify_cells=True)
     fmdl, rows = content["fmdl"], MODEL.protocol.drive_measure.astype(int)
     assert fmdl["type"] == "fwd_model" and content["vi"]["type"] == "data"
@@ -62,7 +62,7 @@ def test_the_fields_are_eidors_own(exported: Path) -> None:
     assert content["img"]["elem_data"].shape == (len(fmdl["elems"]), 2)
 
 
-def test_what_was_exported_comes_back(exported: Path) -> None:
+def test_what_was_exported_comes_back(exported):
     ours, (skin, protocol) = MODEL.skin, load_skin(exported)
     assert protocol.hash == MODEL.protocol.hash and protocol.current_a == 1e-3
     assert np.isclose(skin.outline.diameter_mm or 0, 194, rtol=1e-6)
@@ -128,7 +128,7 @@ def foreign(path: Path, model: dict[str, Any], **more: Any) -> Path:
     return path
 
 
-def test_a_model_that_eidors_made(tmp_path: Path) -> None:
+def test_a_model_that_eidors_made(tmp_path):
     data = np.arange(80.0).reshape(40, 2)
     path = foreign(tmp_path / "a.mat", square(), vh=data[:, :1], vi={"type": "data", "meas": data})
     skin, protocol = load_skin(path)
@@ -142,7 +142,7 @@ def test_a_model_that_eidors_made(tmp_path: Path) -> None:
     assert frames.protocol.hash == protocol.hash and frames.protocol.current_a == 0.01
 
 
-def test_a_model_of_their_jacobian(tmp_path: Path) -> None:
+def test_a_model_of_their_jacobian(tmp_path):
     theirs = np.random.default_rng(1).normal(size=(40, 2 * STEPS**2))
     path, out = foreign(tmp_path / "a.mat", square(), J=theirs), tmp_path / "m.eitm"
     assert main(["model", "build", str(path), "-o", str(out), "--samples", "0"]) == 0
@@ -193,9 +193,7 @@ REFUSED: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
 
 
 @pytest.mark.parametrize(("spoil", "said"), REFUSED, ids=[said for _, said in REFUSED])
-def test_what_is_no_skin_is_refused(
-    spoil: Callable[[dict[str, Any]], Any], said: str, tmp_path: Path
-) -> None:
+def test_what_is_no_skin_is_refused(spoil, said, tmp_path):
     model = dict(square())
     spoil(model)
     with pytest.raises(EitskinError) as refused:
@@ -203,9 +201,7 @@ def test_what_is_no_skin_is_refused(
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
-def test_octave_solves_what_we_export_and_we_import_what_it_saves(
-    exported: Path, tmp_path: Path
-) -> None:
+def test_octave_solves_what_we_export_and_we_import_what_it_saves(exported, tmp_path):
     octave, theirs = shutil.which("octave-cli"), tmp_path / "theirs.mat"
     assert octave, "octave-cli is not installed: apt-get install octave"
     script = Path(__file__).with_name("eidors_forward.m")

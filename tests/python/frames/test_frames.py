@@ -34,7 +34,7 @@ def make_frames(**changes: Any) -> Frames:
     return Frames(**(fields | changes))
 
 
-def test_saved_frames_come_back_equal(tmp_path: Path) -> None:
+def test_saved_frames_come_back_equal(tmp_path):
     frames = make_frames()
     save_frames(tmp_path / "f.npz", frames)
     back = load_frames(tmp_path / "f.npz")
@@ -59,13 +59,13 @@ def test_saved_frames_come_back_equal(tmp_path: Path) -> None:
         assert back.paths.at(time_s)[0].tolist() == places
 
 
-def test_equal_frames_give_equal_bytes(tmp_path: Path) -> None:
+def test_equal_frames_give_equal_bytes(tmp_path):
     save_frames(tmp_path / "a.npz", make_frames())
     save_frames(tmp_path / "b.npz", make_frames())
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
-def test_a_failed_save_leaves_the_old_file(tmp_path: Path) -> None:
+def test_a_failed_save_leaves_the_old_file(tmp_path):
     path = tmp_path / "f.npz"
     save_frames(path, make_frames())
     before = path.read_bytes()
@@ -77,7 +77,7 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["f.npz"]
 
 
-def test_one_reference_frame_becomes_a_row_and_names_are_counted() -> None:
+def test_one_reference_frame_becomes_a_row_and_names_are_counted():
     frames = make_frames(reference_voltage_v=np.ones(CHANNELS), frame_name=())
     assert frames.reference_voltage_v.shape == (1, CHANNELS)
     assert frames.reference_v.tolist() == [1.0] * CHANNELS
@@ -108,7 +108,7 @@ def test_one_reference_frame_becomes_a_row_and_names_are_counted() -> None:
         ({"truth_mask_extent_mm": (1, 0, 0, 1)}, "truth_mask_extent_mm"),
     ],
 )  # fmt: skip
-def test_wrong_fields_are_named(change: dict[str, Any], said: str) -> None:
+def test_wrong_fields_are_named(change, said):
     with pytest.raises(FrameError, match=said) as caught:
         make_frames(**change)
     assert "\n" not in str(caught.value)
@@ -148,16 +148,14 @@ def rewritten(path: Path, **changes: Any) -> Path:
         ({"path_radius_mm": np.full(5, np.nan)}, "path_radius_mm must be finite"),
     ],
 )  # fmt: skip
-def test_wrong_files_are_refused_in_one_line_naming_the_file(
-    tmp_path: Path, change: dict[str, Any], said: str
-) -> None:
+def test_wrong_files_are_refused_in_one_line_naming_the_file(tmp_path, change, said):
     path = rewritten(tmp_path / "f.npz", **change)
     with pytest.raises(EitskinError, match=said) as caught:
         load_frames(path)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
-def test_pickled_objects_are_never_loaded(tmp_path: Path) -> None:
+def test_pickled_objects_are_never_loaded(tmp_path):
     path = tmp_path / "f.npz"
     np.savez(
         path, format=np.array(FORMAT), version=np.array(1), meta=np.array([{"a": 1}], dtype=object)
@@ -166,7 +164,7 @@ def test_pickled_objects_are_never_loaded(tmp_path: Path) -> None:
         load_frames(path)
 
 
-def test_damaged_files_are_refused(tmp_path: Path) -> None:
+def test_damaged_files_are_refused(tmp_path):
     path = tmp_path / "f.npz"
     save_frames(path, make_frames())
     whole = path.read_bytes()
@@ -192,7 +190,7 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
         load_frames(tmp_path)
 
 
-def test_nonfinite_frames_load_only_for_the_doctor(tmp_path: Path) -> None:
+def test_nonfinite_frames_load_only_for_the_doctor(tmp_path):
     bad = np.zeros((3, CHANNELS))
     bad[2, 3] = np.inf
     path = rewritten(tmp_path / "f.npz", voltage_v=bad)

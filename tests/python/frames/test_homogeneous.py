@@ -23,7 +23,7 @@ from eitskin.skin.skin import Skin, paper_skin
 ROWS = adjacent(16).drive_measure.astype(np.int64)
 
 
-def test_point_electrodes_give_the_logarithm_of_the_cross_ratio() -> None:
+def test_point_electrodes_give_the_logarithm_of_the_cross_ratio():
     angles = np.arange(16) * np.pi / 8
     points = np.exp(1j * angles)
     a, b, c, d = points[ROWS].T
@@ -31,7 +31,7 @@ def test_point_electrodes_give_the_logarithm_of_the_cross_ratio() -> None:
     assert np.allclose(voltages_of(disk_transfer(angles, 1e-6), ROWS), exact, atol=1e-9)
 
 
-def test_symmetric_rows_are_equal_and_reciprocal() -> None:
+def test_symmetric_rows_are_equal_and_reciprocal():
     frame = homogeneous(None, 16).voltages(ROWS)
     assert (frame < 0).all()
     for rotate, mirror in ((1, False), (5, True)):
@@ -42,7 +42,7 @@ def test_symmetric_rows_are_equal_and_reciprocal() -> None:
     assert np.allclose(homogeneous(None, 16).voltages(ROWS[:, [1, 0, 2, 3]]), -frame)
 
 
-def test_closed_form_agrees_with_finite_elements() -> None:
+def test_closed_form_agrees_with_finite_elements():
     from eitskin.frames.homogeneous_fem import FemPrediction
 
     skin = paper_skin()
@@ -61,7 +61,7 @@ def test_closed_form_agrees_with_finite_elements() -> None:
     assert np.corrcoef(closed, solved)[0, 1] > 0.98
 
 
-def test_a_touch_beside_the_first_electrodes_changes_their_channels_most() -> None:
+def test_a_touch_beside_the_first_electrodes_changes_their_channels_most():
     skin = paper_skin()
     centre = 0.85 * skin.electrode_centres_mm()[[0]]
     change = voltages_of(
@@ -74,13 +74,13 @@ def test_a_touch_beside_the_first_electrodes_changes_their_channels_most() -> No
     assert np.sign(change[lateral]) != np.sign(frame[lateral])
 
 
-def test_joined_electrodes_have_one_potential() -> None:
+def test_joined_electrodes_have_one_potential():
     transfer = shorted(homogeneous(None, 16).transfer_ohm, 3, 9)
     between = np.array([[0, 1, 3, 9], [5, 12, 3, 9], [3, 9, 0, 1]])
     assert np.allclose(voltages_of(transfer, between), 0, atol=1e-12)
 
 
-def test_other_outlines_use_finite_elements_and_scale_with_the_sheet() -> None:
+def test_other_outlines_use_finite_elements_and_scale_with_the_sheet():
     corners = [(-60.0, -40.0), (70.0, -40.0), (70.0, 30.0), (10.0, 60.0), (-60.0, 40.0)]
     skin = Skin("odd", polygon(corners), Electrodes(count=8))
     rows = adjacent(8).drive_measure.astype(np.int64)
@@ -92,6 +92,6 @@ def test_other_outlines_use_finite_elements_and_scale_with_the_sheet() -> None:
     assert np.corrcoef(turned, predicted.voltages(rows))[0, 1] < 0.99
 
 
-def test_another_number_of_electrodes_is_refused() -> None:
+def test_another_number_of_electrodes_is_refused():
     with pytest.raises(UsageError, match="has 16 electrodes, the frames have 8"):
         homogeneous(paper_skin(), 8)

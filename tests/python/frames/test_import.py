@@ -54,7 +54,7 @@ def assert_same(frames: Frames, wanted: Frames) -> None:
 
 @pytest.mark.parametrize("protocol", (adjacent(16), opposite(16)), ids=("adjacent", "opposite"))
 @pytest.mark.parametrize("order", ORDERS)
-def test_every_order_comes_back_in_ours(tmp_path: Path, protocol: Any, order: str) -> None:
+def test_every_order_comes_back_in_ours(tmp_path, protocol, order):
     frames = healthy_frames(1, protocol)
     rows = source_table(order, protocol)
     measured = ~(rows[:, :2, None] == rows[:, None, 2:]).any(axis=(1, 2))
@@ -64,7 +64,7 @@ def test_every_order_comes_back_in_ours(tmp_path: Path, protocol: Any, order: st
     assert_same(taken(path, protocol, order=order), frames)
 
 
-def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path: Path) -> None:
+def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path):
     frames, rng = healthy_frames(2), np.random.default_rng(2)
     index = rng.permutation(208)
     rows = TABLE[index].copy()
@@ -89,7 +89,7 @@ def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sign", ("reversed", "magnitude"))
 @pytest.mark.parametrize("protocol", (adjacent(16), opposite(16)), ids=("adjacent", "opposite"))
-def test_signs_come_back(tmp_path: Path, protocol: Any, sign: str) -> None:
+def test_signs_come_back(tmp_path, protocol, sign):
     frames = healthy_frames(3, protocol)
     path = tmp_path / "s.npz"
     change = np.abs if sign == "magnitude" else np.negative
@@ -98,7 +98,7 @@ def test_signs_come_back(tmp_path: Path, protocol: Any, sign: str) -> None:
 
 
 @pytest.mark.parametrize(("rotate", "mirror"), [(3, False), (0, True), (5, True)])
-def test_renumbering_comes_back(tmp_path: Path, rotate: int, mirror: bool) -> None:
+def test_renumbering_comes_back(tmp_path, rotate, mirror):
     frames = healthy_frames(4)
     back = electrode_map(16, rotate, mirror)
     match = match_rows(TABLE, relabel(TABLE, back))
@@ -107,7 +107,7 @@ def test_renumbering_comes_back(tmp_path: Path, rotate: int, mirror: bool) -> No
     assert_same(import_frames(path, options, adjacent(16), None), frames)
 
 
-def test_clockwise_mirrors_unless_the_skin_is_clockwise(tmp_path: Path) -> None:
+def test_clockwise_mirrors_unless_the_skin_is_clockwise(tmp_path):
     frames = healthy_frames(5)
     match = match_rows(TABLE, relabel(TABLE, electrode_map(16, 0, True)))
     path = source(tmp_path, frames, match.index, match.sign)
@@ -119,13 +119,13 @@ def test_clockwise_mirrors_unless_the_skin_is_clockwise(tmp_path: Path) -> None:
     assert np.allclose(unchanged.voltage_v, frames.voltage_v[:, match.index] * match.sign)
 
 
-def test_swapped_wires_give_the_table_that_was_really_measured(tmp_path: Path) -> None:
+def test_swapped_wires_give_the_table_that_was_really_measured(tmp_path):
     path = source(tmp_path, healthy_frames(6))
     frames = taken(path, swaps=((3, 9), (1, 2)))
     assert np.array_equal(frames.protocol.drive_measure, swap_map(16, [(3, 9), (1, 2)])[TABLE])
 
 
-def test_channels_are_flipped_filled_and_left_out(tmp_path: Path) -> None:
+def test_channels_are_flipped_filled_and_left_out(tmp_path):
     frames = healthy_frames(7)
     path = source(tmp_path, frames)
     options = ImportOptions(
@@ -152,7 +152,7 @@ def test_channels_are_flipped_filled_and_left_out(tmp_path: Path) -> None:
             taken(path, **bad)
 
 
-def test_bad_values_pass_only_where_they_are_mended(tmp_path: Path) -> None:
+def test_bad_values_pass_only_where_they_are_mended(tmp_path):
     frames = healthy_frames(8)
     voltage = frames.voltage_v.copy()
     voltage[0, 0] = np.nan
@@ -166,7 +166,7 @@ def test_bad_values_pass_only_where_they_are_mended(tmp_path: Path) -> None:
     assert repaired.voltage_v[0, 0] == voltage[0, 26]
 
 
-def test_equalised_gains_follow_the_prediction(tmp_path: Path) -> None:
+def test_equalised_gains_follow_the_prediction(tmp_path):
     frames = healthy_frames(9, gain=0.15)
     repaired = taken(source(tmp_path, frames), equalise=True)
     gains = repaired.reference_v / frames.reference_v
@@ -184,7 +184,7 @@ def test_equalised_gains_follow_the_prediction(tmp_path: Path) -> None:
         taken(tmp_path / "weak.npz", equalise=True)
 
 
-def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
+def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path):
     frames = healthy_frames(10)
     quiet, voltage = frames.reference_voltage_v, frames.voltage_v
     rows = tmp_path / "rows.csv"
@@ -216,7 +216,7 @@ def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("part", ("real", "imag", "abs", "in-phase"))
-def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> None:
+def test_complex_parts_of_arrays_and_column_pairs(tmp_path, part):
     frames = healthy_frames(11)
     phase = np.exp(0.4j)
     voltage, quiet = frames.voltage_v * phase, frames.reference_voltage_v * phase
@@ -244,7 +244,7 @@ def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> 
         taken(tmp_path / "z.csv", source=replace(columns, columns="2"))
 
 
-def test_mat_files_with_structs(tmp_path: Path) -> None:
+def test_mat_files_with_structs(tmp_path):
     from scipy.io import savemat
 
     frames = healthy_frames(12)
@@ -264,7 +264,7 @@ def test_mat_files_with_structs(tmp_path: Path) -> None:
         taken(path, source=options)
 
 
-def test_truth_comes_along_in_millimetres(tmp_path: Path) -> None:
+def test_truth_comes_along_in_millimetres(tmp_path):
     frames, rng = healthy_frames(13), np.random.default_rng(13)
     mask = rng.integers(-1, 2, size=(1, 5, 6)).astype(np.int8)
     path = tmp_path / "t.npz"
@@ -310,7 +310,7 @@ def test_truth_comes_along_in_millimetres(tmp_path: Path) -> None:
         import_frames(path, replace(options, source=KEYS), adjacent(16), paper_skin())
 
 
-def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path: Path) -> None:
+def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path):
     frames = healthy_frames(14)
     save_frames(tmp_path / "a.npz", frames)
     repaired = import_frames(tmp_path / "a.npz", ImportOptions(sign="reversed"), None, None)
@@ -367,15 +367,13 @@ def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_bad_options_say_what_to_do(
-    tmp_path: Path, options: ImportOptions, protocol: Any, said: str
-) -> None:
+def test_bad_options_say_what_to_do(tmp_path, options, protocol, said):
     with pytest.raises(EitskinError, match=said) as caught:
         import_frames(source(tmp_path, healthy_frames(15)), options, protocol, None)
     assert "\n" not in str(caught.value)
 
 
-def test_foreign_and_square_sources(tmp_path: Path) -> None:
+def test_foreign_and_square_sources(tmp_path):
     (tmp_path / "a.xyz").write_text("1")
     with pytest.raises(UsageError, match=r"suffix '.xyz' is not known; use .csv"):
         import_frames(tmp_path / "a.xyz", ImportOptions(), adjacent(16), None)
@@ -389,7 +387,7 @@ def test_foreign_and_square_sources(tmp_path: Path) -> None:
         import_frames(tmp_path / "square.npz", words, adjacent(8), None)
 
 
-def test_kept_tables_need_the_number_of_electrodes(tmp_path: Path) -> None:
+def test_kept_tables_need_the_number_of_electrodes(tmp_path):
     frames = healthy_frames(16)
     path = source(tmp_path, frames, rows=TABLE)
     options = ImportOptions(source=replace(KEYS, protocol_table="rows"))

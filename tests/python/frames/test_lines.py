@@ -19,13 +19,13 @@ from eitskin.skin.protocol import adjacent, opposite
 
 
 def taken(path: Path, protocol: object = None, **options: object) -> np.ndarray:
-    source = SourceOptions(reference_frames="0", **options)  # type: ignore[arg-type]
+    source = SourceOptions(reference_frames="0", **options)
     reading = ImportOptions(source=source)
-    frames = import_frames(path, reading, protocol or adjacent(16), None)  # type: ignore[arg-type]
+    frames = import_frames(path, reading, protocol or adjacent(16), None)
     return np.vstack([frames.reference_voltage_v, frames.voltage_v])
 
 
-def test_a_spectra_log(tmp_path: Path) -> None:
+def test_a_spectra_log(tmp_path):
     """OpenEIT's firmware in mode c: a banner, then "magnitudes: " and 192 numbers, each with a
     comma after it."""
     volts = np.round(np.abs(healthy_frames(1, opposite(16)).reference_voltage_v[:3]) * 1e5, 4)
@@ -41,7 +41,7 @@ def test_a_spectra_log(tmp_path: Path) -> None:
     assert table.notes == ("2 lines without the label 'magnitudes' passed over",)
 
 
-def test_an_eit_kit_message(tmp_path: Path) -> None:
+def test_an_eit_kit_message(tmp_path):
     """EIT-kit: "origin" and "framei" with four decimals each and nothing between the numbers;
     pairs at driving electrodes are left out."""
     volts = np.round(np.abs(healthy_frames(2).reference_voltage_v[:3]) * 300, 4) + 0.001
@@ -56,7 +56,7 @@ def test_an_eit_kit_message(tmp_path: Path) -> None:
         taken(path, label="framei", delimiter="decimals:4")
 
 
-def test_frames_over_several_lines(tmp_path: Path) -> None:
+def test_frames_over_several_lines(tmp_path):
     volts = healthy_frames(3).reference_voltage_v[:2]
     text = "".join(f"frame {k}:\n" + "".join(f"{v!r}\n" for v in row.tolist()) + "done\n"
                    for k, row in enumerate(volts))  # fmt: skip
@@ -68,7 +68,7 @@ def test_frames_over_several_lines(tmp_path: Path) -> None:
     assert found == [[], [], [("1", "2", "3", "4")], [], []]
 
 
-def test_several_labels_must_be_chosen_from(tmp_path: Path) -> None:
+def test_several_labels_must_be_chosen_from(tmp_path):
     path = tmp_path / "two.txt"
     path.write_text("mags: 1,2\nphases: 3,4\nmags: 5,6\nphases: 7,8\n")
     with pytest.raises(UsageError, match=r"'mags' \(2\), 'phases' \(2\); say with --label"):
@@ -76,7 +76,7 @@ def test_several_labels_must_be_chosen_from(tmp_path: Path) -> None:
     assert read_table(path, label="mags").numbers([0, 1]).tolist() == [[1, 2], [5, 6]]
 
 
-def test_bad_lines_are_named_or_left_out_and_counted(tmp_path: Path) -> None:
+def test_bad_lines_are_named_or_left_out_and_counted(tmp_path):
     rows = [",".join(map(repr, row)) for row in healthy_frames(4).reference_voltage_v.tolist()]
     rows[0], rows[5] = rows[0].partition(",")[2], rows[5] + ",1"
     path = tmp_path / "b.csv"
@@ -90,7 +90,7 @@ def test_bad_lines_are_named_or_left_out_and_counted(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("delimiter", ("\t", "  "))
-def test_tabs_spaces_and_times_in_milliseconds(tmp_path: Path, delimiter: str) -> None:
+def test_tabs_spaces_and_times_in_milliseconds(tmp_path, delimiter):
     volts = healthy_frames(5).reference_voltage_v[:3]
     path = tmp_path / "t.txt"
     np.savetxt(path, np.column_stack([[0, 20, 40], volts]), delimiter=delimiter, fmt="%.17g")
@@ -100,7 +100,7 @@ def test_tabs_spaces_and_times_in_milliseconds(tmp_path: Path, delimiter: str) -
     assert frames.time_s.tolist() == [0.02, 0.04]
 
 
-def test_a_bare_array(tmp_path: Path) -> None:
+def test_a_bare_array(tmp_path):
     volts = healthy_frames(6).reference_voltage_v[:3]
     np.save(tmp_path / "a.npy", volts)
     assert np.array_equal(taken(tmp_path / "a.npy"), volts)
@@ -112,7 +112,7 @@ def test_a_bare_array(tmp_path: Path) -> None:
         taken(tmp_path / "c.npy")
 
 
-def test_steps_of_columns_and_long_lists() -> None:
+def test_steps_of_columns_and_long_lists():
     from eitskin.frames.tables import chosen
 
     names = tuple(f"channel {k}" for k in range(400))
@@ -125,11 +125,11 @@ def test_steps_of_columns_and_long_lists() -> None:
     assert len(str(caught.value)) < 700
 
 
-def test_a_foreign_file_for_a_frames_file_names_import(tmp_path: Path) -> None:
+def test_a_foreign_file_for_a_frames_file_names_import(tmp_path):
     (tmp_path / "x.csv").write_text("1,2,3\n")
     with pytest.raises(EitskinError, match=r"no frames file; make one of it:  eitskin import"):
         load_frames(tmp_path / "x.csv")
 
 
-def test_a_source_table_of_opposite_has_192_rows() -> None:
+def test_a_source_table_of_opposite_has_192_rows():
     assert len(source_table("fixed", opposite(16))) == 192

@@ -37,7 +37,7 @@ def pair_table(
 
 
 def read(path: Path, **options: object) -> np.ndarray:
-    source = SourceOptions(reference_frames="0:4", scale=1.0, **options)  # type: ignore[arg-type]
+    source = SourceOptions(reference_frames="0:4", scale=1.0, **options)
     frames = import_frames(path, ImportOptions(source=source), adjacent(16), None)
     return np.vstack([frames.reference_voltage_v, frames.voltage_v])
 
@@ -48,9 +48,7 @@ def read(path: Path, **options: object) -> np.ndarray:
     [(DEGREES, 180 / np.pi), ("|Z| magnitude {0},Phase_{0} [rad]", 1.0)],
     ids=("degrees", "radians"),
 )
-def test_headers_that_say_magnitude_and_phase(
-    tmp_path: Path, head: str, unit: float, blocks: bool
-) -> None:
+def test_headers_that_say_magnitude_and_phase(tmp_path, head, unit, blocks):
     path = pair_table(tmp_path / "p.csv", np.abs(Z), unit * np.angle(Z), head, blocks=blocks)
     assert np.allclose(read(path, complex_part="abs"), np.abs(Z), rtol=1e-12)
     assert np.allclose(read(path, complex_part="real"), Z.real, rtol=1e-9)
@@ -59,12 +57,12 @@ def test_headers_that_say_magnitude_and_phase(
         read(path, complex_part="abs", pairs="real-imag")
 
 
-def test_headers_that_say_real_and_imaginary(tmp_path: Path) -> None:
+def test_headers_that_say_real_and_imaginary(tmp_path):
     path = pair_table(tmp_path / "p.csv", Z.real, Z.imag, "re{0},im{0}", blocks=True)
     assert np.allclose(read(path, complex_part="abs"), np.abs(Z), rtol=1e-12)
 
 
-def test_without_a_header_it_must_be_said_unless_only_one_can_be(tmp_path: Path) -> None:
+def test_without_a_header_it_must_be_said_unless_only_one_can_be(tmp_path):
     polar = pair_table(tmp_path / "p.csv", np.abs(Z), np.angle(Z), None)
     with pytest.raises(UsageError, match=r"nothing says whether .* say --pairs real-imag \|"):
         read(polar, complex_part="abs")
@@ -79,7 +77,7 @@ def test_without_a_header_it_must_be_said_unless_only_one_can_be(tmp_path: Path)
         read(wide, complex_part="abs", pairs="magnitude-radians")
 
 
-def test_a_header_that_says_half_is_asked_for_the_rest(tmp_path: Path) -> None:
+def test_a_header_that_says_half_is_asked_for_the_rest(tmp_path):
     no_unit = pair_table(tmp_path / "p.csv", np.abs(Z), np.angle(Z), "mag{0},phase{0}")
     with pytest.raises(UsageError, match="not the phase's unit; say --pairs magnitude-degrees"):
         read(no_unit, complex_part="abs")
@@ -91,7 +89,7 @@ def test_a_header_that_says_half_is_asked_for_the_rest(tmp_path: Path) -> None:
         read(half, complex_part="abs")
 
 
-def test_a_phase_is_never_taken_for_a_voltage(tmp_path: Path) -> None:
+def test_a_phase_is_never_taken_for_a_voltage(tmp_path):
     path = pair_table(tmp_path / "p.csv", np.abs(Z), np.angle(Z), DEGREES)
     with pytest.raises(UsageError, match=r"column 'phase 0 \(deg\)' is a phase, no voltage"):
         read(path)
@@ -104,13 +102,13 @@ def test_a_phase_is_never_taken_for_a_voltage(tmp_path: Path) -> None:
     ]
 
 
-def test_a_part_of_real_numbers_is_refused(tmp_path: Path) -> None:
+def test_a_part_of_real_numbers_is_refused(tmp_path):
     np.savez(tmp_path / "r.npz", v=np.abs(VOLTS))
     source = SourceOptions(voltage="v", reference_frames="0:4", complex_part="abs")
     with pytest.raises(UsageError, match="the numbers are real; leave it out"):
         import_frames(tmp_path / "r.npz", ImportOptions(source=source), adjacent(16), None)
 
 
-def test_names_of_columns() -> None:
+def test_names_of_columns():
     said = {name: kind_of(name) for name in ("V_mag", "Phase (°)", "Im{Z}", "re_17", "time", "V3")}
     assert list(said.values()) == ["magnitude", "phase", "imag", "real", None, None]

@@ -2,7 +2,6 @@
 truth comes along."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,14 +45,14 @@ MENDED = ImportOptions(
 
 
 @pytest.fixture(scope="module")
-def kit4(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Frames:
+def kit4(shared_data, tmp_path_factory) -> Frames:
     options = ImportOptions(source=KIT4_SOURCE, truth=KIT4_TRUTH)
     path = tmp_path_factory.mktemp("kit4") / "kit4.npz"
     save_frames(path, import_frames(shared_data / "kit4_dev.npz", options, adjacent(16), KIT4))
     return load_frames(path)
 
 
-def test_kit4_is_imported_with_its_truth(kit4: Frames, shared_data: Path) -> None:
+def test_kit4_is_imported_with_its_truth(kit4, shared_data):
     with np.load(shared_data / "kit4_dev.npz") as source:
         assert np.array_equal(kit4.voltage_v, source["voltage"])
         assert np.array_equal(kit4.reference_v, source["reference_voltage"])
@@ -67,7 +66,7 @@ def test_kit4_is_imported_with_its_truth(kit4: Frames, shared_data: Path) -> Non
     assert (kit4.protocol.hash, kit4.meta["unit"]) == (adjacent(16).hash, "V")
 
 
-def test_kit4_is_healthy_with_notes_on_what_is_there(kit4: Frames) -> None:
+def test_kit4_is_healthy_with_notes_on_what_is_there(kit4):
     report = examine(subject_from_frames(kit4, KIT4))
     assert report.exit_code == 0
     found = {finding.name: finding for finding in report.findings}
@@ -87,7 +86,7 @@ def test_kit4_is_healthy_with_notes_on_what_is_there(kit4: Frames) -> None:
     assert report.measured["numbering_by_touch"]["--rotate 15"] < 0.85
 
 
-def test_kit4_numbered_the_other_way_is_noticed(kit4: Frames) -> None:
+def test_kit4_numbered_the_other_way_is_noticed(kit4):
     wrong = replace(KIT4, electrodes=replace(KIT4.electrodes, clockwise=False))
     report = examine(subject_from_frames(kit4, wrong))
     assert report.repair == "--mirror" and report.exit_code == 11
@@ -96,7 +95,7 @@ def test_kit4_numbered_the_other_way_is_noticed(kit4: Frames) -> None:
 
 
 @pytest.mark.parametrize("name", TANKS)
-def test_the_rotating_order_of_the_raw_exports_is_recognised(shared_data: Path, name: str) -> None:
+def test_the_rotating_order_of_the_raw_exports_is_recognised(shared_data, name):
     report = examine(subject_from_source(shared_data / name, ImportOptions(), adjacent(16), None))
     assert report.exit_code == 11
     assert report.repair == "--order rotating --sign reversed"
@@ -111,7 +110,7 @@ def test_the_rotating_order_of_the_raw_exports_is_recognised(shared_data: Path, 
 
 @pytest.mark.parametrize("name", TANKS)
 @pytest.mark.parametrize("part", (None, "in-phase"))
-def test_mended_raw_exports_are_clean(shared_data: Path, name: str, part: str | None) -> None:
+def test_mended_raw_exports_are_clean(shared_data, name, part):
     source = (
         MENDED.source
         if part is None
@@ -126,7 +125,7 @@ def test_mended_raw_exports_are_clean(shared_data: Path, name: str, part: str | 
     assert report.measured["reciprocity_rms"] < 0.03
 
 
-def test_the_metal_rod_changes_most_beside_its_electrode(shared_data: Path) -> None:
+def test_the_metal_rod_changes_most_beside_its_electrode(shared_data):
     """A rod beside electrode 0 (1 in the data's own words), and in the second file beside 0 and 12
     (1 and 13)."""
     for name, electrodes in zip(TANKS, ((0,), (0, 12)), strict=True):
@@ -140,7 +139,7 @@ def test_the_metal_rod_changes_most_beside_its_electrode(shared_data: Path) -> N
         assert (change[strongest] / frames.reference_v[strongest] < 0).all()
 
 
-def test_the_metal_rods_place_agrees_with_the_numbering(shared_data: Path) -> None:
+def test_the_metal_rods_place_agrees_with_the_numbering(shared_data):
     at = 0.58 * 140.0
     options = replace(MENDED, source=replace(MENDED.source, scale=1.0))
     frames = import_frames(shared_data / TANKS[1], options, adjacent(16), KIT4)

@@ -29,7 +29,7 @@ def results() -> dict[int, Reconstruction]:
     return {number: reconstructor.reconstruct(session().frames_v[number]) for number in (2, 0, 9)}
 
 
-def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
+def test_every_field(tmp_path, results):
     path, model = tmp_path / "out.npz", prebuilt()[0]
     save_results(path, model, session().as_frames(), results)
     assert [entry.name for entry in tmp_path.iterdir()] == ["out.npz"]
@@ -71,9 +71,7 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
     assert info[1]["lambda"] == results[2].info.lambda_ and "lambda_" not in info[1]
 
 
-def test_the_documented_fields_are_the_saved_ones(
-    tmp_path: Path, results: dict[int, Reconstruction]
-) -> None:
+def test_the_documented_fields_are_the_saved_ones(tmp_path, results):
     """Names and types of the table in docs/reference/frames-format.md, row by row."""
     page = (
         Path(__file__).resolve().parents[3] / "docs" / "reference" / "frames-format.md"
@@ -91,9 +89,7 @@ def test_the_documented_fields_are_the_saved_ones(
             ), name
 
 
-def test_a_pixel_lies_where_the_grid_says(
-    tmp_path: Path, results: dict[int, Reconstruction]
-) -> None:
+def test_a_pixel_lies_where_the_grid_says(tmp_path, results):
     """Row 0 is the lowest y: the peak of the picture, by origin and pixel size, is the peak of the
     pixels."""
     model = prebuilt()[0]
@@ -104,14 +100,14 @@ def test_a_pixel_lies_where_the_grid_says(
     assert (x, y) == pytest.approx(tuple(model.grid.centres_mm()[np.argmax(results[0].image)]))
 
 
-def test_no_results(tmp_path: Path) -> None:
+def test_no_results(tmp_path):
     save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), {})
     with np.load(tmp_path / "out.npz") as saved:
         assert set(saved.files) == FIELDS
         assert saved["image_s_per_m"].shape == (0, 32, 32) and saved["touch_xy_mm"].shape == (0, 2)
 
 
-def test_frames_without_touches(tmp_path: Path) -> None:
+def test_frames_without_touches(tmp_path):
     reconstructor = Reconstructor(prebuilt()[0])
     reconstructor.tare(session().quiet_v)
     quiet = {0: reconstructor.reconstruct(session().reference_v)}
@@ -120,7 +116,7 @@ def test_frames_without_touches(tmp_path: Path) -> None:
         assert saved["touch_frame"].shape == (0,) and not np.nansum(saved["image_s_per_m"])
 
 
-def test_where_it_cannot_be_written(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
+def test_where_it_cannot_be_written(tmp_path, results):
     with pytest.raises(FileError, match="cannot write there"):
         save_results(tmp_path / "none" / "out.npz", prebuilt()[0], session().as_frames(), results)
     (tmp_path / "out.npz").mkdir()

@@ -97,7 +97,7 @@ SPOILT: dict[str, Callable[[], Frames]] = {
 
 @pytest.mark.parametrize("name", SPOILT)
 @pytest.mark.parametrize("skin", [PAPER, None], ids=["skin", "no skin"])
-def test_same_results_of_the_doctor(name: str, skin: Any) -> None:
+def test_same_results_of_the_doctor(name, skin):
     def examined() -> Any:
         report = examine(subject_from_frames(SPOILT[name](), skin))
         return [report.as_table(), len("\n".join(report.lines()))]
@@ -164,5 +164,5 @@ CALLS: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("name", CALLS)
-def test_same_results_of_frames(name: str) -> None:
+def test_same_results_of_frames(name):
     check_same(STORE, name, CALLS[name])

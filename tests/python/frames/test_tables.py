@@ -29,12 +29,12 @@ def write(tmp_path: Path, text: str | bytes) -> Path:
         "quotes", "bom",
     ],
 )  # fmt: skip
-def test_the_same_numbers_come_out_of_every_dialect(tmp_path: Path, text: str | bytes) -> None:
+def test_the_same_numbers_come_out_of_every_dialect(tmp_path, text):
     found = read_table(write(tmp_path, text)).numbers(range(3)).tolist()
     assert found == [[1, 2.5, -0.03], [4, 5, 6]]
 
 
-def test_headers_name_columns_and_bad_cells_are_named(tmp_path: Path) -> None:
+def test_headers_name_columns_and_bad_cells_are_named(tmp_path):
     table = read_table(write(tmp_path, "time,v0,v1\nabc,1,2\n7,3,x\n8,4,\n"))
     assert table.header == ("time", "v0", "v1") and table.n_columns == 3
     assert table.numbers(chosen("v0", 3, table.header, "--columns")).tolist() == [[1], [3], [4]]
@@ -44,14 +44,14 @@ def test_headers_name_columns_and_bad_cells_are_named(tmp_path: Path) -> None:
         table.numbers([2])
 
 
-def test_empty_and_missing_cells_are_named(tmp_path: Path) -> None:
+def test_empty_and_missing_cells_are_named(tmp_path):
     with pytest.raises(FrameError, match=r"line 2, column 1 \(from 0\): is empty"):
         read_table(write(tmp_path, "1,2,3\n4,,6\n")).numbers(range(3))
     with pytest.raises(FrameError, match="line 3 has 2 cells, line 1 has 3"):
         read_table(write(tmp_path, "1,2,3\n4,5,6\n7,8\n"))
 
 
-def test_complex_cells() -> None:
+def test_complex_cells():
     assert parse_cell("1.5-2j") == 1.5 - 2j
     assert parse_cell("1.5 + 2i") == 1.5 + 2j
     assert parse_cell("0,25") == 0.25
@@ -59,7 +59,7 @@ def test_complex_cells() -> None:
     assert parse_cell("1,000.5") is None and parse_cell("") is None and parse_cell("1_0x") is None
 
 
-def test_column_choices() -> None:
+def test_column_choices():
     names = ("time", "a", "b", "c")
     assert chosen("2", 4, names, "--columns") == (2,)
     assert chosen("0,2:4", 4, names, "--columns") == (0, 2, 3)
@@ -84,13 +84,13 @@ def test_column_choices() -> None:
         (b"\x00\x01\x02", "zero bytes"),
     ],
 )
-def test_no_table_is_one_line(tmp_path: Path, content: bytes, said: str) -> None:
+def test_no_table_is_one_line(tmp_path, content, said):
     with pytest.raises(EitskinError, match=said) as caught:
         read_table(write(tmp_path, content))
     assert "\n" not in str(caught.value)
 
 
-def test_a_forced_delimiter(tmp_path: Path) -> None:
+def test_a_forced_delimiter(tmp_path):
     path = write(tmp_path, "1/2\n3/4\n")
     assert read_table(path, "/").numbers(range(2)).tolist() == [[1, 2], [3, 4]]
     with pytest.raises(UsageError, match="one character or one of comma"):

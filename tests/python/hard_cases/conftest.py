@@ -1,7 +1,5 @@
 """What the hard cases share."""
 
-from pathlib import Path
-
 import pytest
 from everywhere import SameEverywhere
 
@@ -9,6 +7,6 @@ from eitskin_studies.harness.emulated import PROGRAM
 
 
 @pytest.fixture(scope="session")
-def same_everywhere(cortex_m7: Path, tmp_path_factory: pytest.TempPathFactory) -> SameEverywhere:
+def same_everywhere(cortex_m7, tmp_path_factory) -> SameEverywhere:
     """Runs steps on host kernels, plain C and the emulated Cortex-M7, and asserts the same bits."""
     return SameEverywhere(cortex_m7 / PROGRAM, lambda: tmp_path_factory.mktemp("board"))

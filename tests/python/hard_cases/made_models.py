@@ -16,7 +16,6 @@ from eitskin.skin.protocol import Protocol, adjacent
 ELECTRODES = 8
 ROWS, FOLDED = 40, 20
 SIDE = 8
-MAX_COLUMNS = SIDE * SIDE
 
 
 @cache
@@ -80,7 +79,7 @@ def made_model(
 
 def made_blob(s: np.ndarray, **changes: object) -> bytes:
     """The bytes of ``made_model``."""
-    return encode_model(made_model(s, **changes))  # type: ignore[arg-type]
+    return encode_model(made_model(s, **changes))
 
 
 def plain_options(s: np.ndarray, **changes: object) -> Options:
@@ -96,13 +95,4 @@ def plain_options(s: np.ndarray, **changes: object) -> Options:
             "project_reference": False,
             **changes,
         },
-    )  # type: ignore[arg-type]
-
-
-def frame_of(model: Model, data: np.ndarray) -> np.ndarray:
-    """The frame (m,), volts, whose folded difference to the golden reference is ``data`` (k,)."""
-    fold, frame = model.fold, model.golden.reference_v.astype(np.float64)
-    for k, value in enumerate(data):
-        frame[fold.first[k]] += value
-        frame[fold.second[k]] += fold.sign[k] * value
-    return frame
+    )

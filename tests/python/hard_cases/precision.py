@@ -63,7 +63,7 @@ def by_condition(narrow: list[Outcome]) -> list[Condition]:
     wide, found = on_host(steps, "float64")[1], []
     for k, condition in enumerate(CONDITIONS):
         s = made_model(matrix(condition)).sensitivity
-        y = steps[3 * k + 2].data[0]  # type: ignore[union-attr]
+        y = steps[3 * k + 2].data[0]
         one, other = (judged(s, y, "increase", outcomes[k]) for outcomes in (narrow, wide))
         size = float(np.linalg.norm(one.y))
         room = np.sqrt(2 * one.gap) + np.sqrt(2 * (other.gap + U * size**2))

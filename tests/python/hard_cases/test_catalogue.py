@@ -6,25 +6,25 @@ from catalogue import CASES, exists, hard_tests
 import page
 
 
-def test_every_case_has_tests_that_exist() -> None:
+def test_every_case_has_tests_that_exist():
     assert [(case.id, test) for case in CASES for test in case.tests if not exists(test)] == []
     assert all(case.tests for case in CASES)
 
 
-def test_every_test_belongs_to_a_case() -> None:
+def test_every_test_belongs_to_a_case():
     assert hard_tests() - {test for case in CASES for test in case.tests} == set()
 
 
-def test_each_case_says_in_sentences_what_goes_wrong_and_what_is_promised() -> None:
+def test_each_case_says_in_sentences_what_goes_wrong_and_what_is_promised():
     for case in CASES:
         assert case.what.endswith(".") and case.promise.endswith("."), case.id
 
 
-def test_the_page_is_that_of_the_catalogue() -> None:
+def test_the_page_is_that_of_the_catalogue():
     assert page.PAGE.read_text(encoding="utf-8") == page.page_text()
 
 
-def test_pictures_exist() -> None:
+def test_pictures_exist():
     for case in CASES:
         if case.picture is not None:
             assert case.picture in pictures.DRAWN and (page.PICTURES / case.picture).is_file()

@@ -3,14 +3,12 @@ and whitened ones."""
 
 import numpy as np
 import pytest
-from everywhere import SameEverywhere
 from made_models import plain_options
 from random_problems import RandomProblem, asked, gaussian, rounded, smooth, whitened, with_data
 from soundness import check_sound, judged
 
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Step
-from margins import Margins
 
 
 def repeated(times: int, turn: float = 1.0, nudge: float = 0.0) -> RandomProblem:
@@ -68,7 +66,7 @@ PROBLEMS = {
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_columns(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
+def test_columns(same_everywhere, margins, solver):
     """Whatever the columns, the result is sound (soundness.check_sound); a zero column stays at
     zero; where the data have fewer directions than there are columns, the active set's support is
     no larger than they are."""

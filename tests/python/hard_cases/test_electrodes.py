@@ -42,7 +42,7 @@ def check_left_out(margins: Margins, case: str, one: Outcome, *electrodes: int) 
     margins.everywhere(case, "rows left out wrongly, or not", unlike, 0, "rows")
 
 
-def test_detached(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_detached(same_everywhere, margins):
     """Its number is told, and its 52 rows are left out."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["detached"])):
         assert one.info.open_electrodes == (k % ELECTRODES,)
@@ -50,7 +50,7 @@ def test_detached(same_everywhere: SameEverywhere, margins: Margins) -> None:
         check_left_out(margins, "frames/detached", one, k % ELECTRODES)
 
 
-def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_bridged(same_everywhere, margins):
     """Neighbours: both are named, and left out. Others: no row is dead, and the frame is named a
     model_mismatch."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["bridged"])):
@@ -62,7 +62,7 @@ def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
 
 @pytest.mark.parametrize("which", ["swapped", "swapped apart"])
-def test_swapped(same_everywhere: SameEverywhere, margins: Margins, which: str) -> None:
+def test_swapped(same_everywhere, margins, which):
     """A model mismatch, by name."""
     outcomes = compare(same_everywhere, lambda k, _: simulated()[k][which])
     assert all(one.status == 0 for _, one in outcomes)
@@ -71,7 +71,7 @@ def test_swapped(same_everywhere: SameEverywhere, margins: Margins, which: str) 
     )
 
 
-def test_noisy(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_noisy(same_everywhere, margins):
     """A contact that rubs, a fifth of each reading at random: named, and left out."""
 
     def rub(k: int, frame: np.ndarray) -> np.ndarray:
@@ -84,7 +84,7 @@ def test_noisy(same_everywhere: SameEverywhere, margins: Margins) -> None:
         check_left_out(margins, "frames/noisy", one, k % ELECTRODES)
 
 
-def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_polarity_flip(same_everywhere, margins):
     """A channel's 13 rows with the other sign: its two electrodes are named, the rows left out;
     their reciprocals stand for them."""
     losses = []
@@ -100,7 +100,7 @@ def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> Non
 
 
 @pytest.mark.parametrize("by", [1, 3, 13, 65])
-def test_rotated(same_everywhere: SameEverywhere, margins: Margins, by: int) -> None:
+def test_rotated(same_everywhere, margins, by):
     """All rows in the place of others: a model mismatch, by name."""
     outcomes = compare(same_everywhere, lambda _, frame: np.roll(frame, by))
     assert all(one.status == 0 for _, one in outcomes)

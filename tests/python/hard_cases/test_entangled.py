@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import touch_scenes
-from everywhere import SameEverywhere
 from test_hard_touches import on_skin
 from touch_scenes import entangled, frames_of
 
@@ -13,7 +12,6 @@ from eitskin.core.options_table import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPL
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
-from margins import Margins
 from small_models import prebuilt
 
 CASE = "physics/entangled"
@@ -42,7 +40,7 @@ def searches() -> list[Options]:
     ]
 
 
-def test_touches_in_each_others_field(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_touches_in_each_others_field(same_everywhere, margins):
     """Same bits everywhere, finite, on the skin, within max_touches; two that overlap lie within
     the outline of both."""
     model, blob = prebuilt()

@@ -1,15 +1,12 @@
 """The image gets worse no faster than the frames do."""
 
-from everywhere import SameEverywhere
 from losses import BITS, LEVELS, NOISE, ROWS_OUT, all_steps, errors_of
-
-from margins import Margins
 
 CASE = "problem/graceful-loss"
 DAMAGE = {"noise": NOISE, "rows left out": ROWS_OUT, "bits": tuple(2.0**-bits for bits in BITS)}
 
 
-def test_graceful_loss(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_graceful_loss(same_everywhere, margins):
     """The optimum follows the data as a projection does, no further than they move; so the error
     may grow in proportion to noise, rows lost and steps of the converter. Twice that is allowed,
     for the chance in where noise and losses fall, reckoned from the least damage that shows; and at

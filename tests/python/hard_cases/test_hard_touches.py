@@ -75,7 +75,7 @@ def check_alone(
 
 
 @pytest.mark.parametrize("where", ["on an electrode", "between electrodes"])
-def test_on_an_electrode(same_everywhere: SameEverywhere, margins: Margins, where: str) -> None:
+def test_on_an_electrode(same_everywhere, margins, where):
     """At the rim, over an electrode's middle or in a gap: one touch, inside the skin."""
     for one, (truth,) in zip(
         reconstruct(same_everywhere, frames_of(where)), groups()[where], strict=True
@@ -85,7 +85,7 @@ def test_on_an_electrode(same_everywhere: SameEverywhere, margins: Margins, wher
         margins.everywhere("physics/on-an-electrode", "centre beyond the rim", beyond, 0, "mm")
 
 
-def test_merge_and_part(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_merge_and_part(same_everywhere, margins):
     """Two touches of 9 mm: apart by 30 mm (12 mm of sheet between them, two pixels), two; nearer,
     two as near or one between them; then two again. Ids are never shared, and one that stays keeps
     its own."""
@@ -117,13 +117,13 @@ def test_merge_and_part(same_everywhere: SameEverywhere, margins: Margins) -> No
     assert len(common) == 1
 
 
-def test_centre(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_centre(same_everywhere, margins):
     """Farthest from every electrode, where the data say least."""
     (one,), ((truth,),) = reconstruct(same_everywhere, frames_of("centre")), groups()["centre"]
     check_alone(margins, "physics/centre", "centre", one, truth)
 
 
-def test_small(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_small(same_everywhere, margins):
     """3 mm, half of a pixel: found as one touch; its place to its diameter."""
     for one, (truth,) in zip(
         reconstruct(same_everywhere, frames_of("radius 3 mm")), groups()["radius 3 mm"], strict=True
@@ -131,7 +131,7 @@ def test_small(same_everywhere: SameEverywhere, margins: Margins) -> None:
         check_alone(margins, "physics/sizes", "radius 3 mm", one, truth, share=2.0)
 
 
-def test_large(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_large(same_everywhere, margins):
     """40 mm, beyond touch_max_radius_mm of 30: touches, perhaps several, but only within it and a
     pixel around; there, too, lies nearly all of the image's weight."""
     model, _ = prebuilt()
@@ -154,7 +154,7 @@ def test_large(same_everywhere: SameEverywhere, margins: Margins) -> None:
         )
 
 
-def test_contrasts(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_contrasts(same_everywhere, margins):
     """1.01 lies within the noise: nothing, or one touch there. 1.1 is found, to a diameter; from
     1.5 to 1,000 each is found in its place, and a stronger one is never given a lesser strength."""
     case, strength = "physics/contrasts", 0.0
@@ -180,7 +180,7 @@ def test_contrasts(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
 
 @pytest.mark.parametrize("sign", ["decrease", "both"])
-def test_insulating(same_everywhere: SameEverywhere, margins: Margins, sign: str) -> None:
+def test_insulating(same_everywhere, margins, sign):
     """Found, negative, under the signs that allow it."""
     outcomes = reconstruct(same_everywhere, frames_of("insulating"), sign)
     for one, (truth,) in zip(outcomes, groups()["insulating"], strict=True):
@@ -188,7 +188,7 @@ def test_insulating(same_everywhere: SameEverywhere, margins: Margins, sign: str
         assert one.touches[0].strength_s_per_m_mm2 < 0
 
 
-def test_insulating_under_the_other_sign(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_insulating_under_the_other_sign(same_everywhere, margins):
     """Where only increases are looked for, an insulating touch shows as increases around it: no
     coefficient has the other sign, and where touches are found that are none, it is said."""
     for one in reconstruct(same_everywhere, frames_of("insulating")):
@@ -202,7 +202,7 @@ def test_insulating_under_the_other_sign(same_everywhere: SameEverywhere, margin
         assert len(one.touches) < 3 or says_that_there_are_too_many(one)
 
 
-def test_light_presses(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_light_presses(same_everywhere, margins):
     """At the gate, 1.2 times the greatest correlation of 32 quiet frames: of 200 quiet frames at
     most 2 % are taken for a touch; as the press grows it is detected no less often, and in all
     places from twice the gate on."""
@@ -244,9 +244,7 @@ def is_one_group(one: Outcome, touches: tuple[TrueTouch, ...]) -> bool:
     )
 
 
-def test_more_touches_than_can_be_told_apart(
-    same_everywhere: SameEverywhere, margins: Margins
-) -> None:
+def test_more_touches_than_can_be_told_apart(same_everywhere, margins):
     """Finite, on the skin, at most as many as asked for; and that they are too many is said, but
     where each is found all the same, and for a group within the size of one touch, which is found
     as one that covers it."""

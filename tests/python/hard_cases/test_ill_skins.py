@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from everywhere import Host, Outcome, SameEverywhere, as_float32, on_host
+from everywhere import Host, Outcome, as_float32, on_host
 from hard_skins import SKINS, HardSkin, hard_skin
 from soundness import U, check_sound, judged
 
@@ -69,9 +69,7 @@ def compare_widths(
 
 
 @pytest.mark.parametrize("name", SKINS)
-def test_ill_conditioned_skins(
-    same_everywhere: SameEverywhere, margins: Margins, name: str
-) -> None:
+def test_ill_conditioned_skins(same_everywhere, margins, name):
     """The default settings give finite images and touches; each solver, without projection so that
     S is the whole problem, a sound result; and to a small gap, float32 what float64 gives."""
     h = hard_skin(name)

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from everywhere import SameEverywhere, on_host
+from everywhere import on_host
 from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import RandomProblem, asked, gaussian, optimum_of, smooth, whitened
 from soundness import Judged, U, check_sound, judged
@@ -49,7 +49,7 @@ def check_rate(margins: Margins, name: str, best: Judged, k: int, point: Judged)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_iterations(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
+def test_iterations(same_everywhere, margins, solver):
     """Coordinate descent and active set never raise the objective but for rounding. FISTA may
     ripple; it stays within its rate, and so does the working set, whose columns left out are looked
     after."""
@@ -100,9 +100,7 @@ def precise(problem: RandomProblem, solver: str, sign: str) -> list[Step]:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_float32_against_float64(
-    same_everywhere: SameEverywhere, margins: Margins, solver: str
-) -> None:
+def test_float32_against_float64(same_everywhere, margins, solver):
     """Both to a gap of 1e-5 |y|^2/2. The objective is strongly convex in S x: f(x) - f* >= |S (x -
     x*)|^2 / 2 at the optimum x*, so a gap g leaves S x within sqrt(2 g) of the optimum's, and two
     results within the sum. On the columns where either is not zero x itself differs by at most that

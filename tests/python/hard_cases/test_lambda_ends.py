@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-from everywhere import SameEverywhere
 from made_models import made_blob, plain_options
 from random_problems import RANK, gaussian
 from soundness import check_sound, judged
 
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
-from margins import Margins
 
 CASE = "problem/lambda-ends"
 EPSILON = 2.0**-23
@@ -27,7 +25,7 @@ def at_the_ends(top: np.float32) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_lambda_ends(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
+def test_lambda_ends(same_everywhere, margins, solver):
     """Zero from lambda_max on. What "at" means is the core's own sum of ``RANK`` products, read
     back from a first solve."""
     problem = gaussian(1)

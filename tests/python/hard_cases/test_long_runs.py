@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from everywhere import SameEverywhere, on_host
+from everywhere import on_host
 from made_models import made_blob, plain_options
 from random_problems import gaussian
 from soundness import check_sound, judged
@@ -13,7 +13,6 @@ from soundness import check_sound, judged
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
-from margins import Margins
 from small_models import small, small_blob, small_model
 
 ITERATIONS_CASE, WARM_CASE = "time/iterations", "time/warm-frames"
@@ -22,9 +21,7 @@ HELD, FEW = 3_000, 100
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_hundred_thousand_iterations(
-    same_everywhere: SameEverywhere, margins: Margins, solver: str
-) -> None:
+def test_a_hundred_thousand_iterations(same_everywhere, margins, solver):
     """Rounding does not gather: what is lost between 100 iterations and 100,000 is never more than
     the rounding of one objective each."""
     problem = gaussian(91, 8, 12)
@@ -53,7 +50,7 @@ def test_a_hundred_thousand_iterations(
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_warm_frames(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
+def test_warm_frames(same_everywhere, margins, solver):
     """A touch held for thousands of frames: the gap after each warm frame is at most that of a cold
     one, but for rounding, and the last image is as near to the optimum as the first warm ones.
     Lifted off, it is gone in the next frame: no ghost.

@@ -4,13 +4,12 @@ so."""
 from dataclasses import replace
 
 import numpy as np
-from everywhere import Outcome, SameEverywhere, as_printed
+from everywhere import Outcome, as_printed
 
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
-from margins import Margins
 from small_models import small, small_blob, small_model
 
 NO_REFERENCE = -13
@@ -37,7 +36,7 @@ def unlike(some: list[Outcome], others: list[Outcome]) -> int:
     )
 
 
-def test_model_swapped(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_model_swapped(same_everywhere, margins):
     """A second model takes the first one's memory: until it has a reference of its own no frame is
     taken; then nothing is left of the first, whatever its storage, data and size."""
     s, other = small(), small("l")
@@ -108,7 +107,7 @@ def changes() -> list[Options]:
     ]
 
 
-def test_options_changed(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_options_changed(same_everywhere, margins):
     """Cold starts: each frame is as in a context that never had other options. Warm ones: a sign,
     once changed, leaves nothing that it forbids."""
     s, blob, case = small(), small_blob(), "time/options-changed"
@@ -144,7 +143,7 @@ def test_options_changed(same_everywhere: SameEverywhere, margins: Margins) -> N
         margins.everywhere(case, "pixels of a sign no longer wanted", wrong, 0, "pixels")
 
 
-def test_tare_in_midstream(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_tare_in_midstream(same_everywhere, margins):
     """A new reference, at rest or under a held touch: what follows is as in a context that never
     had another, warm starts included; a tare that is refused leaves no reference, and frames are
     refused until one is taken.

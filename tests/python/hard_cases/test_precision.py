@@ -3,16 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-from everywhere import SameEverywhere
 from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_steps
 
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
-from margins import Margins
 from small_models import prebuilt
 
 
-def test_error_over_the_condition_number(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_error_over_the_condition_number(same_everywhere, margins):
     """What the data say is as exact at any condition; coefficients lose with it."""
     _, outcomes = same_everywhere.steps(condition_steps())
     for condition, found in zip(CONDITIONS, by_condition(outcomes), strict=True):
@@ -21,7 +19,7 @@ def test_error_over_the_condition_number(same_everywhere: SameEverywhere, margin
         assert np.isfinite(found.coefficients)
 
 
-def test_change_down_to_the_last_bit(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_change_down_to_the_last_bit(same_everywhere, margins):
     """The error of the data is what rounding each voltage costs; where nothing is left of the
     change, there is no image and no touch; a last bit in every row gives finite numbers."""
     for size, found in zip(CHANGES, by_change(), strict=True):

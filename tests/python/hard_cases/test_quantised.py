@@ -3,7 +3,7 @@ quantiser."""
 
 import numpy as np
 import pytest
-from everywhere import SameEverywhere, on_host
+from everywhere import on_host
 from made_models import made_model, plain_options
 from random_problems import RandomProblem, asked, gaussian, rounded, smooth, with_data
 from soundness import check_sound, judged, objective_of
@@ -12,7 +12,6 @@ from eitskin.core.options_table import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.model.storage import STORAGES, store
 from eitskin_studies.harness.emulated_steps import Step
-from margins import Margins
 
 CASE = "problem/quantised"
 HALF_STEP = {"i8": 0.5 / 127, "i16": 0.5 / 32767}  # of a column's greatest number
@@ -48,7 +47,7 @@ def entry_errors(s: np.ndarray, storage: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_quantised(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
+def test_quantised(same_everywhere, margins, solver):
     """With S' = S + E stored and e(x) = sum_j |x_j| |E_j|, |y - S x| and |y - S' x| differ by at
     most e(x). So x', within a gap g of the optimum of S', has f(x') <= f* + g + |r'| e(x') +
     e(x')^2 / 2 + |r*| e(x*) + e(x*)^2 / 2 in the problem of S, and by strong convexity |S (x' -
@@ -102,7 +101,7 @@ def test_quantised(same_everywhere: SameEverywhere, margins: Margins, solver: st
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_what_does_not_fit_is_refused(storage: str) -> None:
+def test_what_does_not_fit_is_refused(storage):
     """Beyond the type's greatest number; and a column too small for a step is silent, not
     rubbish."""
     for value in (1e39, np.inf, np.nan, *((65520.0,) if storage == "f16" else ())):

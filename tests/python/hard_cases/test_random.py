@@ -4,7 +4,7 @@ same bits everywhere."""
 from typing import Any
 
 import numpy as np
-from everywhere import SameEverywhere, on_host
+from everywhere import on_host
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from made_models import made_model, plain_options
@@ -15,7 +15,6 @@ from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.model.eitm import encode_model
 from eitskin.model.storage import STORAGES
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
-from margins import Margins
 
 CASE = "problem/any"
 EXAMPLES = 150
@@ -80,7 +79,7 @@ def steps_of(given_problem: dict[str, Any]) -> tuple[np.ndarray, list[Step]]:
     ]
 
 
-def test_any_problem(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_any_problem(same_everywhere, margins):
     """On this host example by example; then all of them at once on the others."""
     steps: list[Step] = []
 

@@ -2,18 +2,15 @@
 none."""
 
 import numpy as np
-from everywhere import SameEverywhere
 from fault_scenes import COUNT, frames_of, miou, noisy, played, rms_v, simulated, touched
 from test_rows import options, run
-
-from margins import Margins
 
 GAINS = (0.8, 0.95, 0.99, 1.01, 1.05, 1.2)
 JUMPS = (-0.05, -0.01, 0.01, 0.05)  # of rms(V0)
 HOUR_S = 3600.0
 
 
-def test_gain_drift(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_gain_drift(same_everywhere, margins):
     """The whole gain off by 1 to 20 %: the peak follows it and loses no more; at 5 % at most 2
     %."""
     case = "frames/gain-drift"
@@ -30,7 +27,7 @@ def test_gain_drift(same_everywhere: SameEverywhere, margins: Margins) -> None:
         margins.everywhere(case, f"MIoU lost at gain {gain:g}", worse[:, g].mean(), 0.02)
 
 
-def test_drying(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_drying(same_everywhere, margins):
     """A gel that dries for an hour since the tare: touches stay where they are."""
     hour = {"rate_hz": 3 / HOUR_S, "frames": 4}
     dried = played(lambda k: noisy(k, frames_of(k, {"gel_drying": {}}, **hour)[1:], 2))
@@ -43,7 +40,7 @@ def test_drying(same_everywhere: SameEverywhere, margins: Margins) -> None:
     margins.everywhere("frames/drying", "MIoU lost in an hour", np.mean(losses, axis=0).max(), 0.03)
 
 
-def test_common_mode_jump(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_common_mode_jump(same_everywhere, margins):
     """A constant on all rows: nothing is left out for it; 1 % of rms(V0) costs little, and at 5 %
     most frames are named."""
     offset = played(
@@ -70,7 +67,7 @@ def test_common_mode_jump(same_everywhere: SameEverywhere, margins: Margins) -> 
     )
 
 
-def test_touch_during_tare(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_touch_during_tare(same_everywhere, margins):
     """Not to be known then. Once it has gone, the change goes the way touches cannot, and that is
     said."""
     lifts = []
@@ -84,7 +81,7 @@ def test_touch_during_tare(same_everywhere: SameEverywhere, margins: Margins) ->
     margins.everywhere("frames/touch-during-tare", "lifts that were not named", missed, 0, "frames")
 
 
-def test_lift_off(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_lift_off(same_everywhere, margins):
     """Held for ten warm-started frames, then lifted: the very next frame is as empty as if nothing
     had been there."""
     held, after = 10, 5

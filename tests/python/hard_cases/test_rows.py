@@ -11,7 +11,6 @@ from fault_scenes import COUNT, half, miou, played, quiet_frames, rms_v, simulat
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
-from margins import Margins
 from small_models import prebuilt
 
 OUTLIERS = (0.05, 0.3, 1.0, 5.0)  # of rms(V0)
@@ -20,7 +19,7 @@ CHANNELS, ZERO = -11, -12  # eits_status
 
 def options(**changes: object) -> Options:
     """The model's own, with some changed."""
-    return replace(default_options(prebuilt()[0]), **changes)  # type: ignore[arg-type]
+    return replace(default_options(prebuilt()[0]), **changes)
 
 
 def run(
@@ -44,7 +43,7 @@ def damaged(k: int, amplitude: float) -> np.ndarray:
     return frame
 
 
-def test_outlier(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_outlier(same_everywhere, margins):
     """One row of a full scan off by 5 % of rms(V0) to five times that: left out, counted, and
     hardly seen."""
     spoilt = played(lambda k: [touched(k), *(damaged(k, a) for a in OUTLIERS)])
@@ -59,7 +58,7 @@ def test_outlier(same_everywhere: SameEverywhere, margins: Margins) -> None:
         margins.everywhere("frames/outlier", f"MIoU lost to {amplitude:g} rms(V0)", loss, 0.02)
 
 
-def test_outlier_in_half_scans(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_outlier_in_half_scans(same_everywhere, margins):
     """Without reciprocals only what the other rows contradict can be told: the mean loss is at most
     half of what it would be."""
     found, blind = [], []
@@ -74,7 +73,7 @@ def test_outlier_in_half_scans(same_everywhere: SameEverywhere, margins: Margins
     margins.everywhere("frames/outlier", "MIoU lost in half scans", np.mean(found), bound)
 
 
-def test_outlier_in_the_reference(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_outlier_in_the_reference(same_everywhere, margins):
     """One reading of one of 16 quiet frames off by rms(V0) / 2: left out of the reference and of
     its noise."""
     pairs = []
@@ -92,7 +91,7 @@ def test_outlier_in_the_reference(same_everywhere: SameEverywhere, margins: Marg
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_not_finite(same_everywhere: SameEverywhere, margins: Margins, value: float) -> None:
+def test_not_finite(same_everywhere, margins, value):
     """One, 10 or 40 rows: left out. More than half of them: refused, the image cleared, and the
     next frame as ever."""
     good, generator = touched(0), np.random.default_rng(5)
@@ -116,7 +115,7 @@ def test_not_finite(same_everywhere: SameEverywhere, margins: Margins, value: fl
     assert (again.image == clean.image).all()
 
 
-def test_zero_and_denormal(same_everywhere: SameEverywhere) -> None:
+def test_zero_and_denormal(same_everywhere):
     """All zero: a dead front end, refused as such, though every electrode looks open. Denormal
     numbers: no touch."""
     good = touched(0)
@@ -130,7 +129,7 @@ def test_zero_and_denormal(same_everywhere: SameEverywhere) -> None:
     assert (again.image == clean.image).all()
 
 
-def test_one_denormal_row(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_one_denormal_row(same_everywhere, margins):
     """A row that fell to 1e-39 V is an outlier like any other."""
     good = touched(0)
     row = int(np.abs(simulated()[0]["quiet"]).argmax())
@@ -146,7 +145,7 @@ def test_one_denormal_row(same_everywhere: SameEverywhere, margins: Margins) -> 
     )
 
 
-def test_saturation_in_touch(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_saturation_in_touch(same_everywhere, margins):
     """Rows at the limit are left out and counted apart."""
     good = touched(0)
     limit = 1.05 * float(np.abs(quiet_frames(0)).max())
@@ -166,7 +165,7 @@ def test_saturation_in_touch(same_everywhere: SameEverywhere, margins: Margins) 
     )
 
 
-def test_saturation_in_the_reference(same_everywhere: SameEverywhere) -> None:
+def test_saturation_in_the_reference(same_everywhere):
     """A saturated quiet frame is no reference, whether the touch saturates too or not; the same
     status everywhere."""
     quiet, limit = quiet_frames(0), float(np.abs(quiet_frames(0)).max())
@@ -174,7 +173,7 @@ def test_saturation_in_the_reference(same_everywhere: SameEverywhere) -> None:
     assert same_everywhere.steps(steps)[0] == [0, 0, CHANNELS]
 
 
-def test_clean_frames_are_left_alone(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_clean_frames_are_left_alone(same_everywhere, margins):
     """Nothing is found, and the bits are those without any diagnostic."""
     clean = played(lambda k: [touched(k)])
     uncrowded = options().diagnostics & ~(1 << 7)  # crowded scenes: test_hard_touches.py

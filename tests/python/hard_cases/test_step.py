@@ -3,14 +3,12 @@ it, or gives zero and says so."""
 
 import numpy as np
 import pytest
-from everywhere import SameEverywhere
 from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import gaussian, optimum_of, smooth, whitened
 from soundness import check_sound, judged
 
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
-from margins import Margins
 
 CASE = "problem/step-too-long"
 MAX_HALVINGS = 8
@@ -20,9 +18,7 @@ PROBLEMS = {"gaussian": gaussian(31), "smooth": smooth(32), "whitened": whitened
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("iterations", [3, 300])
-def test_step_too_long(
-    same_everywhere: SameEverywhere, margins: Margins, solver: str, iterations: int
-) -> None:
+def test_step_too_long(same_everywhere, margins, solver, iterations):
     """Up to 2^8 times too long, the halvings leave most of 300 iterations: at least 99 % of what
     the objective can lose is lost. Where the step cannot be brought down, or there is no time, the
     image is zero and the stop is "diverged". Coordinate descent and active set take no step from

@@ -30,9 +30,7 @@ RANK = 37  # as small_model has it
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_powers_of_two_and_turned_signs(
-    same_everywhere: SameEverywhere, margins: Margins, solver: str
-) -> None:
+def test_powers_of_two_and_turned_signs(same_everywhere, margins, solver):
     """Data and lambda times 2^k: coefficients times 2^k. Data turned, the other sign: coefficients
     turned. Both bit for bit."""
     problem = gaussian(51)
@@ -71,7 +69,7 @@ def test_powers_of_two_and_turned_signs(
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_polarity(same_everywhere: SameEverywhere, margins: Margins, data_kind: str) -> None:
+def test_polarity(same_everywhere, margins, data_kind):
     """Wires swapped at current or voltage turn every sign, in quiet frames too: the same bits."""
     s, blob = small(), small_blob("f32", data_kind)
     options = default_options(small_model("f32", data_kind))
@@ -155,9 +153,7 @@ def check_alike(
 
 
 @pytest.mark.parametrize("what", ["rotation by one electrode", "numbered the other way round"])
-def test_electrodes_relabelled(
-    same_everywhere: SameEverywhere, margins: Margins, what: str
-) -> None:
+def test_electrodes_relabelled(same_everywhere, margins, what):
     """The same electrodes under other numbers, and the protocol's table in those numbers: the same
     rows, from mesh to image."""
     s = small()
@@ -186,9 +182,7 @@ def test_electrodes_relabelled(
     )
 
 
-def test_channels_permuted_with_the_protocol(
-    same_everywhere: SameEverywhere, margins: Margins
-) -> None:
+def test_channels_permuted_with_the_protocol(same_everywhere, margins):
     s = small()
     order = np.random.default_rng(5).permutation(s.protocol.n_rows)
     protocol = table(COUNT, s.protocol.drive_measure[order].astype(int))
@@ -257,9 +251,7 @@ def symmetric(linear: Linearisation, protocol: Protocol) -> Linearisation:
 
 
 @pytest.mark.parametrize("what", ["a quarter turn of the disk", "the disk in a mirror"])
-def test_the_disk_turned_and_mirrored(
-    same_everywhere: SameEverywhere, margins: Margins, what: str
-) -> None:
+def test_the_disk_turned_and_mirrored(same_everywhere, margins, what):
     """A touch elsewhere by symmetry is the same touch: its frame is the rows' permutation, its
     image the pixels'."""
     s, protocol = small(), adjacent(COUNT)

@@ -4,12 +4,11 @@ that are missing."""
 from dataclasses import replace
 
 import numpy as np
-from everywhere import Outcome, SameEverywhere
+from everywhere import Outcome
 
 from eitskin.core.results import Options
 from eitskin.model.options import default_options, tracking
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
-from margins import Margins
 from small_models import small, small_blob, small_model
 
 NOISE = 1e-3
@@ -44,7 +43,7 @@ def ids(outcomes: list[Outcome]) -> list[tuple[int, ...]]:
     return [tuple(touch.id for touch in one.touches) for one in outcomes]
 
 
-def test_noise_that_flickers(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_noise_that_flickers(same_everywhere, margins):
     """Quiet frames at half of the gate: without tracking many of them have a touch, and each that
     comes is another; with it a touch has to come twice to one place."""
     low = options(detection_factor=0.6)
@@ -60,7 +59,7 @@ def test_noise_that_flickers(same_everywhere: SameEverywhere, margins: Margins) 
     )
 
 
-def test_a_finger_that_lifts(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_a_finger_that_lifts(same_everywhere, margins):
     """A clear touch that is lifted is told no more from the next frame on, and one that comes at
     its place later is another."""
     place = (10.0, 15.0)
@@ -82,7 +81,7 @@ def test_a_finger_that_lifts(same_everywhere: SameEverywhere, margins: Margins) 
     assert seen[16] == ()
 
 
-def test_frames_that_are_missing(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_frames_that_are_missing(same_everywhere, margins):
     """A moving finger; frames that the core refuses in between, or that never came: it keeps its
     id, and stays a number."""
     path: list[tuple[float, float] | None] = [(-30.0 + 2.5 * k, 5.0) for k in range(24)]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from everywhere import SameEverywhere, as_float32
+from everywhere import as_float32
 from made_models import made_blob, made_model, plain_options
 from random_problems import gaussian, rounded
 from soundness import Judged, U, check_sound, judged
@@ -67,9 +67,7 @@ def check_scaled(
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_units_of_model_and_data(
-    same_everywhere: SameEverywhere, margins: Margins, solver: str
-) -> None:
+def test_units_of_model_and_data(same_everywhere, margins, solver):
     """S times a, y times b, each alone and both together: x times b / a, while squares are
     numbers."""
     problem = gaussian(1)
@@ -127,7 +125,7 @@ def reduced(
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_units_of_frames(same_everywhere: SameEverywhere, margins: Margins, data_kind: str) -> None:
+def test_units_of_frames(same_everywhere, margins, data_kind):
     """Frames and quiet frames in other volts: the gain brings them to the model's, from 1e-38 to
     1e37. Every voltage is rounded again, by u of itself, and so is every mean of 8 quiet ones, 8
     times; their difference, times the gain, is so off by at most (1 + 8 + 3) u of the model's own
@@ -181,7 +179,7 @@ def test_units_of_frames(same_everywhere: SameEverywhere, margins: Margins, data
 
 
 @pytest.mark.parametrize("width", ["float32", "float64"])
-def test_the_noise_has_the_units_of_the_frames(margins: Margins, width: str) -> None:
+def test_the_noise_has_the_units_of_the_frames(margins, width):
     """rms over rows of the deviation: a square of volts would leave float32 at 1e-23 and 1e19."""
     s = small()
     quiet = s.quiet(31, 8)
@@ -198,7 +196,7 @@ def test_the_noise_has_the_units_of_the_frames(margins: Margins, width: str) -> 
         )
 
 
-def test_a_model_that_float32_cannot_hold_is_refused_in_one_line() -> None:
+def test_a_model_that_float32_cannot_hold_is_refused_in_one_line():
     good = made_model(gaussian(1).s)
     for value in (1e39, float("inf"), float("nan"), 1e-39, 0.0, -1.0):
         with pytest.raises(EitskinError) as error:

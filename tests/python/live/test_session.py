@@ -1,7 +1,6 @@
 """Sessions: one generator for all, bounded for ever, told by one message."""
 
 import json
-from pathlib import Path
 
 import jsonschema
 import numpy as np
@@ -21,14 +20,14 @@ from small_models import session as small_session
 VALID = jsonschema.Draft202012Validator(schema())
 
 
-def test_the_schema_is_one() -> None:
+def test_the_schema_is_one():
     jsonschema.Draft202012Validator.check_schema(schema())
     for wrong in ({}, {"version": 2, "type": "frame"}, {"version": 1, "type": "frame"}):
         assert not VALID.is_valid(wrong)
 
 
 @pytest.mark.parametrize("mode", ["touches", "raw,image,touches", "image", "raw"])
-def test_what_stream_prints_is_valid(mode: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_stream_prints_is_valid(mode, capsys):
     command = ["stream", "--device", "sim:two_touch", "--frames", "3", "--json", "--mode", mode]
     assert main(command) == 0
     *frames, last = map(json.loads, capsys.readouterr().out.splitlines())
@@ -39,9 +38,7 @@ def test_what_stream_prints_is_valid(mode: str, capsys: pytest.CaptureFixture[st
     assert all(frame["time_unix_s"] > 1.7e9 for frame in frames)
 
 
-def test_what_reconstruct_prints_is_valid(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_reconstruct_prints_is_valid(tmp_path, capsys):
     path = tmp_path / "frames.npz"
     frames = small_session().as_frames()
     save_frames(path, frames)
@@ -53,7 +50,7 @@ def test_what_reconstruct_prints_is_valid(
     VALID.validate(Notice("link", "link: gap (2 packets)", 0.5, 1.8e9).message())
 
 
-def test_a_sample_stays_bounded_and_fair() -> None:
+def test_a_sample_stays_bounded_and_fair():
     sample = Sample()
     for value in range(SIZE):
         sample.add(value)
@@ -68,7 +65,7 @@ def test_a_sample_stays_bounded_and_fair() -> None:
     assert np.isnan(Sample().quantile(0.5))
 
 
-def test_a_summary_of_a_day_is_as_large_as_one_of_a_minute() -> None:
+def test_a_summary_of_a_day_is_as_large_as_one_of_a_minute():
     settings = SessionSettings(mode=Stream.TOUCHES, frames=1)
     with Session("sim:swipe", settings) as session:
         (frame,) = [item for item in session.items() if isinstance(item, LiveFrame)]
@@ -78,7 +75,7 @@ def test_a_summary_of_a_day_is_as_large_as_one_of_a_minute() -> None:
     assert summary.frames == 3 * SIZE and len(summary.solve_us.values) == SIZE
 
 
-def test_a_board_is_asked_between_frames() -> None:
+def test_a_board_is_asked_between_frames():
     """The stream goes on, and its clock with it."""
     settings = SessionSettings(mode=Stream.TOUCHES)
     with Session("sim:swipe", settings) as session:
@@ -99,7 +96,7 @@ def test_a_board_is_asked_between_frames() -> None:
     assert len(times) == 20 and np.all(np.diff(times) > 0) and np.all(np.diff(numbers) > 0)
 
 
-def test_a_recording_is_asked_too_and_says_no(tmp_path: Path) -> None:
+def test_a_recording_is_asked_too_and_says_no(tmp_path):
     run = tmp_path / "run.eits"
     settings = SessionSettings(mode=Stream.TOUCHES, record=run, frames=6)
     with Session("sim:swipe", settings) as session:

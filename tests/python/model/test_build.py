@@ -35,9 +35,7 @@ KINDS = (
 
 
 @pytest.mark.parametrize(("outline", "kind", "electrodes", "rows", "folded"), KINDS)
-def test_every_shape_and_protocol(
-    outline: str, kind: str, electrodes: int, rows: int, folded: int
-) -> None:
+def test_every_shape_and_protocol(outline, kind, electrodes, rows, folded):
     s = small(outline, kind, electrodes)
     blob = small_blob("f32", "difference", outline, kind, electrodes)
     model = decode_model(blob, "x")
@@ -63,7 +61,7 @@ def test_every_shape_and_protocol(
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
-def test_golden_frame_of_every_storage_and_data_kind(storage: str, data_kind: str) -> None:
+def test_golden_frame_of_every_storage_and_data_kind(storage, data_kind):
     blob = small_blob(storage, data_kind)
     engines = [
         CoreEngine(blob, prepared=prepared, portable=portable)
@@ -79,7 +77,7 @@ def test_golden_frame_of_every_storage_and_data_kind(storage: str, data_kind: st
     assert np.abs(image - model.golden.image).max() < 1e-4 * np.abs(model.golden.image).max()
 
 
-def test_the_golden_image_shows_its_two_discs() -> None:
+def test_the_golden_image_shows_its_two_discs():
     model = prebuilt()[0]
     centres, image = model.grid.centres_mm(), model.golden.image
     size = np.ptp(centres, axis=0).min()
@@ -96,7 +94,7 @@ def test_the_golden_image_shows_its_two_discs() -> None:
 
 
 @pytest.mark.parametrize("storage", STORAGES[1:])
-def test_storages_show_the_same_image(storage: str) -> None:
+def test_storages_show_the_same_image(storage):
     """Narrow storage costs little: the golden image within 3 % of the peak in int8, far less in the
     others."""
     whole, narrow = small_model("f32"), small_model(storage)
@@ -106,7 +104,7 @@ def test_storages_show_the_same_image(storage: str) -> None:
     assert found == whole.stored.columns.nbytes
 
 
-def test_normalised_data_divide_the_jacobian_by_the_reference() -> None:
+def test_normalised_data_divide_the_jacobian_by_the_reference():
     s, model = small(), small_model("f32", "normalised")
     jacobian = (
         fold_rows(s.linear.jacobian, model.fold) / fold_rows(s.linear.v0_v, model.fold)[:, None]
@@ -117,7 +115,7 @@ def test_normalised_data_divide_the_jacobian_by_the_reference() -> None:
     )
 
 
-def test_defaults_scale_with_the_skin() -> None:
+def test_defaults_scale_with_the_skin():
     skin = paper_skin()
     assert scaled_defaults(skin, "difference") == prebuilt()[0].defaults
     half = scaled_defaults(small().skin, "difference", 2.0)
@@ -139,7 +137,7 @@ def images_of(model: Model) -> np.ndarray:
     return np.array([reconstructor.reconstruct(frame, touches=False).image for frame in frames])
 
 
-def test_the_prebuilt_model_is_what_the_builder_makes() -> None:
+def test_the_prebuilt_model_is_what_the_builder_makes():
     """Meshes of other netgen versions differ a little, so images are compared loosely; on one mesh,
     all numbers closely."""
     old, new = (
@@ -182,18 +180,18 @@ def test_the_prebuilt_model_is_what_the_builder_makes() -> None:
         ({"column_power": 2.0}, "column power"),
     ],
 )
-def test_settings_that_cannot_be(changes: dict[str, float], text: str) -> None:
+def test_settings_that_cannot_be(changes, text):
     s = small()
     with pytest.raises(UsageError, match=text):
         make_model(s.skin, s.protocol, s.linear, replace(BuildSettings(), **changes))
 
 
-def test_more_pixels_than_a_model_holds_are_refused_before_meshing() -> None:
+def test_more_pixels_than_a_model_holds_are_refused_before_meshing():
     with pytest.raises(UsageError, match=r"205\d{3} pixels are more than a model's 65535"):
         build_model(paper_skin(), adjacent(16), BuildSettings(pixels_across=512))
 
 
-def test_a_row_whose_reference_vanishes_says_nothing_as_a_ratio() -> None:
+def test_a_row_whose_reference_vanishes_says_nothing_as_a_ratio():
     s = small()
     v0 = s.linear.v0_v.copy()
     v0[[0, s.protocol.reciprocal_pairs().second[0]]] = 0

@@ -34,7 +34,7 @@ def refusal(blob: bytes) -> str:
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
-def test_round_trip(storage: str, data_kind: str) -> None:
+def test_round_trip(storage, data_kind):
     blob = small_blob(storage, data_kind)
     first = decode_model(blob, "first")
     again = decode_model(encode_model(first), "again")
@@ -60,7 +60,7 @@ def test_round_trip(storage: str, data_kind: str) -> None:
     assert first.meta == again.meta
 
 
-def test_the_order_of_drives_is_kept_and_only_whole_ones_are_read() -> None:
+def test_the_order_of_drives_is_kept_and_only_whole_ones_are_read():
     made = replace(prebuilt()[0], protocol=in_order(prebuilt()[0].protocol, "by 7"))
     blob = encode_model(made)
     assert struct.unpack_from("<2H", blob, 4) == (1, 6)
@@ -80,7 +80,7 @@ def test_the_order_of_drives_is_kept_and_only_whole_ones_are_read() -> None:
             CoreEngine(sealed(broken))
 
 
-def test_the_factor_of_places_is_kept_and_only_a_number_is_read() -> None:
+def test_the_factor_of_places_is_kept_and_only_a_number_is_read():
     blob = encode_model(replace(small_model(), place_factor=4.5))
     assert struct.unpack_from("<2H", blob, 4) == (1, 8)
     assert decode_model(blob, "x").place_factor == 4.5
@@ -94,7 +94,7 @@ def test_the_factor_of_places_is_kept_and_only_a_number_is_read() -> None:
             CoreEngine(sealed(broken))
 
 
-def test_header_as_documented() -> None:
+def test_header_as_documented():
     blob = small_blob()
     assert blob[:4] == b"EITM"
     assert struct.unpack_from("<HH", blob, 4) == (1, 3)
@@ -107,7 +107,7 @@ def test_header_as_documented() -> None:
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_sections_as_documented(storage: str) -> None:
+def test_sections_as_documented(storage):
     """Every section's size and content, read by offsets alone."""
     blob, model, linear = small_blob(storage), small_model(storage), small().linear
     sections = sections_of(blob)
@@ -158,7 +158,7 @@ def fold_section(blob: bytes) -> np.ndarray:
     return np.frombuffer(blob, "<u2", place.size // 2, place.offset).reshape(-1, 4)
 
 
-def test_reciprocals_of_the_other_sign() -> None:
+def test_reciprocals_of_the_other_sign():
     """Opposite drive is repeated the other way round half a turn later."""
     blob = small_blob(outline="l", kind="opposite")
     fold = fold_section(blob)
@@ -167,7 +167,7 @@ def test_reciprocals_of_the_other_sign() -> None:
     assert (decode_model(blob, "x").fold.sign == -1).all()
 
 
-def test_rows_without_a_reciprocal_are_marked() -> None:
+def test_rows_without_a_reciprocal_are_marked():
     s = small("l", "opposite")
     half = Linearisation(
         s.linear.grid, s.linear.jacobian[:96], s.linear.v0_v[:96], s.linear.elements
@@ -186,17 +186,17 @@ python -c "from eitskin.model import eitm; p='python/eitskin/model/paper.eitm'
 eitm.save_model(p, eitm.load_model(p)[0])" """
 
 
-def test_the_prebuilt_model_is_written_again_bit_for_bit() -> None:
+def test_the_prebuilt_model_is_written_again_bit_for_bit():
     model, blob = prebuilt()
     assert encode_tested(model) == blob, REWRITE
     assert len(blob) < 384 * 1024
 
 
-def test_bytes_after_the_end_do_not_belong_to_the_model() -> None:
+def test_bytes_after_the_end_do_not_belong_to_the_model():
     assert encode_model(decode_model(tiny_blob() + b"and more", "x")) == tiny_blob()
 
 
-def test_a_truncation_is_said_to_be_one() -> None:
+def test_a_truncation_is_said_to_be_one():
     blob = tiny_blob()
     for length in range(4, len(blob), 7):
         assert "truncated" in refusal(blob[:length])
@@ -205,11 +205,11 @@ def test_a_truncation_is_said_to_be_one() -> None:
 @pytest.mark.parametrize(
     "content", [b"", b"E", b"PK\x03\x04" + bytes(200), b"[skin]\nname = 'x'\n" * 20]
 )
-def test_a_foreign_file_is_no_model(content: bytes) -> None:
+def test_a_foreign_file_is_no_model(content):
     assert "not an .eitm model" in refusal(content)
 
 
-def test_a_newer_major_is_refused_before_the_checksum() -> None:
+def test_a_newer_major_is_refused_before_the_checksum():
     blob = bytearray(tiny_blob())
     blob[4] = 2
     blob[100] ^= 1
@@ -232,18 +232,18 @@ def with_extra_section(tag: bytes, flags: int) -> bytes:
     return sealed(whole, total=len(whole), count=count)
 
 
-def test_an_unknown_optional_section_is_skipped() -> None:
+def test_an_unknown_optional_section_is_skipped():
     model = decode_model(with_extra_section(b"NEWS", 0), "x")
     assert encode_model(model) == tiny_blob()
 
 
-def test_an_unknown_required_section_is_refused() -> None:
+def test_an_unknown_required_section_is_refused():
     assert "needs section 'NEWS', which this eitskin does not know" in refusal(
         with_extra_section(b"NEWS", 1)
     )
 
 
-def test_a_section_that_stands_twice_is_refused() -> None:
+def test_a_section_that_stands_twice_is_refused():
     assert "'COLW' is misplaced or repeated" in refusal(with_extra_section(b"COLW", 1))
 
 
@@ -256,12 +256,12 @@ def without(name: str, storage: str = "f32") -> bytes:
 
 
 @pytest.mark.parametrize("name", eitm_sections.REQUIRED)
-def test_a_missing_section_is_named(name: str) -> None:
+def test_a_missing_section_is_named(name):
     assert f"section {name!r} is missing" in refusal(without(name))
 
 
 @pytest.mark.parametrize("storage", ["i8", "f32"])
-def test_scales_go_with_integers_only(storage: str) -> None:
+def test_scales_go_with_integers_only(storage):
     if storage == "i8":
         assert "section 'SCAL' of no bytes" in refusal(without("SCAL", "i8"))
     else:
@@ -276,7 +276,7 @@ def test_scales_go_with_integers_only(storage: str) -> None:
     ],
     ids=lambda content: repr(content[:12]),
 )  # fmt: skip
-def test_meta_must_be_an_object(content: bytes) -> None:
+def test_meta_must_be_an_object(content):
     blob = tiny_blob()
     padded = content + bytes(-len(content) % 16)
     whole = bytearray(blob + padded)
@@ -284,7 +284,7 @@ def test_meta_must_be_an_object(content: bytes) -> None:
     assert "'META'" in refusal(sealed(bytes(whole), total=len(whole)))
 
 
-def test_save_and_load(tmp_path: Path) -> None:
+def test_save_and_load(tmp_path):
     path = tmp_path / "small.eitm"
     size = save_model(path, small_model())
     assert path.stat().st_size == size
@@ -294,7 +294,7 @@ def test_save_and_load(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["small.eitm"]
 
 
-def test_another_core_than_the_one_that_wrote_the_checksums_is_told() -> None:
+def test_another_core_than_the_one_that_wrote_the_checksums_is_told():
     blob = encode_tested(small_model())
     sums = CoreEngine(blob).self_test_sums()
     assert blob.count(sums) == 1 and blob[6] == 7
@@ -309,9 +309,7 @@ def test_another_core_than_the_one_that_wrote_the_checksums_is_told() -> None:
             assert engine.self_test() == 0
 
 
-def test_a_failed_save_leaves_the_old_file_and_nothing_beside(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failed_save_leaves_the_old_file_and_nothing_beside(tmp_path, monkeypatch):
     path = tmp_path / "small.eitm"
     path.write_bytes(b"old")
 
@@ -325,14 +323,14 @@ def test_a_failed_save_leaves_the_old_file_and_nothing_beside(
     assert path.read_bytes() == b"old"
 
 
-def test_a_failed_rename_leaves_nothing_beside(tmp_path: Path) -> None:
+def test_a_failed_rename_leaves_nothing_beside(tmp_path):
     (tmp_path / "folder.eitm").mkdir()
     with pytest.raises(FileError, match="cannot write it"):
         save_model(tmp_path / "folder.eitm", small_model())
     assert [entry.name for entry in tmp_path.iterdir()] == ["folder.eitm"]
 
 
-def test_missing_and_unreadable_files(tmp_path: Path) -> None:
+def test_missing_and_unreadable_files(tmp_path):
     with pytest.raises(FileError, match="no such model"):
         load_model(tmp_path / "none.eitm")
     with pytest.raises(FileError, match="cannot read this model"):
@@ -341,5 +339,5 @@ def test_missing_and_unreadable_files(tmp_path: Path) -> None:
         save_model(tmp_path / "none" / "x.eitm", small_model())
 
 
-def test_errors_are_of_the_project() -> None:
+def test_errors_are_of_the_project():
     assert issubclass(ModelError, EitskinError) and ModelError.exit_code == 6

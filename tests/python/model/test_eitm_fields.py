@@ -14,7 +14,7 @@ from eitskin.skin.mirror import rim_mirror
 from small_models import prebuilt, small, small_blob, small_model, tiny_blob
 
 
-def test_the_section_as_documented() -> None:
+def test_the_section_as_documented():
     blob, model, s = small_blob(), small_model(), small()
     place = sections_of(blob)["FLDS"]
     assert place.size == 16 + 2 * s.linear.grid.n_pixels * 40 and place.flags == 0
@@ -39,12 +39,12 @@ def test_the_section_as_documented() -> None:
 
 
 @pytest.mark.parametrize("data_kind", ["normalised", "log-ratio"])
-def test_only_models_of_differences_have_fields(data_kind: str) -> None:
+def test_only_models_of_differences_have_fields(data_kind):
     assert "FLDS" not in sections_of(small_blob(data_kind=data_kind))
     assert small_model(data_kind=data_kind).fields is None
 
 
-def test_a_model_without_fields_finds_touches_each_by_itself() -> None:
+def test_a_model_without_fields_finds_touches_each_by_itself():
     model = replace(prebuilt()[0], fields=None)
     blob = encode_model(model)
     assert agreed(blob, "no fields") and "FLDS" not in sections_of(blob)
@@ -52,7 +52,7 @@ def test_a_model_without_fields_finds_touches_each_by_itself() -> None:
 
 
 @pytest.mark.parametrize("size", [-16, -2, 2, 16])
-def test_wrong_sizes(size: int) -> None:
+def test_wrong_sizes(size):
     blob = tiny_blob()
     own = sections_of(blob)["FLDS"].size
     changed = patched(blob, entry_place(blob, "FLDS") + 8, "<I", own + size)
@@ -63,7 +63,7 @@ def test_wrong_sizes(size: int) -> None:
 
 @pytest.mark.parametrize("at", [0, 4])
 @pytest.mark.parametrize("value", [0.0, 1.0, 9e29, -1e-9, 1.1e30, float("inf"), float("nan")])
-def test_numbers_in_range(at: int, value: float) -> None:
+def test_numbers_in_range(at, value):
     blob = tiny_blob()
     changed = patched(blob, sections_of(blob)["FLDS"].offset + at, "<f", value)
     assert agreed(changed, value) == (0 <= value <= 1e30)
@@ -72,7 +72,7 @@ def test_numbers_in_range(at: int, value: float) -> None:
 @pytest.mark.parametrize(
     ("half", "good"), [(0x7BFF, True), (0x7C00, False), (0xFC00, False), (0x7E01, False)]
 )
-def test_every_half_is_finite(half: int, good: bool) -> None:
+def test_every_half_is_finite(half, good):
     blob = tiny_blob()
     place = sections_of(blob)["FLDS"]
     # the first, the mirror's last, padding, the very last

@@ -2,7 +2,6 @@
 whatever the bytes."""
 
 import struct
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -39,18 +38,18 @@ STORAGE = {0: "f32", 1: "f16", 2: "i16", 3: "i8"}
 
 
 @pytest.mark.parametrize("storage", STORAGE.values())
-def test_both_read_the_whole_one(storage: str) -> None:
+def test_both_read_the_whole_one(storage):
     assert agreed(tiny_blob(storage), storage)
 
 
-def test_both_refuse_every_truncation() -> None:
+def test_both_refuse_every_truncation():
     blob = tiny_blob()
     for length in range(len(blob)):
         assert not agreed(blob[:length], length)
 
 
 @pytest.mark.parametrize("flip", [0x01, 0x80, 0xFF])
-def test_both_refuse_every_damaged_byte(flip: int) -> None:
+def test_both_refuse_every_damaged_byte(flip):
     blob = bytearray(tiny_blob())
     for place in range(len(blob)):
         blob[place] ^= flip
@@ -59,7 +58,7 @@ def test_both_refuse_every_damaged_byte(flip: int) -> None:
 
 
 @pytest.mark.parametrize("field", range(10))
-def test_whole_numbers_of_dims(field: int) -> None:
+def test_whole_numbers_of_dims(field):
     """What else fits the sections' sizes: larger images, more electrodes, ranks of the same stride,
     another data kind."""
     blob = tiny_blob()
@@ -92,7 +91,7 @@ def test_whole_numbers_of_dims(field: int) -> None:
         (5, lambda v: 0 <= v < np.inf),
     ],
 )
-def test_numbers_of_dims(field: int, good: Callable[[float], bool]) -> None:
+def test_numbers_of_dims(field, good):
     blob = tiny_blob()
     place = sections_of(blob)["DIMS"].offset + 40 + 4 * field
     for value in FLOATS:
@@ -111,7 +110,7 @@ GOOD_DEFAULTS = {
 
 
 @pytest.mark.parametrize("field", range(12))
-def test_numbers_of_defaults(field: int) -> None:
+def test_numbers_of_defaults(field):
     """The field's range as documented; the tiny model's radii are 1.55, 15.5 and 4.64 mm."""
     blob = tiny_blob()
     start = sections_of(blob)["DEFS"].offset + 8
@@ -124,7 +123,7 @@ def test_numbers_of_defaults(field: int) -> None:
 
 
 @pytest.mark.parametrize("iterations", [0, 100_001])
-def test_defaults_of_no_or_endless_iterations_are_refused(iterations: int) -> None:
+def test_defaults_of_no_or_endless_iterations_are_refused(iterations):
     """A day of a board's work is not what ``eitskin model build`` makes."""
     changed = patched(tiny_blob(), sections_of(tiny_blob())["DEFS"].offset, "<I", iterations)
     assert not agreed(changed, "iterations")
@@ -134,7 +133,7 @@ def test_defaults_of_no_or_endless_iterations_are_refused(iterations: int) -> No
 
 @pytest.mark.parametrize("name", ["VREF", "REDU", "SENS", "SCAL", "COLW", "GOLD"])
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
-def test_numbers_that_are_not_finite(name: str, value: float) -> None:
+def test_numbers_that_are_not_finite(name, value):
     blob = tiny_blob("i8" if name == "SCAL" else "f32")
     place = sections_of(blob)[name]
     for at in (0, place.size - 4):
@@ -142,7 +141,7 @@ def test_numbers_that_are_not_finite(name: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("half", [0x7C00, 0xFC00, 0x7E01])
-def test_halves_that_are_not_finite(half: int) -> None:
+def test_halves_that_are_not_finite(half):
     blob = tiny_blob("f16")
     assert not agreed(patched(blob, sections_of(blob)["SENS"].offset + 10, "<H", half), half)
 
@@ -157,7 +156,7 @@ def test_halves_that_are_not_finite(half: int) -> None:
         ((0, 1, 5, 5), False),
     ],
 )
-def test_a_protocol_of_pairs(row: tuple[int, ...], good: bool) -> None:
+def test_a_protocol_of_pairs(row, good):
     changed = bytearray(tiny_blob())
     struct.pack_into("<4B", changed, sections_of(changed)["PROT"].offset, *row)
     assert agreed(sealed(changed, rehash=True), row) == good
@@ -172,14 +171,14 @@ def test_a_protocol_of_pairs(row: tuple[int, ...], good: bool) -> None:
     (4, 0xFFFF, True),
      (4, 0, False), (4, 2, False), (6, 77, True)],
 )  # fmt: skip
-def test_a_fold_of_rows(at: int, value: int, good: bool) -> None:
+def test_a_fold_of_rows(at, value, good):
     """40 rows; the sign is 1 or -1; the last number of an entry is not looked at."""
     blob = tiny_blob()
     changed = patched(blob, sections_of(blob)["FOLD"].offset + at, "<H", value)
     assert agreed(changed, (at, value)) == good
 
 
-def test_pixels_are_ordered_and_inside() -> None:
+def test_pixels_are_ordered_and_inside():
     blob = tiny_blob()
     place = sections_of(blob)["GRID"]
     pixels = np.frombuffer(blob, "<u2", place.size // 2, place.offset).reshape(-1, 2)
@@ -194,23 +193,23 @@ def test_pixels_are_ordered_and_inside() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 10, 11, 13, 257, 2**20, 2**32 - 1])
-def test_numbers_of_sections(count: int) -> None:
+def test_numbers_of_sections(count):
     """Sections beyond the table are read from other sections' bytes, and one too few lacks nothing
     that is required."""
     assert agreed(sealed(tiny_blob(), count=count), count) == (count in (10, 11, 12, 13))
 
 
 @pytest.mark.parametrize("size", [0, 16, 48, 64, 80])
-def test_sizes_that_no_model_has(size: int) -> None:
+def test_sizes_that_no_model_has(size):
     assert not agreed(sealed(tiny_blob(), total=size), size)
 
 
-def test_a_size_that_is_no_multiple_of_sixteen() -> None:
+def test_a_size_that_is_no_multiple_of_sixteen():
     blob = tiny_blob() + bytes(8)
     assert not agreed(sealed(blob, total=len(blob)), len(blob))
 
 
-def test_misplaced_sections() -> None:
+def test_misplaced_sections():
     blob = tiny_blob()
     for name, place in sections_of(blob).items():
         for offset in (0, 48, 64, place.offset + 4, len(blob), len(blob) + 16, 2**32 - 16):
@@ -220,7 +219,7 @@ def test_misplaced_sections() -> None:
 
 @given(st.data())
 @settings(max_examples=400, deadline=None)
-def test_agreement_on_anything(data: st.DataObject) -> None:
+def test_agreement_on_anything(data):
     """Bytes changed anywhere but in META, which boards ignore, and sealed again; what both read
     also runs."""
     blob = bytearray(tiny_blob(data.draw(st.sampled_from(list(STORAGE.values())))))
@@ -243,7 +242,7 @@ def test_agreement_on_anything(data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize("change", ["below zero", "off by 1.5 per mille"])
-def test_strengths_that_no_model_has(change: str) -> None:
+def test_strengths_that_no_model_has(change):
     """A weak row's strength below zero would be a root of it in the core; both readers have one
     tolerance for a strong one's."""
     blob = bytearray(prebuilt()[1])
@@ -272,7 +271,7 @@ def runs(blob: bytes) -> None:
             assert "\n" not in str(error)
 
 
-def test_what_boards_ignore() -> None:
+def test_what_boards_ignore():
     """META that is no JSON: Python says so, a board runs."""
     blob = bytearray(tiny_blob())
     place = sections_of(blob)["META"]
@@ -280,7 +279,7 @@ def test_what_boards_ignore() -> None:
     assert accepts(sealed(blob)) == (False, True)
 
 
-def test_both_take_a_file_of_format_1_0_as_fista() -> None:
+def test_both_take_a_file_of_format_1_0_as_fista():
     """It has zero where 1.1 names the solver; a number that neither knows is refused by both."""
     blob = bytearray(tiny_blob())
     place = sections_of(blob)["DEFS"].offset + 56

@@ -24,7 +24,7 @@ def law(order: int = 2) -> LoadLaw:
     return LoadLaw(strength, load, gain, order, 97.0, 0.9, 0.03)
 
 
-def test_without_it_nothing_changes() -> None:
+def test_without_it_nothing_changes():
     model, blob = prebuilt()
     assert model.load is None
     assert encode_tested(model) == blob
@@ -32,7 +32,7 @@ def test_without_it_nothing_changes() -> None:
 
 
 @pytest.mark.parametrize("order", range(5))
-def test_it_is_read_as_written(order: int) -> None:
+def test_it_is_read_as_written(order):
     blob = encode_model(replace(prebuilt()[0], load=law(order)))
     assert HEADER.unpack_from(blob)[1:3] == (1, 4)
     read = decode_model(blob, "made").load
@@ -41,7 +41,7 @@ def test_it_is_read_as_written(order: int) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_touches_carry_the_load_of_strength_and_place(engine: str) -> None:
+def test_touches_carry_the_load_of_strength_and_place(engine):
     model = replace(prebuilt()[0], load=law())
     skin, bare = Reconstructor(model, engine=engine), Reconstructor(prebuilt()[0], engine=engine)
     seen = 0
@@ -85,9 +85,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("content", WRONG.values(), ids=WRONG)
-def test_both_readers_refuse_what_is_out_of_range(
-    content: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_both_readers_refuse_what_is_out_of_range(content, monkeypatch):
     with pytest.raises(
         ModelError, match=r"calibration \(section 'LOAD'\) that is out of range; calibrate again"
     ):
@@ -100,6 +98,6 @@ def test_both_readers_refuse_what_is_out_of_range(
         CoreEngine(blob, "float32")
 
 
-def test_what_no_reader_takes_is_not_written() -> None:
+def test_what_no_reader_takes_is_not_written():
     with pytest.raises(ModelError):
         encode_load(replace(law(), radius_mm=-1.0))

@@ -56,10 +56,10 @@ def is_covariance(matrix: np.ndarray) -> bool:
     return bool(matrix.dtype == np.float32 and (matrix == matrix.T).all() and low >= 0 < high)
 
 
-def test_any_number_of_processes_draws_the_same() -> None:
+def test_any_number_of_processes_draws_the_same():
     seen: list[tuple[int, int]] = []
 
-    def progress(drawn, total):  # type: ignore[no-untyped-def]
+    def progress(drawn, total):
         for row in drawn:
             seen.append((len(seen) + 1, total))
             yield row
@@ -72,20 +72,20 @@ def test_any_number_of_processes_draws_the_same() -> None:
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_every_kind_of_data(data_kind: str) -> None:
+def test_every_kind_of_data(data_kind):
     skins = RandomSkins(request(data_kind))
     rows = np.array([skins.sample(k) for k in range(4)])
     assert is_covariance(skins.error(rows)) and is_covariance(skins.drift())
     assert (rows[:, -2:] > 1e-4).all() and (rows[:, -2:] < 1).all()
 
 
-def test_a_skin_as_described_errs_by_shapes_alone() -> None:
+def test_a_skin_as_described_errs_by_shapes_alone():
     rows = np.array([RandomSkins(request(uncertainty=CALM)).sample(k) for k in range(3)])
     assert (rows[:, -2] < 1e-10).all() and (rows[:, -1] > 1e-3).all()
     assert np.abs(rows[:, :5]).max() < 1e-9
 
 
-def test_row_gains_help_where_the_sheet_is_uneven() -> None:
+def test_row_gains_help_where_the_sheet_is_uneven():
     uneven = replace(CALM, background_log_sd=0.3)
     with_gains, without = (
         np.mean([RandomSkins(request(uncertainty=u)).sample(k)[-2] for k in range(6)])
@@ -94,7 +94,7 @@ def test_row_gains_help_where_the_sheet_is_uneven() -> None:
     assert with_gains < 0.7 * without
 
 
-def test_drift_is_that_of_drawn_fields() -> None:
+def test_drift_is_that_of_drawn_fields():
     """The covariance, taken to first order, against nonlinear solves."""
     skins, draw = RandomSkins(request()), np.random.default_rng(5)
     drawn = []
@@ -106,7 +106,7 @@ def test_drift_is_that_of_drawn_fields() -> None:
     assert np.trace(moment) == pytest.approx(np.trace(skins.drift()), rel=0.2)
 
 
-def test_a_thin_skin_takes_what_fits() -> None:
+def test_a_thin_skin_takes_what_fits():
     strip = Skin("strip", polygon([(0, 0), (300, 0), (300, 4), (0, 4)]), Electrodes(8, 2.0))
     fold = adjacent(8).reciprocal_pairs()
     mesh = mesh_for_elements(strip, 600)
@@ -115,12 +115,12 @@ def test_a_thin_skin_takes_what_fits() -> None:
     assert np.isfinite([skins.sample(k) for k in range(4)]).all()
 
 
-def test_build_model_draws_as_told() -> None:
+def test_build_model_draws_as_told():
     settings = BuildSettings(rank=5, pixels_across=8, elements=300)
     counted = []
 
     def built(skin: Skin, samples: int | None) -> Model:
-        def progress(drawn, total):  # type: ignore[no-untyped-def]
+        def progress(drawn, total):
             counted.append(total)
             return drawn
 
@@ -136,7 +136,7 @@ def test_build_model_draws_as_told() -> None:
     assert encode_model(bare) == encode_model(built(SKIN, 0))  # nothing else differs
 
 
-def test_it_is_read_as_written() -> None:
+def test_it_is_read_as_written():
     model = decode_model(tiny_blob(), "tiny")
     assert model.model_errors is None and HEADER.unpack_from(tiny_blob())[2] == 3
     for row_gains in (True, False):
@@ -151,7 +151,7 @@ def test_it_is_read_as_written() -> None:
         assert encode_model(decode_model(blob, "made")) == blob
 
 
-def test_the_core_takes_a_model_with_it() -> None:
+def test_the_core_takes_a_model_with_it():
     model = prebuilt()[0]
     unit = np.eye(model.rank, dtype=np.float32)
     blob = encode_model(replace(model, model_errors=ModelErrors(unit, unit, 0.04, 0.1)))
@@ -177,14 +177,14 @@ def changed(at: int, value: float) -> bytes:
         (changed(28, -2.0), "a matrix in section 'UNCE' that is no covariance"),
     ],
 )
-def test_refused(content: bytes, said: str) -> None:
+def test_refused(content, said):
     assert decode_model_errors(WHOLE, 2, "x").error.tolist() == [[1, 0.5], [0.5, 1]]
     with pytest.raises(ModelError, match=f"x: holds {said}") as refused:
         decode_model_errors(content, 2, "x")
     assert "\n" not in str(refused.value)
 
 
-def test_rounding_leaves_a_covariance() -> None:
+def test_rounding_leaves_a_covariance():
     vectors = np.linalg.qr(np.random.default_rng(2).normal(size=(40, 40)))[0]
     for least in (1e-12, 0.0, -1e-3):
         spectrum = np.geomspace(1, 1e-14, 40)
@@ -193,11 +193,11 @@ def test_rounding_leaves_a_covariance() -> None:
     assert (as_covariance(np.zeros((3, 3))) == 0).all()
 
 
-def test_a_process_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_fails_is_named(monkeypatch):
     with pytest.raises(
         ModelError, match=r"random skins failed \(ValueError: matmul.*\);"
     ) as refused:
-        draw_model_errors(replace(request(), projection=None), jobs=2)  # type: ignore[arg-type]
+        draw_model_errors(replace(request(), projection=None), jobs=2)
     assert "\n" not in str(refused.value)
     monkeypatch.setattr(monte_carlo.sys, "executable", "/bin/false")
     with pytest.raises(ModelError, match="ended before its time"):

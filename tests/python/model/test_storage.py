@@ -13,25 +13,25 @@ MATRIX[:, 17] = 0.0
 @pytest.mark.parametrize(
     ("rank", "stride"), [(1, 8), (7, 8), (8, 8), (9, 16), (64, 64), (104, 104)]
 )
-def test_stride_is_the_rank_rounded_up_to_eight(rank: int, stride: int) -> None:
+def test_stride_is_the_rank_rounded_up_to_eight(rank, stride):
     assert stride_for(rank) == stride
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_columns_are_padded_with_zeros(storage: str) -> None:
+def test_columns_are_padded_with_zeros(storage):
     stored = store(MATRIX, storage)
     assert stored.columns.shape == (40, 16)
     assert not stored.columns[:, 13:].any()
     assert stored.decode(13).shape == MATRIX.shape
 
 
-def test_f32_is_the_float_nearest() -> None:
+def test_f32_is_the_float_nearest():
     stored = store(MATRIX, "f32")
     assert stored.scale is None
     assert (stored.decode(13) == MATRIX.astype(np.float32)).all()
 
 
-def test_f16_is_within_half_a_step() -> None:
+def test_f16_is_within_half_a_step():
     stored = store(MATRIX, "f16")
     step = np.maximum(2.0 ** (np.floor(np.log2(np.maximum(np.abs(MATRIX), 1e-30))) - 10), 2.0**-24)
     assert stored.scale is None
@@ -39,7 +39,7 @@ def test_f16_is_within_half_a_step() -> None:
 
 
 @pytest.mark.parametrize(("storage", "top"), [("i16", 32767), ("i8", 127)])
-def test_integers_are_within_half_a_step_of_their_column(storage: str, top: int) -> None:
+def test_integers_are_within_half_a_step_of_their_column(storage, top):
     stored = store(MATRIX, storage)
     assert stored.scale is not None and stored.scale.shape == (40,)
     peak = np.abs(MATRIX).max(axis=0)
@@ -52,7 +52,7 @@ def test_integers_are_within_half_a_step_of_their_column(storage: str, top: int)
 
 
 @pytest.mark.parametrize("storage", ["i16", "i8"])
-def test_a_column_of_zeros_has_scale_one(storage: str) -> None:
+def test_a_column_of_zeros_has_scale_one(storage):
     stored = store(MATRIX, storage)
     assert stored.scale is not None and stored.scale[17] == 1
     assert not stored.decode(13)[:, 17].any()

@@ -93,17 +93,17 @@ def entered(name: str, others: set[str]) -> set[str]:
     return {parent for parent in parents if not f"{name}.".startswith(f"{parent}.")}
 
 
-def test_circles_are_seen() -> None:
+def test_circles_are_seen():
     chain = {"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set[str]()}
     assert circles(chain) == [["b", "c"]]
 
 
 @pytest.mark.parametrize("package", ["eitskin", "eitskin_emulator", "eitskin_studies"])
-def test_no_module_imports_itself_by_way_of_others(package: str) -> None:
+def test_no_module_imports_itself_by_way_of_others(package):
     assert circles(graph(package)) == []
 
 
-def test_imports_follow_the_data() -> None:
+def test_imports_follow_the_data():
     def level(name: str) -> int:
         inner = name.removeprefix("eitskin.")
         return next(k for k, rooms in enumerate(ORDER) if inner.partition(".")[0] in rooms)
@@ -117,7 +117,7 @@ def test_imports_follow_the_data() -> None:
     assert against == set()
 
 
-def test_the_installed_package_knows_nothing_of_a_checkouts_but_emu() -> None:
+def test_the_installed_package_knows_nothing_of_a_checkouts_but_emu():
     others = modules("eitskin_studies") | modules("eitskin_emulator")
     named = {name for name, path in modules("eitskin").items() if imported(path, others)}
     assert named == {"eitskin.device.open"}
@@ -126,6 +126,6 @@ def test_the_installed_package_knows_nothing_of_a_checkouts_but_emu() -> None:
     }
 
 
-def test_the_emulated_board_knows_nothing_of_the_studies() -> None:
+def test_the_emulated_board_knows_nothing_of_the_studies():
     studies = modules("eitskin_studies")
     assert not any(imported(path, studies) for path in modules("eitskin_emulator").values())

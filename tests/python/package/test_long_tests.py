@@ -7,7 +7,7 @@ from pathlib import Path
 TESTS = Path(__file__).resolve().parents[1]
 
 
-def test_every_pattern_names_a_test() -> None:
+def test_every_pattern_names_a_test():
     names = [
         f"{file.relative_to(TESTS).as_posix()}::{name}"
         for file in TESTS.rglob("test_*.py")

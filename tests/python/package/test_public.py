@@ -14,23 +14,23 @@ from small_models import session
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "python-api.md"
 
 
-def test_the_page_lists_what_is_public() -> None:
+def test_the_page_lists_what_is_public():
     listed = re.findall(r"^### `(\w+)", PAGE.read_text("utf-8"), re.MULTILINE)
     assert sorted(listed) == sorted(eitskin.__all__) and set(eitskin.__all__) <= set(dir(eitskin))
     for name in eitskin.__all__:
         assert getattr(eitskin, name).__doc__
     with pytest.raises(AttributeError, match="no attribute 'touches'"):
-        _ = eitskin.touches  # type: ignore[attr-defined]
+        _ = eitskin.touches
 
 
-def test_importing_it_imports_next_to_nothing() -> None:
+def test_importing_it_imports_next_to_nothing():
     code = "import sys; before = set(sys.modules); import eitskin; "
     done = run_python(code + "print(*(set(sys.modules) - before))")
     new = done.stdout.split()
     assert "eitskin" in new and len(new) <= 6 and "numpy" not in new, done.stderr
 
 
-def test_a_loop_is_a_program() -> None:
+def test_a_loop_is_a_program():
     seen = list(eitskin.stream("sim:swipe", mode="touches,image", frames=12))
     assert [frame.time_s for frame in seen] == pytest.approx(np.arange(12) / 20, abs=1e-5)
     last = seen[-1]
@@ -44,7 +44,7 @@ def test_a_loop_is_a_program() -> None:
     assert {frame.refused for frame in seen} == {None} and {e.name for e in last.events} <= {"move"}
 
 
-def test_sinks_and_recordings_of_a_program(tmp_path: Path) -> None:
+def test_sinks_and_recordings_of_a_program(tmp_path):
     table, run = tmp_path / "t.csv", tmp_path / "run.eits"
     seen = list(eitskin.stream("sim:swipe", frames=5, to=[f"csv:{table}"], record=run))
     assert len(table.read_text().splitlines()) == 1 + len(seen)
@@ -54,12 +54,12 @@ def test_sinks_and_recordings_of_a_program(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("named", [{"mode": "picture"}, {"iteration": 3}])
-def test_what_a_stream_cannot_be_is_refused(named: dict[str, object]) -> None:
+def test_what_a_stream_cannot_be_is_refused(named):
     with pytest.raises(UsageError, match=r"touches|iterations"):
-        next(eitskin.stream("sim:swipe", **named))  # type: ignore[arg-type]
+        next(eitskin.stream("sim:swipe", **named))
 
 
-def test_frames_to_touches() -> None:
+def test_frames_to_touches():
     """The page's second program."""
     model, frames = eitskin.load_model(), session().as_frames()
     assert repr(model) == "<Model paper, 16 electrodes, 208 rows, 812 pixels, rank 64>"
@@ -72,7 +72,7 @@ def test_frames_to_touches() -> None:
     assert png is not None and png.startswith(b"\x89PNG") and "<table>" in result._repr_html_()
 
 
-def test_axes_are_taken_and_returned() -> None:
+def test_axes_are_taken_and_returned():
     from matplotlib.figure import Figure
 
     from eitskin.view.touch_axes import draw_touches
@@ -82,7 +82,7 @@ def test_axes_are_taken_and_returned() -> None:
     assert ax.get_title() == "skin" and len(ax.patches) >= 2
 
 
-def test_without_matplotlib_there_is_no_picture() -> None:
+def test_without_matplotlib_there_is_no_picture():
     code = without("scipy") + (
         "import importlib.util as u\nfind = u.find_spec\n"
         "u.find_spec = lambda name, *a: None if name == 'matplotlib' else find(name, *a)\n"
@@ -93,13 +93,13 @@ def test_without_matplotlib_there_is_no_picture() -> None:
     assert done.stdout.strip() == "None", done.stderr
 
 
-def test_no_command_prints_help_and_where_to_begin() -> None:
+def test_no_command_prints_help_and_where_to_begin():
     done = run_python(MAIN)
     assert done.returncode == 0 and "reconstruct" in done.stdout
     assert done.stdout.splitlines()[-1] == "To begin:  eitskin stream --device sim:swipe"
 
 
-def test_python_m_eitskin() -> None:
+def test_python_m_eitskin():
     code = "import runpy, sys; sys.argv = ['eitskin', '--version']; "
     done = run_python(code + "runpy.run_module('eitskin', run_name='__main__')")
     assert done.stdout.startswith("eitskin ") and done.returncode == 0

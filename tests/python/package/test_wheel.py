@@ -10,7 +10,6 @@ import pytest
 from eitskin.config import load_toml
 
 ROOT = Path(__file__).resolve().parents[3]
-PACKAGE = ROOT / "python" / "eitskin"
 BUILT = {".so", ".pyd", ".dylib"}  # compiled in
 MAX_BYTES = 1_850_000
 
@@ -29,14 +28,14 @@ def installed() -> dict[str, Path]:
     }
 
 
-def test_the_wheel_is_the_package_alone(installed: dict[str, Path]) -> None:
+def test_the_wheel_is_the_package_alone(installed):
     tops = {name.split("/")[0] for name in installed}
     assert {name for name in tops if not name.endswith(".dist-info")} == {"eitskin"}
     table = load_toml(ROOT / "pyproject.toml", "project")
     assert table["tool"]["scikit-build"]["wheel"]["packages"] == ["python/eitskin"]
 
 
-def test_the_wheel_holds_what_a_user_needs_in_little_room(installed: dict[str, Path]) -> None:
+def test_the_wheel_holds_what_a_user_needs_in_little_room(installed):
     for name in ("tuning/front.json", "model/paper.eitm", "scene/library/demo.toml", "py.typed"):
         assert f"eitskin/{name}" in installed
     for name in ("live/message.schema.json", "sinks/msg/TouchArray.msg"):

@@ -16,7 +16,7 @@ def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
 
-def test_a_link_is_followed_and_stays_a_link(tmp_path: Path) -> None:
+def test_a_link_is_followed_and_stays_a_link(tmp_path):
     (tmp_path / "far").mkdir()
     target, link = tmp_path / "far" / "out.npz", tmp_path / "out.npz"
     link.symlink_to(target)
@@ -26,14 +26,14 @@ def test_a_link_is_followed_and_stays_a_link(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "far").iterdir()] == ["out.npz"]
 
 
-def test_links_in_a_circle_are_refused(tmp_path: Path) -> None:
+def test_links_in_a_circle_are_refused(tmp_path):
     (tmp_path / "a").symlink_to(tmp_path / "b")
     (tmp_path / "b").symlink_to(tmp_path / "a")
     with pytest.raises(FileError, match="links go in a circle"):
         write_bytes(tmp_path / "a", b"")
 
 
-def test_a_pipe_behind_a_link_is_written_into(tmp_path: Path) -> None:
+def test_a_pipe_behind_a_link_is_written_into(tmp_path):
     """As /dev/stdout is, which leads to a name that no file has."""
     read, write = os.pipe()
     (tmp_path / "stdout").symlink_to(f"/proc/self/fd/{write}")
@@ -43,14 +43,14 @@ def test_a_pipe_behind_a_link_is_written_into(tmp_path: Path) -> None:
         assert stream.read() == b"content"
 
 
-def test_long_names(tmp_path: Path) -> None:
+def test_long_names(tmp_path):
     write_bytes(tmp_path / ("a" * 251 + ".npz"), b"content")
     with pytest.raises(FileError, match="File name too long"):
         write_bytes(tmp_path / ("a" * 252 + ".npz"), b"")
 
 
 @pytest.mark.parametrize("kept", [0o600, 0o664, 0o755])
-def test_a_file_keeps_its_mode(tmp_path: Path, kept: int) -> None:
+def test_a_file_keeps_its_mode(tmp_path, kept):
     path = tmp_path / "out"
     path.write_bytes(b"old")
     path.chmod(kept)
@@ -58,7 +58,7 @@ def test_a_file_keeps_its_mode(tmp_path: Path, kept: int) -> None:
     assert mode(path) == kept and path.read_bytes() == b"new"
 
 
-def test_a_new_file_has_the_mode_that_the_umask_leaves(tmp_path: Path) -> None:
+def test_a_new_file_has_the_mode_that_the_umask_leaves(tmp_path):
     before = os.umask(0o027)
     try:
         write_bytes(tmp_path / "out", b"")
@@ -67,7 +67,7 @@ def test_a_new_file_has_the_mode_that_the_umask_leaves(tmp_path: Path) -> None:
     assert mode(tmp_path / "out") == 0o640
 
 
-def test_a_fifo_gets_the_content_and_stays_a_fifo(tmp_path: Path) -> None:
+def test_a_fifo_gets_the_content_and_stays_a_fifo(tmp_path):
     fifo, read = tmp_path / "pipe.csv", []
     os.mkfifo(fifo)
     reader = threading.Thread(target=lambda: read.append(fifo.read_bytes()))
@@ -78,16 +78,14 @@ def test_a_fifo_gets_the_content_and_stays_a_fifo(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [fifo]
 
 
-def test_a_device_is_not_replaced() -> None:
+def test_a_device_is_not_replaced():
     before = Path("/dev/null").stat()
     write_bytes("/dev/null", b"content")
     after = Path("/dev/null").stat()
     assert (after.st_ino, after.st_mode) == (before.st_ino, before.st_mode)
 
 
-def test_file_and_folder_are_on_the_disk_before_it_is_done(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_file_and_folder_are_on_the_disk_before_it_is_done(tmp_path, monkeypatch):
     synced = []
 
     def note(handle: int) -> None:
@@ -98,7 +96,7 @@ def test_file_and_folder_are_on_the_disk_before_it_is_done(
     assert synced == [stat.S_IFREG, stat.S_IFDIR]
 
 
-def test_what_fails_leaves_the_old_file(tmp_path: Path) -> None:
+def test_what_fails_leaves_the_old_file(tmp_path):
     path = tmp_path / "out"
     path.write_bytes(b"old")
     with pytest.raises(RuntimeError), write_beside(path) as temporary:

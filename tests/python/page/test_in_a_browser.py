@@ -32,7 +32,7 @@ NEAR_MM = 3.0
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory) -> Path:
     """Two touches that stay."""
     path: Path = tmp_path_factory.mktemp("scene") / "two.toml"
     touches = "".join(f"[[touch]]\nx_mm = {x}\ny_mm = {y}\nradius_mm = 9.0\n" for x, y in PLACES)
@@ -44,7 +44,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+def page(tmp_path_factory) -> Iterator[Page]:
     one = Page(tmp_path_factory.mktemp("chromium"))
     try:
         yield one
@@ -53,7 +53,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
 
 
 @pytest.fixture(scope="module")
-def server(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+def server(scene, tmp_path_factory) -> Iterator[PageServer]:
     """A simulated board before the scene, again and again."""
     folder = tmp_path_factory.mktemp("recordings")
     with serving(f"sim:{scene}?loop=1", folder=folder) as one:
@@ -61,7 +61,7 @@ def server(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pa
 
 
 @pytest.fixture
-def live(server: PageServer, page: Page) -> Page:
+def live(server, page) -> Page:
     """The simulated board's page, playing."""
     server.follower.live().pacer.play()
     page.size(1200, 900)
@@ -92,7 +92,7 @@ def red(page: Page, x_mm: float, y_mm: float) -> int:
     )
 
 
-def test_simulated(live: Page) -> None:
+def test_simulated(live):
     assert_shown(live)
     assert min(red(live, *place) for place in PLACES) > 40
     assert red(live, -20.0, -60.0) < 25
@@ -108,7 +108,7 @@ def test_simulated(live: Page) -> None:
     until(lambda: live.text("n-rate").endswith("Hz"))
 
 
-def test_emulated(scene: Path, page: Page) -> None:
+def test_emulated(scene, page):
     with serving(f"emu:{scene}?loop=1", Stream.IMAGE | Stream.TOUCHES) as server:
         page.open(server)
         until(lambda: len(page.touches()) == 2, 60)
@@ -117,7 +117,7 @@ def test_emulated(scene: Path, page: Page) -> None:
         until(lambda: "slower than real time" in page.text("log"))
 
 
-def test_recorded(scene: Path, page: Page, tmp_path: Path) -> None:
+def test_recorded(scene, page, tmp_path):
     settings = SessionSettings(ALL, record=tmp_path / "run.eits")
     with Session(f"sim:{scene}", settings) as session:
         count = sum(1 for _ in session.items())
@@ -136,7 +136,7 @@ def test_recorded(scene: Path, page: Page, tmp_path: Path) -> None:
         until(lambda: server.follower.frames == 2 * count)
 
 
-def test_lines_of_an_instrument(scene: Path, page: Page, tmp_path: Path) -> None:
+def test_lines_of_an_instrument(scene, page, tmp_path):
     rows = BoardFrames(load_scene(scene)).voltage_v(adjacent(16))
     text = "\n".join(",".join(map(repr, row)) for row in rows.tolist())
     (tmp_path / "lines.csv").write_text(text)
@@ -149,7 +149,7 @@ def test_lines_of_an_instrument(scene: Path, page: Page, tmp_path: Path) -> None
         assert server.follower.frames == 12
 
 
-def test_gestures_and_zones(page: Page) -> None:
+def test_gestures_and_zones(page):
     zones = (Zone("middle", outer_mm=60.0), Zone("far", x_mm=80.0, outer_mm=5.0))
     with serving("sim:tap?loop=1", ALL, zones=zones) as server:
         page.open(server)
@@ -157,7 +157,7 @@ def test_gestures_and_zones(page: Page) -> None:
         assert "far" not in page.text("gestures")
 
 
-def test_teaching_press_by_press(page: Page, tmp_path: Path) -> None:
+def test_teaching_press_by_press(page, tmp_path):
     """A finger presses where the plan says; the presses become a model that the board then has."""
     skin, scene, presses = paper_skin(), tmp_path / "practice.toml", tmp_path / "presses.npz"
     plan = plan_places(skin, adjacent(16), 6)
@@ -181,7 +181,7 @@ def test_teaching_press_by_press(page: Page, tmp_path: Path) -> None:
         until(lambda: page.text("teach-count").startswith("5 of 6 presses"))
 
 
-def test_pause_step_play_and_speed(live: Page, server: PageServer) -> None:
+def test_pause_step_play_and_speed(live, server):
     live.click("play")
     assert live.answer() == "paused"
     until(lambda: live.text("play") == "Play")
@@ -198,7 +198,7 @@ def test_pause_step_play_and_speed(live: Page, server: PageServer) -> None:
     until(lambda: server.follower.frames > before + 3)
 
 
-def test_tare_solver_and_mode(live: Page, server: PageServer) -> None:
+def test_tare_solver_and_mode(live, server):
     session = server.follower.live()
     live.choose("sign", "decrease")
     assert live.answer() == "solver: sign decrease"
@@ -235,7 +235,7 @@ def begin_again(server: PageServer) -> None:
     until(lambda: server.follower.session not in (None, session))
 
 
-def test_record(live: Page, server: PageServer) -> None:
+def test_record(live, server):
     live.click("record")
     name = live.answer().removeprefix("recording to ")
     until(lambda: live.text("record-text") == "Stop recording")
@@ -248,7 +248,7 @@ def test_record(live: Page, server: PageServer) -> None:
         assert sum(1 for _ in session.items()) > 2
 
 
-def test_a_model_is_uploaded(live: Page, server: PageServer, tmp_path: Path) -> None:
+def test_a_model_is_uploaded(live, server, tmp_path):
     box = live.driver.find_element("id", "model")
     (tmp_path / "bad.eitm").write_bytes(b"no model")
     live.run("document.getElementById('answer').textContent = ''")
@@ -262,7 +262,7 @@ def test_a_model_is_uploaded(live: Page, server: PageServer, tmp_path: Path) -> 
     begin_again(server)
 
 
-def test_unplugged_and_back(scene: Path, page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unplugged_and_back(scene, page, monkeypatch):
     empty = bytes([ERASED]) * BANK_BYTES
     board = SimBoard(BoardFrames(load_scene(scene)), [bank_bytes(load_prebuilt()[1], 1), empty])
     first, there = Wire(board, frame_s=0.02), []
@@ -292,7 +292,7 @@ def test_unplugged_and_back(scene: Path, page: Page, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("width", [360, 768, 2560])
-def test_it_fits(live: Page, width: int) -> None:
+def test_it_fits(live, width):
     live.size(width, 900)
     until(lambda: live.run("return innerWidth") == width)
     wide, inner = live.run("return [document.documentElement.scrollWidth, innerWidth]")
@@ -305,7 +305,7 @@ def test_it_fits(live: Page, width: int) -> None:
     assert outside == []
 
 
-def test_light_and_dark(live: Page) -> None:
+def test_light_and_dark(live):
     shades = []
     for dark in (False, True):
         live.size(1200, 900, dark=dark)
@@ -317,7 +317,7 @@ def test_light_and_dark(live: Page) -> None:
     assert sum(map(int, light_ink[4:-1].split(","))) > 600
 
 
-def test_every_control_has_a_name_and_is_reached_by_keyboard(live: Page) -> None:
+def test_every_control_has_a_name_and_is_reached_by_keyboard(live):
     nodes = live.command("Accessibility.getFullAXTree")["nodes"]
     roles = ("button", "checkbox", "combobox", "spinbutton", "image", "table", "toolbar")
     found = [
@@ -336,7 +336,7 @@ def test_every_control_has_a_name_and_is_reached_by_keyboard(live: Page) -> None
     assert reached == []
 
 
-def test_nothing_comes_from_elsewhere_and_nothing_is_wrong(live: Page, server: PageServer) -> None:
+def test_nothing_comes_from_elsewhere_and_nothing_is_wrong(live, server):
     names = live.run("return performance.getEntriesByType('resource').map(e => e.name)")
     assert len(names) >= 3
     assert all(name.startswith(server.address) for name in names)
@@ -345,7 +345,7 @@ def test_nothing_comes_from_elsewhere_and_nothing_is_wrong(live: Page, server: P
     assert [text for text in wrong if not any(one in text for one in servers_that_went)] == []
 
 
-def test_without_the_token_it_only_looks_on(live: Page, server: PageServer) -> None:
+def test_without_the_token_it_only_looks_on(live, server):
     live.open(server, token=None)
     until(live.touches)
     assert live.run(
@@ -361,7 +361,7 @@ def test_without_the_token_it_only_looks_on(live: Page, server: PageServer) -> N
     until(lambda: "eitskin view printed" in live.text("answer"))
 
 
-def test_frames_go_on_without_end_and_memory_does_not(live: Page, server: PageServer) -> None:
+def test_frames_go_on_without_end_and_memory_does_not(live, server):
     """As many frames as in ten minutes at 50 a second, as fast as they come."""
     live.choose("speed", "max")
     start = server.follower.frames

@@ -28,7 +28,7 @@ from fresh_python import INTERRUPTIBLE
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("scene") / "one.toml"
     path.write_text(
         "[scene]\nframes = 10\nquiet_frames = 16\nelements = 1500\nrate_hz = 50.0\n"
@@ -38,7 +38,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def server(scene: Path) -> Iterator[PageServer]:
+def server(scene) -> Iterator[PageServer]:
     with serving(f"sim:{scene}?loop=1") as one:
         yield one
 
@@ -51,7 +51,7 @@ def opened(
     if origin == "its own":
         origin = f"http://127.0.0.1:{server.port}"
     url = f"ws://127.0.0.1:{server.port}/live"
-    with connect(url, origin=origin, compression=None) as line:  # type: ignore[arg-type]
+    with connect(url, origin=origin, compression=None) as line:
         line.send(json.dumps({"type": "hello", "token": token}))
         yield line
 
@@ -75,7 +75,7 @@ def got(server: PageServer, path: str, **headers: str) -> tuple[int, dict[str, s
         return error.code, dict(error.headers), error.read()
 
 
-def test_files_say_that_nothing_else_may_be_loaded(server: PageServer) -> None:
+def test_files_say_that_nothing_else_may_be_loaded(server):
     for path in ("/", "/page.js", "/drawing.js", "/page.css", "/icon.svg"):
         status, headers, content = got(server, path)
         assert status == 200
@@ -90,7 +90,7 @@ def test_files_say_that_nothing_else_may_be_loaded(server: PageServer) -> None:
     assert got(server, "/../server.py")[0] == 404
 
 
-def test_a_frame_is_what_is_documented(server: PageServer) -> None:
+def test_a_frame_is_what_is_documented(server):
     with opened(server, TOKEN) as line:
         setup = told(line, "setup")
         data = line.recv(10)
@@ -115,17 +115,17 @@ def test_a_frame_is_what_is_documented(server: PageServer) -> None:
 @pytest.mark.parametrize(
     "host", ["evil.example", "127.0.0.1.evil.example:80", "", "127.0.0.1:80; script-src *"]
 )
-def test_another_hosts_name_is_refused(server: PageServer, host: str) -> None:
+def test_another_hosts_name_is_refused(server, host):
     assert got(server, "/", Host=host)[0] in (400, 403)
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", None])
-def test_another_sites_page_is_refused(server: PageServer, origin: str | None) -> None:
+def test_another_sites_page_is_refused(server, origin):
     with pytest.raises(InvalidStatus, match="403"), opened(server, TOKEN, origin):
         pass
 
 
-def test_a_model_needs_the_token_and_the_same_site(server: PageServer) -> None:
+def test_a_model_needs_the_token_and_the_same_site(server):
     assert got(server, "/model", **{"X-Eitskin-Token": "guess"})[0] == 401
     status, _, _ = got(
         server, "/model", **{"X-Eitskin-Token": TOKEN, "Origin": "http://evil.example"}
@@ -137,7 +137,7 @@ def test_a_model_needs_the_token_and_the_same_site(server: PageServer) -> None:
 
 
 @pytest.mark.parametrize("token", [None, "", "guess", 7])
-def test_commands_need_the_token(server: PageServer, token: str | None) -> None:
+def test_commands_need_the_token(server, token):
     with opened(server, token) as line:
         assert told(line, "setup")["may_command"] is False
         for what in ("tare", "pause", "record", "sign"):
@@ -151,7 +151,7 @@ def test_commands_need_the_token(server: PageServer, token: str | None) -> None:
 @pytest.mark.parametrize(
     "said", ["no json", "[1]", '{"type": "drawn"}', '{"type": "drawn", "number": "x"}']
 )
-def test_a_page_that_talks_nonsense_is_let_go(server: PageServer, said: str) -> None:
+def test_a_page_that_talks_nonsense_is_let_go(server, said):
     with opened(server, TOKEN) as line:
         told(line, "setup")
         line.send(said)
@@ -161,14 +161,14 @@ def test_a_page_that_talks_nonsense_is_let_go(server: PageServer, said: str) -> 
 
 
 @pytest.mark.parametrize("what", ["fly", "preset", "sign", "iterations", "mode", "speed"])
-def test_an_order_that_cannot_be_is_answered(server: PageServer, what: str) -> None:
+def test_an_order_that_cannot_be_is_answered(server, what):
     with opened(server, TOKEN) as line:
         line.send(json.dumps({"type": "do", "do": what, "value": ["x"]}))
         answer = told(line, "answer")
         assert not answer["ok"]
 
 
-def test_from_elsewhere_even_looking_on_needs_the_token(scene: Path) -> None:
+def test_from_elsewhere_even_looking_on_needs_the_token(scene):
     with serving(f"sim:{scene}?loop=1", remote=True, host="0.0.0.0") as server:
         with opened(server, "guess") as line, pytest.raises(ConnectionClosed) as end:
             while True:
@@ -180,7 +180,7 @@ def test_from_elsewhere_even_looking_on_needs_the_token(scene: Path) -> None:
         assert got(server, "/", Host=f"evil.example:{server.port}")[0] == 403
 
 
-def test_a_page_that_reads_nothing_disturbs_nobody(server: PageServer) -> None:
+def test_a_page_that_reads_nothing_disturbs_nobody(server):
     """It says that it has drawn nothing: it gets a few frames, the rest is dropped and counted."""
     with opened(server, TOKEN) as slow, opened(server, TOKEN) as quick:
         told(slow, "setup")
@@ -199,7 +199,7 @@ def test_a_page_that_reads_nothing_disturbs_nobody(server: PageServer) -> None:
     until(lambda: not server.hub.pages)
 
 
-def test_what_a_page_cannot_take_is_dropped_and_counted() -> None:
+def test_what_a_page_cannot_take_is_dropped_and_counted():
     async def run() -> tuple[list[int], PageClient]:
         hub, page = Hub(), PageClient()
         hub.pages.add(page)
@@ -228,32 +228,32 @@ def refused(capsys: pytest.CaptureFixture[str], code: int, *arguments: str) -> s
     return lines[0]
 
 
-def test_a_taken_port(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_taken_port(capsys):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         line = refused(capsys, 2, "--port", str(taken.getsockname()[1]))
     assert "in use" in line
     assert "--port 0" in line
 
 
-def test_other_hosts_without_a_token(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_other_hosts_without_a_token(capsys, tmp_path):
     assert "--token WORD" in refused(capsys, 2, "--host", "0.0.0.0", "--port", "0")
     assert "at least 12" in refused(capsys, 2, "--token", "short")
     assert "no such folder" in refused(capsys, 3, "--folder", str(tmp_path / "none"))
     assert "cannot listen" in refused(capsys, 2, "--host", "no.such.host.invalid", "--token", TOKEN)
 
 
-def test_a_device_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_device_that_is_not_there(capsys):
     assert main(["view", "--device", "sim:nowhere", "--port", "0"]) == 3
     assert "no such scene" in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_every_kind_is_asked_for(server: PageServer) -> None:
+def test_every_kind_is_asked_for(server):
     with opened(server, TOKEN) as line:
         assert told(line, "setup")["mode"] == ["raw", "image", "touches"]
     assert ALL == 7
 
 
-def test_the_command_says_where_and_ends_by_the_keyboard(scene: Path, tmp_path: Path) -> None:
+def test_the_command_says_where_and_ends_by_the_keyboard(scene, tmp_path):
     command = [sys.executable, "-c", INTERRUPTIBLE, "view", "--device", f"sim:{scene}?loop=1"]
     command += ["--port", "0", "--token", "a-word-for-tests", "--to", f"csv:{tmp_path}/t.csv"]
     with subprocess.Popen(

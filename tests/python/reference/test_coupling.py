@@ -28,9 +28,7 @@ PLACES = [
 
 
 @pytest.mark.parametrize(("middle", "turn"), PLACES)
-def test_two_touches_differ_from_the_sum_of_each_by_the_interplay(
-    middle: tuple[float, float], turn: float
-) -> None:
+def test_two_touches_differ_from_the_sum_of_each_by_the_interplay(middle, turn):
     """9 mm, contrast 5, 36 mm apart, in the middle and near the rim; a change of 2 (c - 1) / (c +
     1) of the sheet's."""
     skin, model = paper_skin(), prebuilt()[0]
@@ -50,7 +48,7 @@ def test_two_touches_differ_from_the_sum_of_each_by_the_interplay(
     assert left < 0.2, f"the interplay leaves {left:.2f} of it"
 
 
-def test_far_apart_and_alone() -> None:
+def test_far_apart_and_alone():
     """One disc has none; two at the ends of the sheet have a small part of what near ones have; it
     grows as both changes do."""
     model = prebuilt()[0]

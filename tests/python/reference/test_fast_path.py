@@ -104,9 +104,7 @@ SCENES: dict[str, tuple[str, Any, float, float]] = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_touches_are_told_soon_where_they_are_and_no_others(
-    solved: dict[str, States], name: str
-) -> None:
+def test_touches_are_told_soon_where_they_are_and_no_others(solved, name):
     kind, make, soon_ms, near_mm = SCENES[name]
     for k in range(len(solved[kind].places)):
         outcome = played(make, solved[kind], k)
@@ -118,9 +116,7 @@ def test_touches_are_told_soon_where_they_are_and_no_others(
 
 
 @pytest.mark.parametrize("name", [*SCENES, "light press"])
-def test_numpy_has_the_cores_bits_in_double_and_its_decisions_in_single_width(
-    solved: dict[str, States], name: str
-) -> None:
+def test_numpy_has_the_cores_bits_in_double_and_its_decisions_in_single_width(solved, name):
     """In single width places are within .1 mm, with faults that frames have yet to name 1 mm."""
     kind, make = SCENES[name][:2] if name in SCENES else ("presses", SCENES["sudden press"][1])
     for width in ("float64", "float32"):
@@ -129,27 +125,27 @@ def test_numpy_has_the_cores_bits_in_double_and_its_decisions_in_single_width(
         assert twins.off_mm < (1 if "electrode" in name else 0.1)
 
 
-def test_quiet_frames_keep_their_bits_and_hold_no_touch(solved: dict[str, States]) -> None:
+def test_quiet_frames_keep_their_bits_and_hold_no_touch(solved):
     quiet = partial(fast_path._fault, spoil=fast_path._nothing, press=False)
     outcome = played(quiet, solved["presses"], 0)
     assert outcome.false == 0 and not any(count for _, count in outcome.told)
     assert outcome.frames["same"] == outcome.frames["explained"] == outcome.frames["frames"] > 10
 
 
-def test_a_press_that_lands_in_a_scan_spoils_only_that_frame(solved: dict[str, States]) -> None:
+def test_a_press_that_lands_in_a_scan_spoils_only_that_frame(solved):
     outcome = played(partial(fast_path._press, rise_s=0.0), solved["presses"], 0)
     unexplained = outcome.frames["frames"] - outcome.frames["explained"]
     assert 1 <= unexplained <= 3 and outcome.frames["named"] == 0
 
 
-def test_light_touches_come_from_whole_frames(solved: dict[str, States]) -> None:
+def test_light_touches_come_from_whole_frames(solved):
     outcomes = [
         played(partial(fast_path._press, rise_s=0.0), solved["presses"], k, 40.0) for k in range(2)
     ]
     assert all(one.first[0] is not None and one.false == 0 for one in outcomes)
 
 
-def test_a_model_without_fields_has_no_fast_path() -> None:
+def test_a_model_without_fields_has_no_fast_path():
     model = replace(load_prebuilt()[0], fields=None)
     with pytest.raises(UsageError, match="no fields"):
         FastPath(model)
@@ -157,7 +153,7 @@ def test_a_model_without_fields_has_no_fast_path() -> None:
         FastCore(CoreEngine(encode_model(model)))
 
 
-def test_what_is_not_a_drive_is_refused() -> None:
+def test_what_is_not_a_drive_is_refused():
     engine = CoreEngine(load_prebuilt()[1])
     fast = FastCore(engine)
     with pytest.raises(FrameError, match="no reference"):

@@ -28,7 +28,7 @@ def reference(model: Model, **options: object) -> ReferenceEngine:
 
 
 @pytest.mark.parametrize("sign", SIGNS)
-def test_shrink_minimises_its_objective(sign: str) -> None:
+def test_shrink_minimises_its_objective(sign):
     """argmin over allowed x of (x - v)^2 / 2 + t |x|, by brute force on a fine grid."""
     allowed = {
         "increase": np.linspace(0, 4, 4001),
@@ -43,7 +43,7 @@ def test_shrink_minimises_its_objective(sign: str) -> None:
     assert shrink(v, 0.7, sign) == pytest.approx(np.array(best), abs=1e-3)
 
 
-def test_greatest_is_the_lambda_at_which_zero_is_optimal() -> None:
+def test_greatest_is_the_lambda_at_which_zero_is_optimal():
     g = np.array([-3.0, 1.0, 2.0])
     assert [greatest(g, sign) for sign in SIGNS] == [2.0, 3.0, 3.0]
     assert greatest(np.array([-1.0, -2.0]), "increase") == 0
@@ -58,7 +58,7 @@ def test_greatest_is_the_lambda_at_which_zero_is_optimal() -> None:
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_data_of_small_changes_are_the_linear_change(data_kind: str) -> None:
+def test_data_of_small_changes_are_the_linear_change(data_kind):
     """For a change towards nothing, y is S g whatever the kind of data; the drift direction is gone
     from both."""
     s, model = small(), small_model("f32", data_kind)
@@ -72,7 +72,7 @@ def test_data_of_small_changes_are_the_linear_change(data_kind: str) -> None:
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_data_have_the_units_of_the_model_whatever_the_gain(data_kind: str) -> None:
+def test_data_have_the_units_of_the_model_whatever_the_gain(data_kind):
     s, frame = small(), small().frames(3, 1)[0]
     ys = []
     for gain in (1.0, -0.02, 1e3):
@@ -86,7 +86,7 @@ def test_data_have_the_units_of_the_model_whatever_the_gain(data_kind: str) -> N
 
 
 @pytest.mark.parametrize("pairs", [1, 10, 30])
-def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
+def test_rows_left_out_are_whitened_anew(pairs):
     """What S sees, and the data that it is to meet, are those of the reduction by SVD of the rows
     that are left: S'S and S'y."""
     s, model = small(), small_model()
@@ -120,7 +120,7 @@ def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
 
 
 @pytest.mark.parametrize("noise", [4e-3, 0.02, 0.5])
-def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> None:
+def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise):
     """The same S'S, S'y and images, but for a scale, as from a model that was built with that
     regularisation."""
     s, frame = small(), small().frames(4, 1)[0]
@@ -151,7 +151,7 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> Non
 
 
 @pytest.mark.parametrize("quiet_frames", [1, 8])
-def test_the_regularisation_stays_where_noise_is_little_or_unknown(quiet_frames: int) -> None:
+def test_the_regularisation_stays_where_noise_is_little_or_unknown(quiet_frames):
     s = small()
     engine = reference(small_model(), diagnostics=0)
     engine.set_reference(s.quiet(6, quiet_frames, noise=1.5e-3 if quiet_frames > 1 else 0.1))
@@ -161,7 +161,7 @@ def test_the_regularisation_stays_where_noise_is_little_or_unknown(quiet_frames:
     assert engine.seen is small_model().sensitivity
 
 
-def test_one_of_a_pair_stands_for_both() -> None:
+def test_one_of_a_pair_stands_for_both():
     s, model = small(), small_model()
     fold = s.protocol.reciprocal_pairs()
     frame = s.linear.v0_v + s.linear.jacobian @ s.discs(np.random.default_rng(3), 2, "increase")
@@ -175,7 +175,7 @@ def test_one_of_a_pair_stands_for_both() -> None:
         )
 
 
-def test_lambda_noise_is_the_greatest_of_the_second_half() -> None:
+def test_lambda_noise_is_the_greatest_of_the_second_half():
     s, model = small(), small_model()
     quiet = s.quiet(5, 10)
     engine = ReferenceEngine(model)
@@ -208,7 +208,7 @@ def fit_of(model: Model, **options: object) -> Fit:
     )
 
 
-def test_a_discs_answer_is_that_of_the_pixels_it_covers() -> None:
+def test_a_discs_answer_is_that_of_the_pixels_it_covers():
     model = prebuilt()[0]
     fit = fit_of(model)
     disc = Disc(12.0, -20.0, 15.0, 1.0, 1.0)
@@ -219,7 +219,7 @@ def test_a_discs_answer_is_that_of_the_pixels_it_covers() -> None:
     assert np.linalg.norm(atom - exact) < 0.05 * np.linalg.norm(exact)
 
 
-def test_slopes_are_derivatives() -> None:
+def test_slopes_are_derivatives():
     """Against central differences; the cover is piecewise smooth, so a step far below a pixel."""
     fit = fit_of(prebuilt()[0])
     disc = Disc(-31.7, 18.3, 13.1, 1.0, 1.0)
@@ -234,7 +234,7 @@ def test_slopes_are_derivatives() -> None:
         )
 
 
-def test_the_step_solves_the_damped_equations_and_leaves_what_nothing_moves() -> None:
+def test_the_step_solves_the_damped_equations_and_leaves_what_nothing_moves():
     a = GENERATOR.normal(size=(9, 4)) * [1.0, 1e3, 1e-3, 1.0]
     h, g = a.T @ a, GENERATOR.normal(size=4)
     step = damped_step(h, g)
@@ -243,7 +243,7 @@ def test_the_step_solves_the_damped_equations_and_leaves_what_nothing_moves() ->
     assert damped_step(h, g)[2] == 0
 
 
-def test_expected_radius_from_strength() -> None:
+def test_expected_radius_from_strength():
     fit = fit_of(prebuilt()[0], touch_change_s_per_m=0.01)
     disc = Disc(0, 0, 10.0, 0.04, 1.0)
     assert fit.expected_radius(disc) == pytest.approx(20.0)
@@ -253,7 +253,7 @@ def test_expected_radius_from_strength() -> None:
     assert fit_of(prebuilt()[0], touch_change_s_per_m=0.0).expected_radius(disc) == 9.0
 
 
-def test_what_a_disc_explains_is_what_leaving_it_out_costs() -> None:
+def test_what_a_disc_explains_is_what_leaving_it_out_costs():
     """With changes at the joint least-squares optimum: (|residual without k|^2 - |residual|^2) /
     |y|^2."""
     fit = fit_of(prebuilt()[0])

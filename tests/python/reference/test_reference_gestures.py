@@ -46,7 +46,7 @@ def wild_stream(seed: int) -> list[tuple[int, list[Touch]]]:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_reference_has_the_cores_bits(seed: int) -> None:
+def test_the_reference_has_the_cores_bits(seed):
     core, reference = Gestures(), ReferenceGestures()
     kinds = set()
     for number, (now, touches) in enumerate(wild_stream(seed)):

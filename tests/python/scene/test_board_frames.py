@@ -27,7 +27,7 @@ def moving(frames: int, **changes: object) -> Scene:
         elements=1500,
         effects={"noise": {"snr_db": 60.0}, "amplitude_drift": {"walk_per_sqrt_min": 0.01}},
     )
-    return replace(scene, **changes)  # type: ignore[arg-type]
+    return replace(scene, **changes)
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def moving(frames: int, **changes: object) -> Scene:
     [{}, {"contact_impedance": {"spread": 0.2}}, {"temperature": {"drift_k_per_min": 1.0}}],
     ids=["touch", "contacts", "sheet"],
 )
-def test_by_and_by_is_as_at_once(effects: dict, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_by_and_by_is_as_at_once(effects, monkeypatch):
     scene = moving(40)
     scene = replace(scene, effects={**scene.effects, **effects}, solver="factorise")
     at_once = BoardFrames(scene).voltage_v(PROTOCOL)
@@ -48,7 +48,7 @@ def test_by_and_by_is_as_at_once(effects: dict, monkeypatch: pytest.MonkeyPatch)
         np.testing.assert_array_equal(volts, at_once[frame : frame + 1])
 
 
-def test_a_long_scene_is_not_simulated_before_its_first_frame() -> None:
+def test_a_long_scene_is_not_simulated_before_its_first_frame():
     few, many = (BoardFrames(moving(n)).rows(PROTOCOL) for n in (2_000, 200_000))
     few.around(8)
     many.around(8)
@@ -58,7 +58,7 @@ def test_a_long_scene_is_not_simulated_before_its_first_frame() -> None:
     assert many.solves - before < 120
 
 
-def test_memory_stays_flat() -> None:
+def test_memory_stays_flat():
     rows = BoardFrames(moving(200_000)).rows(PROTOCOL)
     tracemalloc.start()
     try:

@@ -25,15 +25,13 @@ snr_db = 60.0
 
 
 @pytest.fixture
-def scene(tmp_path: Path) -> Path:
+def scene(tmp_path) -> Path:
     path = tmp_path / "short.toml"
     path.write_text(TEXT, encoding="utf-8")
     return path
 
 
-def test_run_writes_frames_with_truth(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_run_writes_frames_with_truth(scene, tmp_path, capsys):
     assert scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--json") == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["effects"] == ["noise"] and facts["counters"]["states"] == 2
@@ -47,7 +45,7 @@ def test_run_writes_frames_with_truth(
     assert load_frames(tmp_path / "f.npz").truth_mask is None
 
 
-def test_plan_lists_the_steps(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_plan_lists_the_steps(scene, capsys):
     scene_command("plan", str(scene), "--json")
     plan = json.loads(capsys.readouterr().out)
     assert [step["name"] for step in plan["steps"] if step["effect"]] == ["noise"]
@@ -56,12 +54,12 @@ def test_plan_lists_the_steps(scene: Path, capsys: pytest.CaptureFixture[str]) -
     assert "*noise" in capsys.readouterr().out
 
 
-def test_picture_is_a_picture(scene: Path, tmp_path: Path) -> None:
+def test_picture_is_a_picture(scene, tmp_path):
     scene_command("picture", str(scene), "-o", str(tmp_path / "s.png"))
     assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_lists(capsys: pytest.CaptureFixture[str]) -> None:
+def test_lists(capsys):
     scene_command("list")
     assert "pinch" in capsys.readouterr().out
     scene_command("list", "--json")
@@ -77,7 +75,7 @@ def test_lists(capsys: pytest.CaptureFixture[str]) -> None:
     assert found == {"snr_db", "noise_v"}
 
 
-def test_bad_input_is_refused_before_the_work(scene: Path, tmp_path: Path) -> None:
+def test_bad_input_is_refused_before_the_work(scene, tmp_path):
     with pytest.raises(FileError, match="does not exist; make it first"):
         scene_command("run", str(scene), "-o", str(tmp_path / "none" / "f.npz"))
     with pytest.raises(ConfigError, match="unknown effect 'nose'; did you mean 'noise'"):

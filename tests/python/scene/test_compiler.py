@@ -19,7 +19,6 @@ from eitskin.scene.effect import Contacts, ContactStep, EffectCost, Stage, Volta
 from eitskin.scene.forward_steps import count_costs
 from eitskin.scene.registry import BUILT_IN, Registry
 from eitskin.scene.runner import run_scene, simulate_frames
-from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import conductivity_with
 from eitskin.scene.touch_path import touches_at
 
@@ -27,7 +26,7 @@ NEEDED: dict[str, dict[str, Any]] = {"noise": {"snr_db": 60.0}}
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
-def test_naming_an_effect_adds_exactly_one_step(name: str, mesh_cache: MeshCache) -> None:
+def test_naming_an_effect_adds_exactly_one_step(name, mesh_cache):
     """The steps of the scene without it stay, in their order."""
     scene = moving_scene(4)
     without = compile_scene(scene, mesh_cache=mesh_cache).plan.steps
@@ -39,7 +38,7 @@ def test_naming_an_effect_adds_exactly_one_step(name: str, mesh_cache: MeshCache
     assert [step.name for step in named if step.effect] == [name]
 
 
-def test_frames_without_effects_are_the_forward_models_to_the_bit() -> None:
+def test_frames_without_effects_are_the_forward_models_to_the_bit():
     for scene in (still_scene(), moving_scene(4, solver="factorise", frozen=True)):
         frames = run_scene(scene)
         forward = ForwardModel(
@@ -54,7 +53,7 @@ def test_frames_without_effects_are_the_forward_models_to_the_bit() -> None:
             assert np.array_equal(frames.voltage_v[k], direct)
 
 
-def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames() -> None:
+def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames():
     def refuse(parameters: Any, session: Any) -> Any:
         raise AssertionError("the factory of an unnamed effect was called")
 
@@ -70,8 +69,8 @@ def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames() -> None:
 
 
 def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(
-    mesh_cache: MeshCache,
-) -> None:
+    mesh_cache,
+):
     """V0 has patterns of its own; asking for it late does not disturb the scene's."""
 
     def make(parameters: Any, session: Any) -> VoltageStep:
@@ -92,7 +91,7 @@ def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(
     assert scaled == pytest.approx(plain, rel=1e-12)
 
 
-def test_update_and_factorisation_agree_to_1e_9(mesh_cache: MeshCache) -> None:
+def test_update_and_factorisation_agree_to_1e_9(mesh_cache):
     """Real, with contacts, with bridges and complex, and with the grounded electrode off."""
     around = moving_scene(16, frozen=True)
     for effects in (
@@ -118,7 +117,7 @@ def test_update_and_factorisation_agree_to_1e_9(mesh_cache: MeshCache) -> None:
         assert difference < 1e-9 * largest, effects
 
 
-def test_the_way_with_fewer_multiplications_is_chosen(mesh_cache: MeshCache) -> None:
+def test_the_way_with_fewer_multiplications_is_chosen(mesh_cache):
     many = compile_scene(moving_scene(60), mesh_cache=mesh_cache)
     assert many.counted is not None
     assert many.counted.update < many.counted.factorise
@@ -130,14 +129,14 @@ def test_the_way_with_fewer_multiplications_is_chosen(mesh_cache: MeshCache) -> 
     assert still.method == "factorise" and still.counted is None
 
 
-def test_count_prefers_factorisations_where_few_states_touch_much() -> None:
+def test_count_prefers_factorisations_where_few_states_touch_much():
     model = compile_scene(still_scene()).model
     shunted = np.ones(16, np.bool_)
     assert count_costs(model, shunted, np.array([10, 12]), 15).cheaper == "update"
     assert count_costs(model, shunted, np.array([300, 300]), 600).cheaper == "factorise"
 
 
-def test_the_plan_tells_what_the_run_then_does(mesh_cache: MeshCache) -> None:
+def test_the_plan_tells_what_the_run_then_does(mesh_cache):
     for effects in (
         {},
         {"noise": {"snr_db": 60.0}},
@@ -154,11 +153,11 @@ def test_the_plan_tells_what_the_run_then_does(mesh_cache: MeshCache) -> None:
             assert compiled.plan.is_complex == ("phase" in effects)
 
 
-def test_a_plan_cannot_be_changed_and_prints_every_step() -> None:
+def test_a_plan_cannot_be_changed_and_prints_every_step():
     plan = compile_scene(moving_scene(4, effects={"noise": {"snr_db": 60.0}, "mains": {}})).plan
     assert isinstance(plan.steps, tuple)
     with pytest.raises(dataclasses.FrozenInstanceError):
-        plan.steps = ()  # type: ignore[misc]
+        plan.steps = ()
     text = plan.text()
     assert [name in text for name in ("mesh", "touches", "solve", "*mains", "*noise")] == [True] * 5
     assert "in all: 1 factorisations (real" in text and "208 random/frame" in text
@@ -166,7 +165,7 @@ def test_a_plan_cannot_be_changed_and_prints_every_step() -> None:
     assert [step["name"] for step in plan.as_dict()["steps"]][-2:] == ["mains", "noise"]
 
 
-def test_a_static_scene_of_a_thousand_frames_factorises_once_for_its_frames() -> None:
+def test_a_static_scene_of_a_thousand_frames_factorises_once_for_its_frames():
     frames = run_scene(still_scene(1000))
     assert frames.n_frames == 1000
     assert frames.meta["counters"]["factorisations_in_recorded_frames"] == 1
@@ -175,7 +174,7 @@ def test_a_static_scene_of_a_thousand_frames_factorises_once_for_its_frames() ->
     assert bare.meta["counters"]["factorisations"] == 1
 
 
-def test_order_within_a_stage_is_that_of_order_then_name(mesh_cache: MeshCache) -> None:
+def test_order_within_a_stage_is_that_of_order_then_name(mesh_cache):
     scene = still_scene(
         effects={"jitter": {}, "adc": {}, "noise": {"snr_db": 60.0}, "saturation": {}}
     )
@@ -189,9 +188,9 @@ def test_order_within_a_stage_is_that_of_order_then_name(mesh_cache: MeshCache) 
     assert set(names[-1:]) == {"adc"}
 
 
-def test_contradictory_effects_are_refused(mesh_cache: MeshCache) -> None:
+def test_contradictory_effects_are_refused(mesh_cache):
     name = effect_module("opposed")
-    sys.modules[name].CONFLICTS = ("mains",)  # type: ignore[attr-defined]
+    sys.modules[name].CONFLICTS = ("mains",)
     registry = Registry({**BUILT_IN, "opposed": name})
     scene = still_scene(effects={"mains": {}, "opposed": {}}, where="f.toml")
     with pytest.raises(
@@ -205,7 +204,7 @@ def test_contradictory_effects_are_refused(mesh_cache: MeshCache) -> None:
         compile_scene(varying, mesh_cache=mesh_cache)
 
 
-def test_a_bridge_rescues_a_detached_electrode(mesh_cache: MeshCache) -> None:
+def test_a_bridge_rescues_a_detached_electrode(mesh_cache):
     """Electrode 5 off, but joined to 6 by a wire: rows over both read 0, the others' rows are read
     through 6."""
     effects = {
@@ -219,7 +218,7 @@ def test_a_bridge_rescues_a_detached_electrode(mesh_cache: MeshCache) -> None:
     assert (np.abs(v[np.logical_not(across)]) > 0).all()
 
 
-def test_bad_steps_are_said_to_be_the_effects(mesh_cache: MeshCache) -> None:
+def test_bad_steps_are_said_to_be_the_effects(mesh_cache):
     def renamed(parameters: Any, session: Any) -> VoltageStep:
         return VoltageStep("other", Stage.FRONT_END, EffectCost(), "", lambda v, time_s, frame: v)
 
@@ -261,9 +260,7 @@ def test_bad_steps_are_said_to_be_the_effects(mesh_cache: MeshCache) -> None:
         ({"noise": {"snr_db": 60.0}, "contact_impedance": {}}, 2),
     ],
 )
-def test_a_moving_touch_factorises_the_untouched_skin_once(
-    effects: dict[str, Any], expected: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_moving_touch_factorises_the_untouched_skin_once(effects, expected, monkeypatch):
     """Counted where the matrix is factorised. With contacts the skin is another than V0's."""
     made = []
 
@@ -280,7 +277,7 @@ def test_a_moving_touch_factorises_the_untouched_skin_once(
     assert np.array_equal(first.voltage_v, second.voltage_v)
 
 
-def test_factors_that_v0_left_give_the_updates_bits() -> None:
+def test_factors_that_v0_left_give_the_updates_bits():
     """A noise of nothing asks for V0, and changes no bit."""
     plain = simulate_frames(compile_scene(moving_scene(12, solver="update")))
     with_v0 = compile_scene(

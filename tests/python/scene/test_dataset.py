@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +36,7 @@ def content(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
-def test_the_same_bytes_whatever_the_jobs(tmp_path: Path) -> None:
+def test_the_same_bytes_whatever_the_jobs(tmp_path):
     job = small_job()
     one = write_dataset(job, tmp_path / "one")
     write_dataset(job, tmp_path / "two", jobs=2)
@@ -46,9 +45,7 @@ def test_the_same_bytes_whatever_the_jobs(tmp_path: Path) -> None:
     assert len(content(tmp_path / "one")) == 4
 
 
-def test_an_interrupted_run_resumes_without_doing_things_twice(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_run_resumes_without_doing_things_twice(tmp_path, monkeypatch):
     job, made = small_job(), []
     real = make_chunk
 
@@ -73,7 +70,7 @@ def test_an_interrupted_run_resumes_without_doing_things_twice(
     assert content(tmp_path / "d") == content(tmp_path / "whole")
 
 
-def test_a_folder_with_another_dataset_is_not_mixed(tmp_path: Path) -> None:
+def test_a_folder_with_another_dataset_is_not_mixed(tmp_path):
     write_dataset(small_job(3), tmp_path / "d")
     others = {
         "count": small_job(4),
@@ -88,7 +85,7 @@ def test_a_folder_with_another_dataset_is_not_mixed(tmp_path: Path) -> None:
         write_dataset(small_job(3), tmp_path / "d")
 
 
-def test_a_scene_of_a_dataset_is_the_scene_run_alone(tmp_path: Path) -> None:
+def test_a_scene_of_a_dataset_is_the_scene_run_alone(tmp_path):
     job = small_job()
     write_dataset(job, tmp_path / "d")
     chunk = load_chunk(chunk_path(tmp_path / "d", 1))
@@ -109,7 +106,7 @@ def test_a_scene_of_a_dataset_is_the_scene_run_alone(tmp_path: Path) -> None:
         frames_of(chunk, 3)
 
 
-def test_ranges_are_kept_and_independent_of_each_other() -> None:
+def test_ranges_are_kept_and_independent_of_each_other():
     scene = still_scene(effects={"adc": {"bits": 12}, "mains": {}})
     touch = {"0": {"radius_mm": [6.0, 9.0], "x_mm": [-40, 40]}}
     ranges = ranges_of(
@@ -147,12 +144,12 @@ def test_ranges_are_kept_and_independent_of_each_other() -> None:
         ({"ranges": {"scene": {"frames": [0, 1]}}}, "cannot be varied"),
     ],
 )
-def test_bad_ranges_name_file_table_and_key(table: dict[str, Any], said: str) -> None:
+def test_bad_ranges_name_file_table_and_key(table, said):
     with pytest.raises(ConfigError, match=said):
         ranges_of(table, still_scene(effects={"mains": {}}), "f")
 
 
-def test_bad_datasets_are_refused(tmp_path: Path) -> None:
+def test_bad_datasets_are_refused(tmp_path):
     scene = replace(find_scene("random_touches"), elements=ELEMENTS)
     for change, said in (
         ({"count": 0}, "--count 0"),
@@ -181,9 +178,7 @@ def test_bad_datasets_are_refused(tmp_path: Path) -> None:
         job_of(scene, 1, 1, ranges_file=tmp_path / "r.toml")
 
 
-def test_without_dask_a_scheduler_asks_for_the_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_dask_a_scheduler_asks_for_the_extra(tmp_path, monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
@@ -191,7 +186,7 @@ def test_without_dask_a_scheduler_asks_for_the_extra(
         write_dataset(small_job(), tmp_path / "d", scheduler="tcp://127.0.0.1:1")
 
 
-def test_a_dask_cluster_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_a_dask_cluster_gives_the_same_bytes(tmp_path):
     from dask import distributed
 
     job = small_job()
@@ -205,9 +200,7 @@ def test_a_dask_cluster_gives_the_same_bytes(tmp_path: Path) -> None:
         write_dataset(job, tmp_path / "nowhere", scheduler="nonsense")
 
 
-def test_the_command_takes_ranges_from_a_file_and_resumes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_takes_ranges_from_a_file_and_resumes(tmp_path, capsys):
     scene = tmp_path / "s.toml"
     touch = "[[touch]]\nradius_mm = 9\nx_mm = 10\ny_mm = 20\n"
     scene.write_text(

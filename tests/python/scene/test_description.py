@@ -23,7 +23,7 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def test_a_touch_comes_moves_and_goes(tmp_path: Path) -> None:
+def test_a_touch_comes_moves_and_goes(tmp_path):
     scene = load_scene(written(tmp_path, HEAD + TOUCH))
     (one,) = scene.samples()
     assert scene.n_frames == 44 and scene.times_s()[10] == 0.5
@@ -34,7 +34,7 @@ def test_a_touch_comes_moves_and_goes(tmp_path: Path) -> None:
     assert scene.text == HEAD + TOUCH
 
 
-def test_hold_keeps_a_touch_and_standing_touches_need_no_path(tmp_path: Path) -> None:
+def test_hold_keeps_a_touch_and_standing_touches_need_no_path(tmp_path):
     held = load_scene(
         written(tmp_path, HEAD + TOUCH.replace("radius_mm", "hold = true\nradius_mm"))
     )
@@ -46,14 +46,14 @@ def test_hold_keeps_a_touch_and_standing_touches_need_no_path(tmp_path: Path) ->
     assert np.flatnonzero(bounded.there).tolist() == list(range(10, 21))
 
 
-def test_press_scales_the_contact() -> None:
+def test_press_scales_the_contact():
     keys = (Keyframe(0.0, 0, 0, 8, 0.0), Keyframe(1.0, 0, 0, 8, 1.0))
     found = sample(TouchTrack(keys, ShortCircuit(9.0)), np.array([0.0, 0.25, 1.0]))
     assert found.there.tolist() == [False, True, True]
     assert found.contrast[1:] == pytest.approx([3.0, 9.0])
 
 
-def test_load_is_nearly_linear_and_saturates() -> None:
+def test_load_is_nearly_linear_and_saturates():
     """Slope at no load as stated; 10 % below the straight line at small loads at most; never beyond
     saturation."""
     law = Piezoresistive(0.01, 11.0)
@@ -116,21 +116,19 @@ def test_load_is_nearly_linear_and_saturates() -> None:
         ("[scene\n", "not valid TOML"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line_naming_file_table_and_key(
-    tmp_path: Path, text: str, said: str
-) -> None:
+def test_what_cannot_be_is_refused_in_one_line_naming_file_table_and_key(tmp_path, text, said):
     path = written(tmp_path, text)
     with pytest.raises(EitskinError, match=said) as caught:
         load_scene(path)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
-def test_a_scene_that_is_not_there_is_said_so(tmp_path: Path) -> None:
+def test_a_scene_that_is_not_there_is_said_so(tmp_path):
     with pytest.raises(FileError, match="no such scene"):
         load_scene(tmp_path / "none.toml")
 
 
-def test_scenes_made_in_python_are_checked_too() -> None:
+def test_scenes_made_in_python_are_checked_too():
     with pytest.raises(ConfigError, match="outside"):
         Scene("s", touches=(always(95, 0, 8),))
     with pytest.raises(ConfigError, match="radius_mm must be above 0"):
@@ -141,7 +139,7 @@ def test_scenes_made_in_python_are_checked_too() -> None:
         Scene("s", seed=-1)
 
 
-def test_a_skin_file_beside_the_scene_is_found(tmp_path: Path) -> None:
+def test_a_skin_file_beside_the_scene_is_found(tmp_path):
     (tmp_path / "skin.toml").write_text(
         '[skin]\nname = "mine"\ndiameter_mm = 100\n[electrodes]\ncount = 8\n'
     )

@@ -32,14 +32,14 @@ def fresh(code: str, *arguments: str) -> str:
 
 
 @pytest.mark.parametrize("effects", [{}, {"mains": {}, "gel_drying": {}}])
-def test_only_named_effects_are_imported(effects: dict[str, dict[str, float]]) -> None:
+def test_only_named_effects_are_imported(effects):
     own, every = json.loads(fresh(PROBE, json.dumps(effects)))
     assert own == sorted(effects)
     assert "eitskin.scene.touch_shape" not in every
     assert not {name.split(".")[0] for name in every} & HEAVY
 
 
-def test_listing_effects_imports_none() -> None:
+def test_listing_effects_imports_none():
     code = """
 import sys
 from eitskin.scene.registry import Registry, summary_of
@@ -50,7 +50,7 @@ print([m for m in sys.modules if m.startswith("eitskin.scene.effects.")])
     assert fresh(code).strip() == "[]"
 
 
-def test_the_command_line_starts_without_scipy() -> None:
+def test_the_command_line_starts_without_scipy():
     code = (
         "import sys, eitskin.cli.cmd_scene; print([m for m in ('scipy', 'numpy', 'matplotlib') if m"
         " in sys.modules])"

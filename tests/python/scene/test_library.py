@@ -22,7 +22,7 @@ EXPECTED = {
 BENCH = MeshCache()
 
 
-def test_the_library_has_its_scenes_each_with_a_line() -> None:
+def test_the_library_has_its_scenes_each_with_a_line():
     assert set(library()) == EXPECTED
     for name, line in descriptions().items():
         assert find_scene(name).name == name
@@ -30,7 +30,7 @@ def test_the_library_has_its_scenes_each_with_a_line() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))
-def test_every_library_scene_runs(name: str) -> None:
+def test_every_library_scene_runs(name):
     scene = replace(find_scene(name), elements=ELEMENTS)
     compiled = compile_scene(scene, mesh_cache=BENCH)
     frames = simulate_frames(compiled).voltage_v
@@ -44,7 +44,7 @@ def test_every_library_scene_runs(name: str) -> None:
     assert compiled.states[0].touches == ()
 
 
-def test_seven_on_the_ring_are_seven_on_a_ring() -> None:
+def test_seven_on_the_ring_are_seven_on_a_ring():
     samples = find_scene("ring7").samples()
     assert len(samples) == 7
     assert [float(np.hypot(s.x_mm[0], s.y_mm[0])) for s in samples] == pytest.approx(
@@ -52,7 +52,7 @@ def test_seven_on_the_ring_are_seven_on_a_ring() -> None:
     )
 
 
-def test_an_unknown_scene_names_the_nearest() -> None:
+def test_an_unknown_scene_names_the_nearest():
     with pytest.raises(
         FileError,
         match="swip: no such scene file, nor a scene of the library; did you mean 'swipe'",

@@ -1,7 +1,6 @@
 """Touches that come, move and go while a frame is scanned."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,10 +46,10 @@ def swipe(mm_per_s: float) -> TouchTrack:
 
 def scene_of(track: TouchTrack, **changes: object) -> Scene:
     given = {"touches": (track,), "frames": 5, "rate_hz": RATE_HZ, "elements": 1500}
-    return still_scene(**{**given, **changes})  # type: ignore[arg-type]
+    return still_scene(**{**given, **changes})
 
 
-def test_each_row_of_a_sudden_press_has_its_own_instant(mesh_cache: MeshCache) -> None:
+def test_each_row_of_a_sudden_press_has_its_own_instant(mesh_cache):
     """Of a touch that is there from row 60 of frame 1 to row 20 of frame 3."""
     row_s = 1e-4
     scene = scene_of(press((208 + 59.5) * row_s, 0, (3 * 208 + 20.5) * row_s))
@@ -68,7 +67,7 @@ def test_each_row_of_a_sudden_press_has_its_own_instant(mesh_cache: MeshCache) -
     assert [len(frames.paths.at((208 + row) * row_s)[0]) for row in (59, 60)] == [0, 1]
 
 
-def test_rows_are_measured_in_the_protocols_order(mesh_cache: MeshCache) -> None:
+def test_rows_are_measured_in_the_protocols_order(mesh_cache):
     """A touch that comes after three drives, 0, 7 and 14, is in the rows of the others; charge and
     settling go from row to row as they are measured."""
     track = press(3 * 13 * 1e-4 - 5e-5, 0, 9.0)
@@ -91,9 +90,7 @@ def test_rows_are_measured_in_the_protocols_order(mesh_cache: MeshCache) -> None
     [(50_000, 1, 1, 1), (20_800, 1, 2, 85), (0, 0, 4, 85)],
     ids=["as the scene", "faster", "half scans"],
 )
-def test_a_simulated_board_measures_each_row_at_its_slot(
-    period_us: int, check_every: int, scan: int, place: int
-) -> None:
+def test_a_simulated_board_measures_each_row_at_its_slot(period_us, check_every, scan, place):
     """A touch comes 50.05 ms after the scene began: before place ``place`` of scan ``scan``."""
     model, blob = prebuilt()
     scene = scene_of(press(0.05005, 0, 9), frames=6, rate_hz=20.0, quiet_frames=4)
@@ -114,7 +111,7 @@ def test_a_simulated_board_measures_each_row_at_its_slot(
     assert np.array_equal(changed[scan], clear & after) and clear[:place].any()
 
 
-def test_the_emulated_skin_follows_the_clock_row_by_row() -> None:
+def test_the_emulated_skin_follows_the_clock_row_by_row():
     protocol = adjacent(16)
     scene = scene_of(press(0.0611, 0, 9), frames=8, rate_hz=20.0)
     skin = skin_of(scene, protocol)
@@ -142,8 +139,8 @@ def test_the_emulated_skin_follows_the_clock_row_by_row() -> None:
     ids=["press", "complex", "loads", "sheet", "swipe"],
 )
 def test_rows_are_near_those_that_are_solved_at_their_instants(
-    track: TouchTrack, effects: dict, solver: str, most: float, mesh_cache: MeshCache
-) -> None:
+    track, effects, solver, most, mesh_cache
+):
     """The mean square of what interpolation is wrong by, over that of the touch's signal."""
     scene = scene_of(track, effects=effects, solver=solver)
     done = simulate_frames(compile_scene(scene, mesh_cache=mesh_cache)).voltage_v[2:]
@@ -166,7 +163,7 @@ def test_rows_are_near_those_that_are_solved_at_their_instants(
 
 
 @pytest.mark.parametrize("effects", [{}, {"noise": {"snr_db": 60.0}, "mains": {}}])
-def test_still_skins_keep_their_bits(effects: dict, mesh_cache: MeshCache) -> None:
+def test_still_skins_keep_their_bits(effects, mesh_cache):
     for scene in (still_scene(3, effects=effects), still_scene(3, touches=(), effects=effects)):
         frozen = replace(scene, frozen=True)
         moved, shot = (
@@ -177,7 +174,7 @@ def test_still_skins_keep_their_bits(effects: dict, mesh_cache: MeshCache) -> No
         assert plans[0] == plans[1] and "scan" not in plans[0]
 
 
-def test_the_plan_tells_how_many_states_are_solved(mesh_cache: MeshCache) -> None:
+def test_the_plan_tells_how_many_states_are_solved(mesh_cache):
     """A swipe of 12 mm has a state each mm; a snapshot has one a frame."""
     for frozen, states in ((False, 1 + 13), (True, 1 + 5)):
         path = (Keyframe(0, 0, 0, 9), Keyframe(0.08, 12, 0, 9))
@@ -189,7 +186,7 @@ def test_the_plan_tells_how_many_states_are_solved(mesh_cache: MeshCache) -> Non
         assert sorted(compiled.mixes) == ([] if frozen else [2, 3, 4, 5])
 
 
-def test_rows_may_be_asked_for_at_other_instants(mesh_cache: MeshCache) -> None:
+def test_rows_may_be_asked_for_at_other_instants(mesh_cache):
     scene = scene_of(swipe(300), effects={"noise": {"snr_db": 60.0}})
     maker = FrameMaker(compile_scene(scene, mesh_cache=mesh_cache))
     nominal = 1 / RATE_HZ + scene.row_delays_s
@@ -199,7 +196,7 @@ def test_rows_may_be_asked_for_at_other_instants(mesh_cache: MeshCache) -> None:
     assert np.array_equal(maker.frame(1), maker.frame(1, nominal))  # quiet: no touch
 
 
-def test_states_are_those_at_the_keyframes_and_steps_between() -> None:
+def test_states_are_those_at_the_keyframes_and_steps_between():
     motion = Motion([press(0.1, 0.04, 0.3), TouchTrack((Keyframe(0.2, -30, 0, 5),), hold=True)])
     mix = motion.at(np.array([0.05, 0.1, 0.12, 0.14, 0.17, 0.2, 0.25, 0.3, 0.4]))
     counts = [len(motion.states[k]) for k in mix.lower]
@@ -208,7 +205,7 @@ def test_states_are_those_at_the_keyframes_and_steps_between() -> None:
     assert not mix.still and motion.at(np.array([0.15, 0.19])).still
 
 
-def test_truth_is_that_of_the_end_of_the_scan() -> None:
+def test_truth_is_that_of_the_end_of_the_scan():
     scene = moving_scene(4)
     frames = run(compile_scene(scene), truth_pixels=16)
     assert scene.truth_delay_s == scene.scan_s == pytest.approx(0.0208)
@@ -228,14 +225,14 @@ def test_truth_is_that_of_the_end_of_the_scan() -> None:
         ("rows = 5", "unknown key"),
     ],
 )
-def test_bad_scans_are_refused(scan: str, problem: str, tmp_path: Path) -> None:
+def test_bad_scans_are_refused(scan, problem, tmp_path):
     path = tmp_path / "s.toml"
     path.write_text(f"[scene]\nframes = 2\n[scan]\n{scan}\n", encoding="utf-8")
     with pytest.raises(ConfigError, match=problem):
         load_scene(path)
 
 
-def test_a_touch_may_not_leave_the_skin_during_a_scan(tmp_path: Path) -> None:
+def test_a_touch_may_not_leave_the_skin_during_a_scan(tmp_path):
     text = "[scene]\n[[touch]]\nradius_mm = 8\npath = [{t_s = 0, x_mm = 80, y_mm = 0}, "
     text += "{t_s = 0.01, x_mm = 95, y_mm = 0}]\n"
     path = tmp_path / "s.toml"

@@ -1,7 +1,5 @@
 """Random scenes: seeds, independence, and the rules they keep."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ PAPER = disk(194.0)
 ELL = polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)])
 
 
-def test_streams_are_keyed_by_seed_name_and_index() -> None:
+def test_streams_are_keyed_by_seed_name_and_index():
     draws = {
         key: tuple(stream(*key).integers(0, 2**62, 4))
         for key in [(1, "noise", 0), (1, "noise", 1), (1, "contact", 0), (2, "noise", 0)]
@@ -26,7 +24,7 @@ def test_streams_are_keyed_by_seed_name_and_index() -> None:
         stream(-1, "noise")
 
 
-def test_stream_values_never_change() -> None:
+def test_stream_values_never_change():
     """A pinned draw: published numbers rest on it."""
     assert stream(7, "noise", 3).integers(0, 10**9, 3).tolist() == PINNED
 
@@ -35,9 +33,9 @@ PINNED = [737924335, 781653816, 288842614]
 
 
 @pytest.mark.parametrize("outline", [PAPER, ELL])
-def test_touches_keep_the_rules(outline: object) -> None:
+def test_touches_keep_the_rules(outline):
     rules = TouchRules()
-    scenes = random_touches(outline, 4, 60).scenes  # type: ignore[arg-type]
+    scenes = random_touches(outline, 4, 60).scenes
     assert {len(s.touches) for s in scenes} == {1, 2, 3}
     for scene in scenes:
         xy, radii = scene.centres_mm(), scene.radii_mm()
@@ -49,20 +47,20 @@ def test_touches_keep_the_rules(outline: object) -> None:
                 assert np.hypot(*(xy[i] - xy[j])) >= radii[i] + radii[j] + rules.gap_mm - 1e-9
 
 
-def test_the_same_seed_gives_the_same_set_and_a_shorter_one_is_its_start() -> None:
+def test_the_same_seed_gives_the_same_set_and_a_shorter_one_is_its_start():
     one = random_touches(PAPER, 9, 30)
     assert one == random_touches(PAPER, 9, 30)
     assert random_touches(PAPER, 9, 10).scenes == one.scenes[:10]
     assert one.name == "test-s9-n30"
 
 
-def test_seeds_and_roles_are_independent() -> None:
+def test_seeds_and_roles_are_independent():
     sets = [random_touches(PAPER, s, 20, r) for s in (9, 10) for r in ("train", "test")]
     touches = [t for one in sets for scene in one.scenes for t in scene.touches]
     assert len(set(touches)) == len(touches)
 
 
-def test_places_are_uniform_over_the_skin() -> None:
+def test_places_are_uniform_over_the_skin():
     """Of single small touches half lie within radius R / sqrt(2), by area."""
     rules = TouchRules(count=(1, 1), radius_mm=(1.0, 1.0), rim_margin_mm=0.0)
     xy = np.concatenate([s.centres_mm() for s in random_touches(PAPER, 0, 600, rules=rules).scenes])
@@ -71,7 +69,7 @@ def test_places_are_uniform_over_the_skin() -> None:
     assert np.abs(xy.mean(axis=0)).max() < 6
 
 
-def test_spaced_touches_have_the_count_and_the_spacing() -> None:
+def test_spaced_touches_have_the_count_and_the_spacing():
     drawn = spaced_touches(PAPER, 3, 8, touches=7, spacing_radii=4.0)
     assert drawn.name == "7 at 4 radii-s3-n8"
     for scene in drawn.scenes:
@@ -81,7 +79,7 @@ def test_spaced_touches_have_the_count_and_the_spacing() -> None:
         assert {(t.radius_mm, t.contrast) for t in scene.touches} == {(9.0, 5.0)}
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_what_does_not_fit_is_refused():
     with pytest.raises(GeometryError, match="do not fit"):
         spaced_touches(disk(40.0), 0, 1, touches=5)
     with pytest.raises(UsageError, match="overlap"):
@@ -92,13 +90,13 @@ def test_what_does_not_fit_is_refused() -> None:
         TouchRules(radius_mm=(12.0, 6.0))
 
 
-def test_rim_distance_of_an_ell() -> None:
+def test_rim_distance_of_an_ell():
     points = [[10, 10], [60, 45], [60, 60], [25, 100], [50, 50.1]]
     assert rim_distance_mm(ELL, points) == pytest.approx([10, 5, -10, 20, 0], abs=0.11)
     assert rim_distance_mm(PAPER, [[90, 0], [0, 0]]) == pytest.approx([7, 97])
 
 
-def test_shapes_are_drawn_apart_so_that_sizes_stay() -> None:
+def test_shapes_are_drawn_apart_so_that_sizes_stay():
     discs = random_touches(disk(194), 3, 5)
     fingers = random_touches(disk(194), 3, 5, rules=TouchRules(shape="finger", aspect=(1.4, 2.2)))
     for disc_scene, finger_scene in zip(discs.scenes, fingers.scenes, strict=True):
@@ -125,6 +123,6 @@ def test_shapes_are_drawn_apart_so_that_sizes_stay() -> None:
         ({"shape": "finger", "aspect": (0.5, 2.0)}, "from 1 on"),
     ],
 )
-def test_shapes_that_cannot_be_are_refused(given: dict[str, Any], message: str) -> None:
+def test_shapes_that_cannot_be_are_refused(given, message):
     with pytest.raises(UsageError, match=message):
         TouchRules(**given)

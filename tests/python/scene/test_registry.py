@@ -3,7 +3,6 @@
 import importlib.metadata
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -13,8 +12,6 @@ from eitskin.errors import ConfigError
 from eitskin.scene.effect_table import describe_parameters, parse_parameters
 from eitskin.scene.parameter import parameter
 from eitskin.scene.registry import BUILT_IN, ENTRY_POINT_GROUP, Registry
-
-ROOT = Path(__file__).resolve().parents[3]
 
 
 @dataclass(frozen=True)
@@ -37,13 +34,13 @@ class Every:
 MODULE = SimpleNamespace(Parameters=Every)
 
 
-def test_tables_become_parameters() -> None:
-    assert parse_parameters(MODULE, {}, "w") == Every()  # type: ignore[arg-type]
+def test_tables_become_parameters():
+    assert parse_parameters(MODULE, {}, "w") == Every()
     table = {
         "gain": 2, "bits": 8.0, "on": False, "kind": "fast", "which": [1, 2], "pair": [3, 4],
         "limit_v": 0.5,
     }  # fmt: skip
-    found = parse_parameters(MODULE, table, "w")  # type: ignore[arg-type]
+    found = parse_parameters(MODULE, table, "w")
     assert found == Every(2.0, 8, False, "fast", (1, 2), (3.0, 4.0), 0.5)
     assert isinstance(found.gain, float) and isinstance(found.bits, int)
 
@@ -68,13 +65,13 @@ def test_tables_become_parameters() -> None:
         ({"limit_v": -1}, "limit_v = -1 is out of range; it must be at least 0 V"),
     ],
 )  # fmt: skip
-def test_impossible_parameters_name_file_table_and_key(table: dict[str, object], said: str) -> None:
+def test_impossible_parameters_name_file_table_and_key(table, said):
     with pytest.raises(ConfigError, match=said):
-        parse_parameters(MODULE, table, "f [effects.x]")  # type: ignore[arg-type]
+        parse_parameters(MODULE, table, "f [effects.x]")
 
 
-def test_parameters_describe_themselves() -> None:
-    rows = {row["name"]: row for row in describe_parameters(MODULE)}  # type: ignore[arg-type]
+def test_parameters_describe_themselves():
+    rows = {row["name"]: row for row in describe_parameters(MODULE)}
     gain = {
         "name": "gain", "type": "float", "default": 1.0, "low": 0, "high": 2, "unit": "V",
         "doc": "a number",
@@ -83,28 +80,28 @@ def test_parameters_describe_themselves() -> None:
     assert rows["kind"]["choices"] == ("slow", "fast")
 
 
-def test_an_unknown_effect_names_the_nearest() -> None:
+def test_an_unknown_effect_names_the_nearest():
     with pytest.raises(
         ConfigError, match=r"f.toml \[effects.nosie\]: unknown effect 'nosie'; did you mean 'noise'"
     ):
         Registry().load("nosie", "f.toml")
 
 
-def test_a_package_adds_an_effect_by_an_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_adds_an_effect_by_an_entry_point(monkeypatch):
     point = importlib.metadata.EntryPoint("mine", effect_module("mine"), ENTRY_POINT_GROUP)
     taken = importlib.metadata.EntryPoint("noise", effect_module("taken"), ENTRY_POINT_GROUP)
     groups = {ENTRY_POINT_GROUP: [point, taken]}
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: groups[group])
     assert Registry().load("mine", "f").NAME == "mine"
-    assert Registry().load("noise", "f").__name__ == BUILT_IN["noise"]  # type: ignore[attr-defined]
+    assert Registry().load("noise", "f").__name__ == BUILT_IN["noise"]
     assert set(Registry().names()) == {*BUILT_IN, "mine"}
     with pytest.raises(ConfigError, match="unknown effect 'mine'"):
         Registry(entry_points=False).load("mine", "f")
 
 
-def test_modules_that_break_the_contract_are_refused() -> None:
+def test_modules_that_break_the_contract_are_refused():
     name = effect_module("broken")
-    del sys.modules[name].SUMMARY  # type: ignore[attr-defined]
+    del sys.modules[name].SUMMARY
     with pytest.raises(ConfigError, match=r"\[effects.broken\]: its module defines no SUMMARY"):
         Registry({"broken": name}).load("broken", "f")
     with pytest.raises(ConfigError, match="NAME must be 'alias'"):

@@ -1,6 +1,5 @@
 """Frames of scenes: truth, streams, counters, real arithmetic."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,11 @@ from eitskin.scene.compiler import compile_scene
 from eitskin.scene.effect import EffectCost, MaterialStep, Stage
 from eitskin.scene.registry import BUILT_IN, Registry
 from eitskin.scene.runner import run, run_scene, simulate_frames
-from eitskin.scene.session import MeshCache
 
 RANDOM = ("noise", "jitter", "channel_gain", "contact_impedance", "background", "charge_injection")
 
 
-def test_frames_carry_the_truth_and_survive_their_file(tmp_path: Path) -> None:
+def test_frames_carry_the_truth_and_survive_their_file(tmp_path):
     scene = moving_scene(6, frozen=True, effects={"noise": {"snr_db": 60.0}})
     frames = run(compile_scene(scene), truth_pixels=32)
     save_frames(tmp_path / "f.npz", frames)
@@ -45,9 +43,7 @@ def test_frames_carry_the_truth_and_survive_their_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("added", sorted(set(BUILT_IN) - {"noise"}))
-def test_adding_an_effect_leaves_the_others_samples_as_they_were(
-    added: str, mesh_cache: MeshCache, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_adding_an_effect_leaves_the_others_samples_as_they_were(added, mesh_cache, monkeypatch):
     """Every number that named effects draw, by stream: equal to the bit with and without one more
     effect."""
     drawn: dict[tuple[int, str, int], np.random.BitGenerator] = {}
@@ -75,7 +71,7 @@ def test_adding_an_effect_leaves_the_others_samples_as_they_were(
     assert all(name.split(" ")[0] == added for _, name, _ in states[1].keys() - states[0].keys())
 
 
-def test_without_random_effects_no_generator_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_random_effects_no_generator_is_made(monkeypatch):
     def refuse(*_: Any, **__: Any) -> Any:
         raise AssertionError("a random generator was made")
 
@@ -90,9 +86,7 @@ def test_without_random_effects_no_generator_is_made(monkeypatch: pytest.MonkeyP
         run_scene(moving_scene(4, effects={"noise": {"snr_db": 60.0}}))
 
 
-def test_arithmetic_is_complex_only_with_phase(
-    mesh_cache: MeshCache, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_arithmetic_is_complex_only_with_phase(mesh_cache, monkeypatch):
     from eitskin.fem import cem
     from eitskin.scene import forward_steps
 
@@ -120,7 +114,7 @@ def test_arithmetic_is_complex_only_with_phase(
     assert done.true_v.dtype == np.complex128 and done.voltage_v.dtype == np.float64
 
 
-def test_a_conductivity_that_cannot_be_names_effect_and_time(mesh_cache: MeshCache) -> None:
+def test_a_conductivity_that_cannot_be_names_effect_and_time(mesh_cache):
     def make(parameters: Any, session: Any) -> MaterialStep:
         return MaterialStep(
             "sinking",

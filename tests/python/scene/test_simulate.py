@@ -30,14 +30,14 @@ def mesh() -> Mesh:
 
 
 @pytest.fixture(scope="module")
-def session(mesh: Mesh) -> Simulated:
+def session(mesh) -> Simulated:
     return simulate(SKIN, PROTOCOL, TOUCHES, mesh=mesh)
 
 
 @pytest.mark.parametrize(
     "touch", [TrueTouch(0, 0, 9, 5), TrueTouch(40.3, -51.7, 6, 3), TrueTouch(2, 80, 12, 8)]
 )
-def test_a_touch_covers_its_area(mesh: Mesh, touch: TrueTouch) -> None:
+def test_a_touch_covers_its_area(mesh, touch):
     elements, part = element_cover(mesh, touch)
     assert part.min() > 0 and 0.5 < part.max() <= 1.0
     assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(
@@ -45,13 +45,13 @@ def test_a_touch_covers_its_area(mesh: Mesh, touch: TrueTouch) -> None:
     )
 
 
-def test_a_touch_smaller_than_an_element_is_not_lost(mesh: Mesh) -> None:
+def test_a_touch_smaller_than_an_element_is_not_lost(mesh):
     elements, part = element_cover(mesh, TrueTouch(10.0, 3.0, 1.0, 5.0), subdivision=32)
     assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(math.pi, rel=0.1)
     assert part.max() < 0.5
 
 
-def test_conductivity_is_the_mean_over_the_element(mesh: Mesh) -> None:
+def test_conductivity_is_the_mean_over_the_element(mesh):
     touch = TrueTouch(20, 10, 9, 5.0)
     sigma = conductivity_with(mesh, [touch], 0.01)
     elements, part = element_cover(mesh, touch)
@@ -62,7 +62,7 @@ def test_conductivity_is_the_mean_over_the_element(mesh: Mesh) -> None:
     assert (conductivity_with(mesh, [], 0.02) == 0.02).all()
 
 
-def test_a_touch_without_contrast_changes_nothing(mesh: Mesh) -> None:
+def test_a_touch_without_contrast_changes_nothing(mesh):
     touches = TouchSet(
         "none", 0, (TouchScene("same", (TrueTouch(10, 10, 9, 1.0),)), TouchScene("empty", ()))
     )
@@ -72,7 +72,7 @@ def test_a_touch_without_contrast_changes_nothing(mesh: Mesh) -> None:
     assert (clean.contact_impedance_ohm_m2 == 0.01).all()
 
 
-def test_conductive_touches_lower_the_voltages_that_drive(mesh: Mesh) -> None:
+def test_conductive_touches_lower_the_voltages_that_drive(mesh):
     """The power that a current source puts in falls when conductivity rises; adjacent rows sum to a
     drop across."""
     touches = TouchSet(
@@ -90,7 +90,7 @@ def test_conductive_touches_lower_the_voltages_that_drive(mesh: Mesh) -> None:
     assert across[1] < across[0] < across[2]
 
 
-def test_noise_has_the_stated_ratio(mesh: Mesh) -> None:
+def test_noise_has_the_stated_ratio(mesh):
     how = Measurement(snr_db=50.0, adc_bits=None, quiet_frames=64)
     noisy = simulate(SKIN, PROTOCOL, TOUCHES, measurement=how, mesh=mesh)
     noise = np.concatenate([noisy.frames_v - noisy.exact_v, noisy.quiet_v - noisy.exact_quiet_v])
@@ -101,7 +101,7 @@ def test_noise_has_the_stated_ratio(mesh: Mesh) -> None:
     assert 20 * np.log10(rms / noise.std()) == pytest.approx(50.0, abs=0.2)
 
 
-def test_converter_steps_are_whole_and_as_stated(session: Simulated) -> None:
+def test_converter_steps_are_whole_and_as_stated(session):
     span = 1.25 * np.abs(session.exact_quiet_v).max()
     assert session.lsb_v == pytest.approx(2 * span / 4096)
     steps = session.frames_v / session.lsb_v
@@ -112,7 +112,7 @@ def test_converter_steps_are_whole_and_as_stated(session: Simulated) -> None:
     )
 
 
-def test_a_small_converter_clips_and_says_so(mesh: Mesh) -> None:
+def test_a_small_converter_clips_and_says_so(mesh):
     how = replace(CLEAN, adc_bits=12, adc_headroom=0.5)
     tight = simulate(SKIN, PROTOCOL, TOUCHES, measurement=how, mesh=mesh)
     span = 0.5 * np.abs(tight.exact_quiet_v).max()
@@ -124,22 +124,20 @@ def test_a_small_converter_clips_and_says_so(mesh: Mesh) -> None:
     assert tight.frames_v.min() >= -span and tight.frames_v.max() < span
 
 
-def test_contacts_are_spread_within_bounds_and_shared(session: Simulated) -> None:
+def test_contacts_are_spread_within_bounds_and_shared(session):
     ratio = session.contact_impedance_ohm_m2 / 0.01
     assert (np.abs(ratio - 1) <= 0.2).all() and ratio.std() > 0.05
     assert len(set(ratio)) == 16
 
 
-def test_sessions_repeat_and_are_independent_of_their_length(
-    session: Simulated, mesh: Mesh
-) -> None:
+def test_sessions_repeat_and_are_independent_of_their_length(session, mesh):
     again = simulate(SKIN, PROTOCOL, TOUCHES, mesh=mesh)
     assert (again.frames_v == session.frames_v).all() and (again.quiet_v == session.quiet_v).all()
     short = simulate(SKIN, PROTOCOL, random_touches(SKIN.outline, 5, 2), mesh=mesh)
     assert (short.frames_v == session.frames_v[:2]).all()
 
 
-def test_sources_do_not_disturb_each_other(session: Simulated, mesh: Mesh) -> None:
+def test_sources_do_not_disturb_each_other(session, mesh):
     def noise_of(one: Simulated) -> np.ndarray:
         return np.asarray((one.frames_v - one.exact_v) / one.noise_v)
 
@@ -161,20 +159,20 @@ def test_sources_do_not_disturb_each_other(session: Simulated, mesh: Mesh) -> No
     assert abs(np.corrcoef(quiet.ravel(), noise_of(with_contacts).ravel())[0, 1]) < 0.15
 
 
-def test_training_and_test_share_nothing(session: Simulated, mesh: Mesh) -> None:
+def test_training_and_test_share_nothing(session, mesh):
     train = simulate(SKIN, PROTOCOL, random_touches(SKIN.outline, 5, 4, "train"), mesh=mesh)
     assert (train.contact_impedance_ohm_m2 != session.contact_impedance_ohm_m2).all()
     assert not set(train.touches.scenes[0].touches) & set(session.touches.scenes[0].touches)
 
 
-def test_reference_is_the_mean_quiet_frame(session: Simulated) -> None:
+def test_reference_is_the_mean_quiet_frame(session):
     assert session.quiet_v.shape == (64, 208)
     assert session.differences_v() == pytest.approx(
         session.frames_v - session.quiet_v.sum(axis=0) / 64
     )
 
 
-def test_as_frames_carries_the_truth(session: Simulated) -> None:
+def test_as_frames_carries_the_truth(session):
     frames = session.as_frames()
     assert (frames.voltage_v == session.frames_v).all()
     assert frames.reference_voltage_v.shape == (64, 208)
@@ -190,11 +188,11 @@ def test_as_frames_carries_the_truth(session: Simulated) -> None:
     assert frames.touch_xy_mm[0].tolist() == [first.x_mm, first.y_mm]
 
 
-def test_progress_sees_every_scene(mesh: Mesh) -> None:
+def test_progress_sees_every_scene(mesh):
     seen: list[TouchScene] = []
 
     def watch(scenes: object) -> object:
-        for scene in scenes:  # type: ignore[attr-defined]
+        for scene in scenes:
             seen.append(scene)
             yield scene
 
@@ -202,7 +200,7 @@ def test_progress_sees_every_scene(mesh: Mesh) -> None:
     assert tuple(seen) == TOUCHES.scenes
 
 
-def test_impossible_measurements_are_refused() -> None:
+def test_impossible_measurements_are_refused():
     with pytest.raises(UsageError, match="contact_spread"):
         Measurement(contact_spread=1.0)
     with pytest.raises(UsageError, match="adc_bits"):

@@ -40,9 +40,7 @@ def _scene(*touches: dict[str, Any], **head: Any) -> Scene:
         (named_shape("gauss"), (1 - 2**-6.25) / math.log(2)),
     ],
 )
-def test_a_shape_changes_its_share_of_the_discs_area(
-    mesh: Mesh, shape: TouchShape, share: float
-) -> None:
+def test_a_shape_changes_its_share_of_the_discs_area(mesh, shape, share):
     elements, factor = Cover(mesh).factor([TrueTouch(5.0, -12.0, 12.0, 4.0, shape)])
     change = (factor - 1) / 3
     area_mm2 = float((change * mesh.areas_mm2[elements]).sum())
@@ -50,13 +48,13 @@ def test_a_shape_changes_its_share_of_the_discs_area(
     assert change.max() <= 1 + 1e-12
 
 
-def test_an_even_round_shape_covers_what_the_disc_does(mesh: Mesh) -> None:
+def test_an_even_round_shape_covers_what_the_disc_does(mesh):
     disc = Cover(mesh).of(TrueTouch(5.0, -12.0, 12.0, 4.0))
     shape = Cover(mesh).of(TrueTouch(5.0, -12.0, 12.0, 4.0, TouchShape()))
     assert all(np.array_equal(a, b) for a, b in zip(disc, shape, strict=True))
 
 
-def test_the_long_axis_points_where_the_angle_says() -> None:
+def test_the_long_axis_points_where_the_angle_says():
     shape = named_shape("ellipse", 4.0, 90.0)
     inside = shape.rho2(np.array([0.0, 19.0]), np.array([19.0, 0.0]), 10.0) <= 1
     assert inside.tolist() == [True, False]
@@ -65,7 +63,7 @@ def test_the_long_axis_points_where_the_angle_says() -> None:
     np.testing.assert_allclose(shape.rho2(rim[:, 0], rim[:, 1], 10.0), 1.0)
 
 
-def test_frames_of_a_finger_carry_its_truth_and_the_plan_names_its_shape() -> None:
+def test_frames_of_a_finger_carry_its_truth_and_the_plan_names_its_shape():
     scene = _scene({"x_mm": 10.0, "y_mm": 5.0, "radius_mm": 12.0, "shape": "finger", "aspect": 2.0})
     assert "shapes: hertz" in compile_scene(scene).plan.text()
     frames = run_scene(scene)
@@ -87,7 +85,7 @@ def test_frames_of_a_finger_carry_its_truth_and_the_plan_names_its_shape() -> No
         ({"law": "press_and_conduct", "press": 0.5}, "press goes with"),
     ],
 )
-def test_what_cannot_be_is_refused_with_its_key(touch: dict[str, Any], message: str) -> None:
+def test_what_cannot_be_is_refused_with_its_key(touch, message):
     table = {"x_mm": 0.0, "y_mm": 0.0, "radius_mm": 10.0, "grams": 50.0, **touch}
     if touch.get("law") != "press_and_conduct" and "grams" not in touch:
         del table["grams"]
@@ -95,27 +93,27 @@ def test_what_cannot_be_is_refused_with_its_key(touch: dict[str, Any], message: 
         _scene(table)
 
 
-def test_fingers_side_by_side_may_be_nearer_than_their_length_but_not_overlap() -> None:
+def test_fingers_side_by_side_may_be_nearer_than_their_length_but_not_overlap():
     finger = {"y_mm": 0.0, "radius_mm": 10.0, "shape": "finger", "aspect": 2.0, "angle_deg": 90.0}
     _scene({**finger, "x_mm": -7.5}, {**finger, "x_mm": 7.5})
     with pytest.raises(ConfigError, match="overlaps touch 0"):
         _scene({**finger, "x_mm": -6.5}, {**finger, "x_mm": 6.5})
 
 
-def test_press_and_conduct_adds_contact_to_the_loads_own_change() -> None:
+def test_press_and_conduct_adds_contact_to_the_loads_own_change():
     law, grams = PressAndConduct(0.02, 10.0, 9.0, 50.0), np.array([0.0, 50.0, 1e5])
     load = 1 + 9 * (1 - np.exp(-0.02 * grams / 9))
     np.testing.assert_allclose(law.contrast_at(grams), load + 8 * (1 - np.exp(-grams / 50)))
     assert Insulating().contrast_at(np.array([0.0, 0.5, 1.0])) == pytest.approx([1.0, 0.6, 0.2])
 
 
-def test_an_insulating_touch_is_resistive() -> None:
+def test_an_insulating_touch_is_resistive():
     scene = _scene({"x_mm": 0.0, "y_mm": 0.0, "radius_mm": 10.0, "law": "insulating"})
     frames = run_scene(scene)
     assert frames.touch_sign is not None and frames.touch_sign.tolist() == [-1]
 
 
-def test_a_sudden_change_costs_one_state_and_leaves_the_quiet_frames() -> None:
+def test_a_sudden_change_costs_one_state_and_leaves_the_quiet_frames():
     effects = {"sheet_change": {"spread": 0.05, "at_s": 0.1}}
     changed = compile_scene(still_scene(6, touches=(), effects=effects))
     plain = simulate_frames(compile_scene(still_scene(6, touches=())))
@@ -126,7 +124,7 @@ def test_a_sudden_change_costs_one_state_and_leaves_the_quiet_frames() -> None:
     assert len(np.unique(done.voltage_v[4:], axis=0)) == 1
 
 
-def test_a_slow_change_grows_until_it_is_whole() -> None:
+def test_a_slow_change_grows_until_it_is_whole():
     effects = {"sheet_change": {"spread": 0.05, "rise_s": 0.2}}
     compiled = compile_scene(still_scene(8, touches=(), effects=effects))
     assert len(compiled.states) == 1 + 4  # untouched, and parts of 1/4 to 4/4
@@ -135,7 +133,7 @@ def test_a_slow_change_grows_until_it_is_whole() -> None:
     assert (np.diff(grown[:5]) > 0).all() and np.ptp(grown[4:]) == 0
 
 
-def test_contacts_change_after_the_tare_only_where_the_scene_says_so() -> None:
+def test_contacts_change_after_the_tare_only_where_the_scene_says_so():
     table = {"mean_ohm_m2": 0.01, "spread": 0.2}
     stays = compile_scene(still_scene(4, touches=(), effects={"contact_impedance": table}))
     changes = compile_scene(
@@ -147,7 +145,7 @@ def test_contacts_change_after_the_tare_only_where_the_scene_says_so() -> None:
     assert 0.05 < np.std(np.log(second / first)) < 0.9
 
 
-def test_the_page_has_every_law_and_shape() -> None:
+def test_the_page_has_every_law_and_shape():
     folder = Path(__file__).resolve().parents[3] / "docs" / "reference" / "touches"
     page = (folder / "README.md").read_text(encoding="utf-8")
     from eitskin.scene.laws import LAWS

@@ -19,17 +19,17 @@ def image(*pixels: tuple[int, int, float]) -> np.ndarray:
     return values
 
 
-def test_centroid_is_weighted_and_the_strongest_comes_first() -> None:
+def test_centroid_is_weighted_and_the_strongest_comes_first():
     found = touches_in_image(image((1, 1, 2.0), (6, 6, 3.0), (6, 7, 1.0)), GRID.index, XY, 0.2)
     assert found == pytest.approx(np.array([[65.0, 67.5], [15.0, 15.0]]))
 
 
-def test_pixels_that_share_a_corner_are_one_touch() -> None:
+def test_pixels_that_share_a_corner_are_one_touch():
     assert len(touches_in_image(image((1, 1, 1.0), (2, 2, 1.0)), GRID.index, XY, 0.5)) == 1
     assert len(touches_in_image(image((1, 1, 1.0), (3, 3, 1.0)), GRID.index, XY, 0.5)) == 2
 
 
-def test_threshold_drops_the_weak_and_the_sign_is_obeyed() -> None:
+def test_threshold_drops_the_weak_and_the_sign_is_obeyed():
     values = image((1, 1, 1.0), (5, 5, 0.4), (3, 7, -5.0))
     assert len(touches_in_image(values, GRID.index, XY, 0.5)) == 1
     assert len(touches_in_image(values, GRID.index, XY, 0.3)) == 2
@@ -39,7 +39,7 @@ def test_threshold_drops_the_weak_and_the_sign_is_obeyed() -> None:
     assert touches_in_image(np.zeros(64), GRID.index, XY, 0.5).shape == (0, 2)
 
 
-def test_best_threshold_counts_most_scenes_exactly() -> None:
+def test_best_threshold_counts_most_scenes_exactly():
     images = np.stack([image((1, 1, 1.0), (5, 5, 0.5)), image((2, 2, 1.0), (6, 6, 0.2))])
     truths = [np.array([[15.0, 15.0], [55.0, 55.0]]), np.array([[25.0, 25.0]])]
     assert best_touch_threshold(images, truths, GRID.index, XY, (0.1, 0.3, 0.4, 0.6)) == 0.3

@@ -15,7 +15,7 @@ from eitskin_studies.harness.thresholds import best_threshold
 SQUARE = polygon([(0, 0), (30, 0), (30, 30), (0, 30)])
 
 
-def test_iou_of_masks_worked_by_hand() -> None:
+def test_iou_of_masks_worked_by_hand():
     truth = np.array([1, 1, 1, 0, 0, 0, 0, 0, 0, 0], dtype=bool)
     estimate = np.array([0, 1, 1, 1, 0, 0, 0, 0, 0, 0], dtype=bool)
     assert metrics.iou(estimate, truth) == pytest.approx(2 / 4)
@@ -24,14 +24,14 @@ def test_iou_of_masks_worked_by_hand() -> None:
     assert metrics.miou(truth, truth) == 1.0
 
 
-def test_empty_masks_agree_and_a_false_touch_does_not() -> None:
+def test_empty_masks_agree_and_a_false_touch_does_not():
     none, one = np.zeros(10, dtype=bool), np.eye(1, 10, dtype=bool)[0]
     assert metrics.miou(none, none) == 1.0
     assert metrics.miou(one, none) == pytest.approx((0 + 9 / 10) / 2)
     assert metrics.miou(none, one) == pytest.approx((0 + 9 / 10) / 2)
 
 
-def test_overlap_of_two_discs_matches_the_lens_formula() -> None:
+def test_overlap_of_two_discs_matches_the_lens_formula():
     """Two circles of radius r at distance d share 2 r^2 acos(d/2r) - d/2 sqrt(4r^2 - d^2)."""
     raster = metrics.raster_inside(disk(100.0), 0.25)
     radius, apart = 12.0, 9.0
@@ -47,7 +47,7 @@ def test_overlap_of_two_discs_matches_the_lens_formula() -> None:
     assert metrics.miou(a, b) == pytest.approx((touch + rest) / 2, abs=2e-3)
 
 
-def test_raster_has_the_area_of_the_skin_and_stays_inside() -> None:
+def test_raster_has_the_area_of_the_skin_and_stays_inside():
     raster = metrics.raster_inside(disk(194.0))
     assert raster.spacing_mm == 1.5
     assert len(raster.points_mm) * 1.5**2 == pytest.approx(math.pi * 97.0**2, rel=2e-3)
@@ -55,21 +55,21 @@ def test_raster_has_the_area_of_the_skin_and_stays_inside() -> None:
     assert len(metrics.raster_inside(SQUARE, 3.0).points_mm) == 100
 
 
-def test_bad_rasters_are_refused() -> None:
+def test_bad_rasters_are_refused():
     with pytest.raises(UsageError, match="above 0"):
         metrics.raster_inside(SQUARE, 0.0)
     with pytest.raises(UsageError, match="no cell inside"):
         metrics.raster_inside(SQUARE, 100.0)
 
 
-def test_mask_lookup_keeps_the_lowest_row_below() -> None:
+def test_mask_lookup_keeps_the_lowest_row_below():
     mask = np.array([[1, 0], [0, 0]], dtype=bool)
     points = np.array([[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [-1.5, -0.5]])
     found = metrics.mask_on_points(points, mask, (-1, -1, 1, 1)).tolist()
     assert found == [True, False, False, False, False]
 
 
-def test_nearest_lookup_shows_the_containing_pixel_or_the_next_at_the_rim() -> None:
+def test_nearest_lookup_shows_the_containing_pixel_or_the_next_at_the_rim():
     grid = grid_for(disk(194.0))
     raster = metrics.raster_inside(disk(194.0))
     lookup = metrics.lookup_for(raster.points_mm, grid, "nearest")
@@ -86,7 +86,7 @@ def test_nearest_lookup_shows_the_containing_pixel_or_the_next_at_the_rim() -> N
     assert gap.max() < 1.5 * grid.pixel_mm
 
 
-def test_bilinear_lookup_is_exact_for_a_plane_and_for_a_constant() -> None:
+def test_bilinear_lookup_is_exact_for_a_plane_and_for_a_constant():
     grid = grid_for(disk(194.0))
     raster = metrics.raster_inside(disk(194.0))
     lookup = metrics.lookup_for(raster.points_mm, grid, "bilinear")
@@ -100,12 +100,12 @@ def test_bilinear_lookup_is_exact_for_a_plane_and_for_a_constant() -> None:
     assert both.shape == (2, len(raster.points_mm))
 
 
-def test_unknown_lookup_is_refused() -> None:
+def test_unknown_lookup_is_refused():
     with pytest.raises(UsageError, match="nearest, bilinear"):
         metrics.lookup_for(np.zeros((1, 2)), grid_for(SQUARE, 4), "cubic")
 
 
-def test_touch_mask_is_strict_and_signed() -> None:
+def test_touch_mask_is_strict_and_signed():
     values = np.array([0.0, 0.5, 1.0, -2.0])
     assert metrics.touch_mask(values, 0.5).tolist() == [False, False, True, False]
     assert metrics.touch_mask(values, 0.49).tolist() == [False, True, True, False]
@@ -115,7 +115,7 @@ def test_touch_mask_is_strict_and_signed() -> None:
 
 
 @pytest.mark.parametrize("lookup", metrics.LOOKUPS)
-def test_curves_equal_masks_on_the_raster(lookup: str) -> None:
+def test_curves_equal_masks_on_the_raster(lookup):
     outline = disk(60.0)
     grid = grid_for(outline, 12)
     image_scorer = metrics.judge_for(outline, grid, 1.0, lookup)
@@ -138,7 +138,7 @@ def test_curves_equal_masks_on_the_raster(lookup: str) -> None:
                 assert curves[k, j] == pytest.approx(metrics.miou(shown, truths[k]), abs=1e-12)
 
 
-def test_nearest_curve_is_the_pixel_mask_spread_over_cells() -> None:
+def test_nearest_curve_is_the_pixel_mask_spread_over_cells():
     grid = grid_for(SQUARE, 6)
     image_scorer = metrics.judge_for(SQUARE, grid, 1.0, "nearest")
     image = np.random.default_rng(2).uniform(size=36)
@@ -149,14 +149,14 @@ def test_nearest_curve_is_the_pixel_mask_spread_over_cells() -> None:
     )
 
 
-def test_pixel_cover_is_exact_in_area() -> None:
+def test_pixel_cover_is_exact_in_area():
     grid = grid_for(disk(194.0))
     part = pixel_cover(grid, [[-40, 11], [20, 30]], [9, 7])
     assert part.sum() * grid.pixel_area_mm2 == pytest.approx(math.pi * (81 + 49), rel=5e-3)
     assert part.min() == 0 and part.max() == 1
 
 
-def test_a_perfect_image_is_limited_by_its_pixels_only() -> None:
+def test_a_perfect_image_is_limited_by_its_pixels_only():
     """The ceiling that a 32-pixel image has, and none where pixels are cells."""
     outline = disk(194.0)
     grid = grid_for(outline)
@@ -176,7 +176,7 @@ def test_a_perfect_image_is_limited_by_its_pixels_only() -> None:
     assert image_scorer.curves(truth.astype(float), truth, [0.5])[0, 0] == 1.0
 
 
-def test_curves_refuse_what_they_cannot_judge() -> None:
+def test_curves_refuse_what_they_cannot_judge():
     image_scorer = metrics.judge_for(SQUARE, grid_for(SQUARE, 6))
     truths = np.zeros((2, len(image_scorer.raster.points_mm)), dtype=bool)
     with pytest.raises(UsageError, match=r"\(2, 36\)"):
@@ -189,7 +189,7 @@ def test_curves_refuse_what_they_cannot_judge() -> None:
         image_scorer.curves(broken, truths)
 
 
-def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals() -> None:
+def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals():
     curves = np.array([[0.2, 0.9, 0.5, 0.5], [0.2, 0.1, 0.6, 0.6]])
     assert best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
     assert metrics.THRESHOLDS[0] == 0.02

@@ -61,28 +61,28 @@ def scored(one: Reconstruction, sign: str = "increase", **changes: object) -> Fr
     return score
 
 
-def test_a_perfect_result() -> None:
+def test_a_perfect_result():
     score = scored(result(put(0, 1), [0, 1]))
     assert score.miou_touches == 1
     assert score.miou_image > 0.85
     assert score.matching.exact and score.matching.distances_mm == (0, 0)
 
 
-def test_found_touches_are_paired_whatever_their_order() -> None:
+def test_found_touches_are_paired_whatever_their_order():
     score = scored(result(put(1, 0, off=3.0), [0, 1]))
     assert score.matching.pairs == ((0, 1), (1, 0))
     assert score.matching.distances_mm == pytest.approx((3, 3))
     assert 0.7 < score.miou_touches < 0.95
 
 
-def test_the_gate_and_what_lies_beyond() -> None:
+def test_the_gate_and_what_lies_beyond():
     assert scorer().gate_mm == pytest.approx(10)
     for off, hits in ((9.9, 2), (10.1, 0)):
         found = scored(result(put(0, 1, off=off), [0, 1])).matching
         assert (found.hits, found.misses, found.false_touches) == (hits, 2 - hits, 2 - hits)
 
 
-def test_an_empty_result_has_half_the_background() -> None:
+def test_an_empty_result_has_half_the_background():
     """Nothing shown: IoU of the touch is 0, of the background the share of it."""
     score = scored(Reconstruction(np.zeros(812), np.zeros(812), (), INFO))
     share = np.pi * (RADII[:2] ** 2).sum() / (np.pi * 97**2)
@@ -90,7 +90,7 @@ def test_an_empty_result_has_half_the_background() -> None:
     assert (score.matching.hits, score.matching.misses) == (0, 2)
 
 
-def test_only_the_wanted_sign_counts() -> None:
+def test_only_the_wanted_sign_counts():
     score = scored(result(put(2), [2], -1.0), "decrease")
     assert score.miou_touches == 1 and score.matching.exact and score.miou_image > 0.85
     both = scored(result(put(0, 1, 2), [0, 1, 2]), "both")
@@ -99,18 +99,18 @@ def test_only_the_wanted_sign_counts() -> None:
     assert scorer().score(increases, 0, result([], []), "decrease") is None
 
 
-def test_unknown_signs_are_touches() -> None:
+def test_unknown_signs_are_touches():
     score = scored(result(put(0, 1, 2), [0, 1, 2]), touch_sign=np.zeros(3))
     assert score.matching.hits == 3
 
 
-def test_frames_of_which_nothing_is_known() -> None:
+def test_frames_of_which_nothing_is_known():
     assert scorer().score(frames(), 1, result([], []), "increase") is None
     nothing = dict.fromkeys(("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_sign"))
     assert scorer().score(frames(**nothing), 0, result([], []), "increase") is None
 
 
-def test_a_mask_is_the_truth_where_there_is_one() -> None:
+def test_a_mask_is_the_truth_where_there_is_one():
     """A mask of the left half over the whole skin, row 0 lowest."""
     mask = np.zeros((2, 64, 64), dtype=np.int8)
     mask[0, :, :32] = 1
@@ -125,12 +125,12 @@ def test_a_mask_is_the_truth_where_there_is_one() -> None:
     assert scorer().score(given, 1, left, "increase") is None
 
 
-def test_lengths_scale_with_the_skin() -> None:
+def test_lengths_scale_with_the_skin():
     smaller = scorer_for(small_model())
     assert smaller.gate_mm == pytest.approx(10 * 100 / 194)
     assert smaller.image_scorer.raster.spacing_mm == pytest.approx(1.5 * 100 / 194)
 
 
-def test_a_model_that_says_nothing_of_its_skin() -> None:
+def test_a_model_that_says_nothing_of_its_skin():
     with pytest.raises(ConfigError):
         scorer_for(replace(prebuilt()[0], meta={}))

@@ -47,7 +47,7 @@ def watcher(scene: str = "two_touch", sign: str = "increase") -> Watcher:
     return Watcher(KnownModel(*prebuilt()), SceneTruth(find_scene(scene), sign))
 
 
-def test_touches_are_paired_with_the_true_ones() -> None:
+def test_touches_are_paired_with_the_true_ones():
     look = watcher()
     seen = look.see(touches((30.0, -24.0), (-40.0, 13.0), (0.0, 0.0)))
     assert seen.errors_mm == {0: pytest.approx(1.0), 1: pytest.approx(3.0)}
@@ -69,7 +69,7 @@ def test_touches_are_paired_with_the_true_ones() -> None:
     )
 
 
-def test_nothing_found_is_no_error_of_zero() -> None:
+def test_nothing_found_is_no_error_of_zero():
     look = watcher()
     assert " s  no touch; 60 iterations" in line(look.see(touches()))
     assert look.score.as_dict()["position_worst_mm"] is None
@@ -77,13 +77,13 @@ def test_nothing_found_is_no_error_of_zero() -> None:
     assert look.score.missed == 2
 
 
-def test_touches_that_are_not_looked_for_are_not_missed() -> None:
+def test_touches_that_are_not_looked_for_are_not_missed():
     look = watcher(sign="decrease")
     look.see(touches())
     assert look.score.missed == 0
 
 
-def test_a_moving_touch_is_where_it_is_at_the_boards_time() -> None:
+def test_a_moving_touch_is_where_it_is_at_the_boards_time():
     truth = SceneTruth(find_scene("swipe"))
     truth.begin(2**32 - 500_000)
     times = np.linspace(0, 1.95, 40)
@@ -93,7 +93,7 @@ def test_a_moving_touch_is_where_it_is_at_the_boards_time() -> None:
     assert truth.touches(int(1e9)) == truth.touches(int(2e9))  # the last frame stays
 
 
-def test_a_refused_frame_says_why_and_is_not_scored() -> None:
+def test_a_refused_frame_says_why_and_is_not_scored():
     look = watcher()
     seen = look.see(touches(status=-5))
     assert "refused: " in line(seen) and Frame(seen.frame, seen).message()["refused"]
@@ -101,7 +101,7 @@ def test_a_refused_frame_says_why_and_is_not_scored() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_an_image_in_brief(sign: float) -> None:
+def test_an_image_in_brief(sign):
     seen = Watcher(KnownModel(*prebuilt()), None).see(
         image((-40.0, 10.0), (30.0, -25.0), sign=sign)
     )
@@ -118,7 +118,7 @@ def test_an_image_in_brief(sign: float) -> None:
     )
 
 
-def test_raw_rows_that_are_missing_become_null() -> None:
+def test_raw_rows_that_are_missing_become_null():
     volts = np.linspace(1, 2, 5).astype(np.float32)
     volts[2] = np.nan
     quality = np.array([0, 0, Quality.OPEN | Quality.SATURATED, Quality.COPIED, 0], dtype=np.uint8)
@@ -134,7 +134,7 @@ def test_raw_rows_that_are_missing_become_null() -> None:
     assert "nan" not in line(seen)
 
 
-def test_spread_keeps_the_ends() -> None:
+def test_spread_keeps_the_ends():
     seen = [Watcher(None, None).see(touches()) for _ in range(100)]
     kept = spread(seen, 36)
     assert len(kept) == 36 and kept[0] is seen[0] and kept[-1] is seen[-1]

@@ -59,7 +59,7 @@ def swipe() -> Swipe:
 
 
 @pytest.fixture(scope="session")
-def drives(swipe: Swipe) -> Swipe:
+def drives(swipe) -> Swipe:
     """The swipe's first frames, and reports, of ``--report drive``."""
     with Session("sim:swipe", SessionSettings(mode=Stream.TOUCHES, report="drive")) as session:
         found = Swipe(list(seen(session, FRAMES_OF_DRIVES)), swipe.source)

@@ -5,11 +5,9 @@ import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
-from swipe_frames import Swipe
 
 from eitskin.cli.main import main
 from eitskin.errors import EitskinError
@@ -69,18 +67,16 @@ class Entry:
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
+def made(monkeypatch) -> Iterator[dict[str, Any]]:
     sinks = {"good": Heard(), "stuck": Stuck(), "dying": Dying(), "away": Away()}
     monkeypatch.setattr(module, "sinks", lambda: {name: Entry(s) for name, s in sinks.items()})
     monkeypatch.setattr(module, "ENDING_S", 0.1)
     yield sinks
-    sinks["stuck"].free.set()  # type: ignore[attr-defined]
+    sinks["stuck"].free.set()
 
 
 @pytest.mark.parametrize("patient", [False, True])
-def test_a_stuck_and_a_dying_sink_disturb_no_other(
-    swipe: Swipe, made: dict[str, Any], patient: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stuck_and_a_dying_sink_disturb_no_other(swipe, made, patient, monkeypatch):
     monkeypatch.setattr(module, "PATIENCE_S", 0.05)
     said: list[str] = []
     urls = ["stuck:", "good:", "dying:", "away:"]
@@ -99,9 +95,7 @@ def test_a_stuck_and_a_dying_sink_disturb_no_other(
     assert made["good"].closed.is_set() and not made["stuck"].closed.is_set()
 
 
-def test_an_impatient_session_never_waits(
-    swipe: Swipe, drives: Swipe, made: dict[str, Any]
-) -> None:
+def test_an_impatient_session_never_waits(swipe, drives, made):
     """Reports and frames take no room from each other; the first is in the sink, or still waits."""
     many = [drives.reports[0]] * (DRIVES * ROOM + 9)
     for first, second in ((swipe.frames, many), (many, swipe.frames)):
@@ -113,7 +107,7 @@ def test_an_impatient_session_never_waits(
             assert counts["dropped"] in (dropped - 1, dropped)
 
 
-def test_a_message_is_made_once_for_all(swipe: Swipe) -> None:
+def test_a_message_is_made_once_for_all(swipe):
     told = Told(swipe.frames[20])
     assert told.message is told.message and told.text is told.text
 
@@ -136,9 +130,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("url", "code", "part"), REFUSED)
-def test_what_cannot_be_opened_is_refused_in_a_line(
-    url: str, code: int, part: str, swipe: Swipe, tmp_path: Path
-) -> None:
+def test_what_cannot_be_opened_is_refused_in_a_line(url, code, part, swipe, tmp_path):
     (tmp_path / "here.mcap").touch()
     with socket.socket() as taken, socket.socket() as closed:
         for one in (taken, closed):
@@ -152,7 +144,7 @@ def test_what_cannot_be_opened_is_refused_in_a_line(
 
 
 @pytest.mark.parametrize("kind", ["csv", "mcap"])
-def test_one_writes_to_a_file(swipe: Swipe, kind: str, tmp_path: Path) -> None:
+def test_one_writes_to_a_file(swipe, kind, tmp_path):
     """An old file stays whole until the new one has begun, and a second writer is refused."""
     path, source = tmp_path / "touches", replace(swipe.source, overwrite=True)
     path.write_bytes(b"old")
@@ -163,7 +155,7 @@ def test_one_writes_to_a_file(swipe: Swipe, kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["csv", "mcap"])
-def test_a_full_disk_is_said(swipe: Swipe, kind: str) -> None:
+def test_a_full_disk_is_said(swipe, kind):
     """Where the file is opened, or by its counts."""
     source, said = replace(swipe.source, overwrite=True), list[str]()
     try:
@@ -176,7 +168,7 @@ def test_a_full_disk_is_said(swipe: Swipe, kind: str) -> None:
         assert error.exit_code == 3 and "No space left" in str(error)
 
 
-def test_passwords_are_not_shown(swipe: Swipe, made: dict[str, Any]) -> None:
+def test_passwords_are_not_shown(swipe, made):
     made["mqtt"] = Heard()
     with Outputs(["mqtt://me:secret@host/topic"], swipe.source) as outputs:
         assert outputs.end({})[0]["url"] == "mqtt://me:...@host/topic"
@@ -185,15 +177,13 @@ def test_passwords_are_not_shown(swipe: Swipe, made: dict[str, Any]) -> None:
     assert "secret" not in str(error.value) and "me:...@127.0.0.1" in str(error.value)
 
 
-def test_tuio_needs_the_skin(swipe: Swipe) -> None:
+def test_tuio_needs_the_skin(swipe):
     with pytest.raises(EitskinError, match="bounding box"):
         Outputs(["tuio://127.0.0.1"], Source("serial:x"))
 
 
 @pytest.mark.parametrize("name", ["osc", "tuio", "ws", "mqtt", "lsl", "mcap", "foxglove"])
-def test_a_missing_extra_is_named(
-    name: str, swipe: Swipe, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_missing_extra_is_named(name, swipe, monkeypatch, tmp_path):
     for package in ("pythonosc", "websockets", "paho", "pylsl", "mcap_ros2", "foxglove"):
         for loaded in [one for one in sys.modules if one.startswith(package)]:
             monkeypatch.delitem(sys.modules, loaded)
@@ -206,9 +196,7 @@ def test_a_missing_extra_is_named(
     assert error.value.exit_code == 9 and not list(tmp_path.iterdir())
 
 
-def test_the_command_line_counts_what_was_sent(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_the_command_line_counts_what_was_sent(capsys, tmp_path):
     path = tmp_path / "t.csv"
     to = ("--to", f"csv:{path}", "--to", "udp://127.0.0.1:9")
     assert main(["stream", "--device", "sim:swipe", "--frames", "5", *to]) == 0
@@ -219,7 +207,7 @@ def test_the_command_line_counts_what_was_sent(
     assert main(["stream", "--device", "sim:swipe", "--frames", "5", "--overwrite", *to]) == 0
 
 
-def test_sinks_are_found_by_entry_point() -> None:
+def test_sinks_are_found_by_entry_point():
     assert set(module.sinks()) >= {
         "udp", "ws", "osc", "tuio", "mqtt", "lsl", "csv", "mcap", "foxglove",
     }  # fmt: skip

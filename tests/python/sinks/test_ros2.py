@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from swipe_frames import Swipe
 
 from eitskin.live.frame import Notice
 from eitskin.sinks import ros2
@@ -55,7 +54,7 @@ def classes(definition: str) -> tuple[type, dict[str, type]]:
     return message_class(first, made), made
 
 
-def test_messages_take_what_the_conversion_sets(swipe: Swipe, drives: Swipe) -> None:
+def test_messages_take_what_the_conversion_sets(swipe, drives):
     sys.path.insert(0, str(NODE / "eitskin_ros"))
     try:
         from eitskin_ros.conversion import fill
@@ -95,7 +94,7 @@ def test_messages_take_what_the_conversion_sets(swipe: Swipe, drives: Swipe) -> 
         assert [one.level for one in fill(status_class(), table, made).status] == [level]
 
 
-def test_the_workspace_has_the_messages_that_ship() -> None:
+def test_the_workspace_has_the_messages_that_ship():
     shipped = {path.name: path.read_text() for path in ROOT.glob("python/eitskin/sinks/msg/*.msg")}
     built = {path.name: path.read_text() for path in NODE.glob("eitskin_msgs/msg/*.msg")}
     assert shipped == built and len(built) == 4

@@ -13,7 +13,6 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import astuple, fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -68,7 +67,7 @@ def check(messages: list[dict[str, Any]], swipe: Swipe) -> None:
     assert all(t["force_n"] is None for m in frames for t in m["touches"])
 
 
-def test_a_plain_socket_gets_a_datagram_a_frame(swipe: Swipe) -> None:
+def test_a_plain_socket_gets_a_datagram_a_frame(swipe):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         receiver.bind(("127.0.0.1", 0))
@@ -100,7 +99,7 @@ def osc() -> Iterator[tuple[int, queue.Queue[Any]]]:
         thread.join()
 
 
-def test_gestures_go_out(osc: tuple[int, queue.Queue[Any]]) -> None:
+def test_gestures_go_out(osc):
     """A double tap of the library, as OSC and as valid messages."""
     port, heard = osc
     kinds = []
@@ -117,7 +116,7 @@ def test_gestures_go_out(osc: tuple[int, queue.Queue[Any]]) -> None:
     assert [values[1] for values in came] == pytest.approx([x for _, x in kinds], abs=1e-4)
 
 
-def test_osc(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
+def test_osc(swipe, osc):
     port, heard = osc
     send(swipe, f"osc://127.0.0.1:{port}/table")
     for frame in swipe.frames:
@@ -136,10 +135,10 @@ def test_osc(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
             assert (x, y) == pytest.approx((event.x_mm, event.y_mm), rel=1e-6)
 
 
-def test_tuio(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
+def test_tuio(swipe, osc):
     port, heard = osc
     send(swipe, f"tuio://127.0.0.1:{port}")
-    x0, y0, x1, y1 = swipe.source.model.skin.outline.bounding_box_mm  # type: ignore[union-attr]
+    x0, y0, x1, y1 = swipe.source.model.skin.outline.bounding_box_mm
     last: dict[int, tuple[float, float]] = {}
     for number, touches in enumerate([*swipe.touches, []], 1):
         bundle: dict[str, list[Any]] = {"set": []}
@@ -161,11 +160,11 @@ def test_tuio(swipe: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
         last = {one[0]: (one[1], one[2]) for one in bundle["set"]}
 
 
-def test_tuio_of_drives(drives: Swipe, osc: tuple[int, queue.Queue[Any]]) -> None:
+def test_tuio_of_drives(drives, osc):
     """A bundle a report, with its speeds; of frames only of those without, and with no touch."""
     port, heard = osc
     send(drives, f"tuio://127.0.0.1:{port}")
-    x0, y0, x1, y1 = drives.source.model.skin.outline.bounding_box_mm  # type: ignore[union-attr]
+    x0, y0, x1, y1 = drives.source.model.skin.outline.bounding_box_mm
     expected, reported = list[list[Any]](), 0
     for item in drives.items:
         if isinstance(item, Frame):
@@ -188,9 +187,7 @@ def test_tuio_of_drives(drives: Swipe, osc: tuple[int, queue.Queue[Any]]) -> Non
     assert told == [*expected, []]
 
 
-def test_tuio_lifts_its_fingers_where_the_stream_is_cut(
-    swipe: Swipe, osc: tuple[int, queue.Queue[Any]]
-) -> None:
+def test_tuio_lifts_its_fingers_where_the_stream_is_cut(swipe, osc):
     port, heard = osc
     touched = next(frame for frame in swipe.frames if frame.touches)
     with Outputs([f"tuio://127.0.0.1:{port}"], swipe.source) as outputs:
@@ -202,7 +199,7 @@ def test_tuio_lifts_its_fingers_where_the_stream_is_cut(
     assert alive == [[t.id for t in touched.touches], []]
 
 
-def test_websocket_clients(swipe: Swipe) -> None:
+def test_websocket_clients(swipe):
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
 
@@ -219,7 +216,7 @@ def test_websocket_clients(swipe: Swipe) -> None:
                 check([json.loads(text) for text in client], swipe)
 
 
-def test_a_websocket_client_that_never_reads_is_left_out(swipe: Swipe) -> None:
+def test_a_websocket_client_that_never_reads_is_left_out(swipe):
     from websockets.sync.client import connect
 
     port = free_port()
@@ -267,7 +264,7 @@ def broker() -> Iterator[int]:
         yield port
 
 
-def test_a_broker_that_comes_back_is_told_again(swipe: Swipe) -> None:
+def test_a_broker_that_comes_back_is_told_again(swipe):
     port = free_port()
 
     def put_until(count: str) -> None:
@@ -287,7 +284,7 @@ def test_a_broker_that_comes_back_is_told_again(swipe: Swipe) -> None:
             assert outputs.end(SUMMARY)[0]["failed"] == 0
 
 
-def test_mqtt(swipe: Swipe, broker: int) -> None:
+def test_mqtt(swipe, broker):
     from paho.mqtt.client import Client
     from paho.mqtt.enums import CallbackAPIVersion
 
@@ -306,7 +303,7 @@ def test_mqtt(swipe: Swipe, broker: int) -> None:
     assert {topic for topic, _ in came} == {"skin/left/frame", "skin/left/summary"}
 
 
-def test_lsl(swipe: Swipe) -> None:
+def test_lsl(swipe):
     import pylsl
 
     with Outputs(["lsl:table?touches=2"], swipe.source) as outputs:
@@ -325,7 +322,7 @@ def test_lsl(swipe: Swipe) -> None:
         inlet.close_stream()
 
 
-def test_lsl_of_drives(drives: Swipe) -> None:
+def test_lsl_of_drives(drives):
     """A stream of their own, from the first report on."""
     import pylsl
 
@@ -346,7 +343,7 @@ def test_lsl_of_drives(drives: Swipe) -> None:
         inlet.close_stream()
 
 
-def test_csv(swipe: Swipe, drives: Swipe, tmp_path: Path) -> None:
+def test_csv(swipe, drives, tmp_path):
     path = tmp_path / "touches.csv"
     send(with_reports(swipe, drives), f"csv:{path}")
     with path.open(newline="") as stream:
@@ -367,7 +364,7 @@ def test_csv(swipe: Swipe, drives: Swipe, tmp_path: Path) -> None:
     assert {row["force_n"] for row in rows} == {""}
 
 
-def test_mcap(swipe: Swipe, drives: Swipe, tmp_path: Path) -> None:
+def test_mcap(swipe, drives, tmp_path):
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
 
@@ -385,7 +382,7 @@ def test_mcap(swipe: Swipe, drives: Swipe, tmp_path: Path) -> None:
         [(t.id, t.x_mm) for t in listed] for listed in swipe.touches
     ]
     assert stamps == pytest.approx([frame.time_unix_s for frame in swipe.frames], abs=1e-6)
-    image, grid = came["/image"][20], swipe.source.model.grid  # type: ignore[union-attr]
+    image, grid = came["/image"][20], swipe.source.model.grid
     picture = np.frombuffer(bytes(image.data), "<f4").reshape(image.height, image.width)[::-1]
     assert image.encoding == "32FC1" and image.step == 4 * image.width
     np.testing.assert_array_equal(grid.values(picture), swipe.frames[20].image)
@@ -415,7 +412,7 @@ with Session("sim:swipe") as session, Outputs(sys.argv[1:], Source("x"), patient
 """
 
 
-def test_files_of_a_killed_program_can_be_read(swipe: Swipe, tmp_path: Path) -> None:
+def test_files_of_a_killed_program_can_be_read(swipe, tmp_path):
     from mcap.exceptions import EndOfFile
     from mcap.reader import NonSeekingReader
     from mcap_ros2.decoder import DecoderFactory
@@ -433,7 +430,7 @@ def test_files_of_a_killed_program_can_be_read(swipe: Swipe, tmp_path: Path) -> 
     assert frames == [frame.number for frame in swipe.frames[: len(frames)]]
 
 
-def test_foxglove(swipe: Swipe, drives: Swipe) -> None:
+def test_foxglove(swipe, drives):
     """By the protocol that Foxglove publishes: text for what there is, binary for messages."""
     from websockets.sync.client import connect
 
@@ -442,7 +439,7 @@ def test_foxglove(swipe: Swipe, drives: Swipe) -> None:
         Outputs([f"foxglove://127.0.0.1:{port}"], swipe.source) as outputs,
         connect(
             f"ws://127.0.0.1:{port}",
-            subprotocols=["foxglove.sdk.v1"],  # type: ignore[list-item]
+            subprotocols=["foxglove.sdk.v1"],
             max_size=None,
         ) as client,
     ):

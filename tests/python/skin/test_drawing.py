@@ -10,7 +10,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from eitskin.errors import ConfigError, EitskinError, FileError, GeometryError, MissingExtraError
+from eitskin.errors import ConfigError, FileError, GeometryError, MissingExtraError
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.skin.drawing import read_drawing
@@ -62,7 +62,7 @@ def assert_centres(skin: Skin, wanted: list[tuple[float, float]]) -> None:
     np.testing.assert_allclose(skin.electrode_centres_mm(), wanted, atol=1e-4)
 
 
-def test_y_goes_up_from_the_lower_edge_of_the_page(tmp_path: Path) -> None:
+def test_y_goes_up_from_the_lower_edge_of_the_page(tmp_path):
     assert outline(svg(tmp_path, BOX)).bounding_box_mm == pytest.approx((10, 30, 70, 70), abs=1e-4)
     shifted = 'width="50mm" height="40mm" viewBox="10 20 100 80"'
     assert outline(svg(tmp_path, BOX, shifted)).bounding_box_mm == pytest.approx(
@@ -80,12 +80,12 @@ def test_y_goes_up_from_the_lower_edge_of_the_page(tmp_path: Path) -> None:
         ("", {"scale_mm": 0.5}, 30.0),
     ],
 )
-def test_units(tmp_path: Path, head: str, reading: dict[str, float], width_mm: float) -> None:
+def test_units(tmp_path, head, reading, width_mm):
     x0, _, x1, _ = outline(svg(tmp_path, BOX, head), **reading).bounding_box_mm
     assert x1 - x0 == pytest.approx(width_mm, rel=1e-6)
 
 
-def test_transforms_and_groups(tmp_path: Path) -> None:
+def test_transforms_and_groups(tmp_path):
     body = (
         '<g id="layer" transform="translate(50 40) rotate(90) scale(2)"><path class="rim" d="M0 0'
         ' h20 v10 h-20 z"/></g>'
@@ -95,7 +95,7 @@ def test_transforms_and_groups(tmp_path: Path) -> None:
     assert outline(svg(tmp_path, body), "rim").area_mm2 == pytest.approx(800, rel=1e-6)
 
 
-def test_copies_are_placed(tmp_path: Path) -> None:
+def test_copies_are_placed(tmp_path):
     body = '<defs><rect id="r" width="20" height="10"/></defs><use href="#r" x="30" y="40"/>'
     assert outline(svg(tmp_path, body)).bounding_box_mm == pytest.approx((30, 30, 50, 40), abs=1e-4)
 
@@ -113,7 +113,7 @@ def test_copies_are_placed(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_curves_are_flat_to_the_tolerance(tmp_path: Path, body: str, tolerance: float) -> None:
+def test_curves_are_flat_to_the_tolerance(tmp_path, body, tolerance):
     shape = outline(svg(tmp_path, body), tolerance_mm=tolerance)
     corners = np.array(shape.vertices_mm)
     middles = (corners + np.roll(corners, -1, axis=0)) / 2
@@ -122,7 +122,7 @@ def test_curves_are_flat_to_the_tolerance(tmp_path: Path, body: str, tolerance: 
     assert off.max() >= tolerance / 8  # and no finer than asked for
 
 
-def test_open_pieces_are_joined(tmp_path: Path) -> None:
+def test_open_pieces_are_joined(tmp_path):
     body = (
         '<path d="M10 10 H70"/><path d="M10 50 V10"/><path d="M70 10 V50"/><path d="M70 50 H10"/>'
     )
@@ -139,7 +139,7 @@ MARKS = (
 )
 
 
-def test_marks_are_numbered_by_their_ids(tmp_path: Path) -> None:
+def test_marks_are_numbered_by_their_ids(tmp_path):
     """Left, top, right, bottom as drawn; the ids say where 0 is and which way round, and 10 comes
     after 9."""
     skin = described(tmp_path, BOX + MARKS.format(2, 9, 10, 11), electrodes='marked = "electrode"')
@@ -151,7 +151,7 @@ def test_marks_are_numbered_by_their_ids(tmp_path: Path) -> None:
     assert skin_from_table(skin_to_table(skin), "again") == skin
 
 
-def test_marks_without_numbers_lie_along_the_rim(tmp_path: Path) -> None:
+def test_marks_without_numbers_lie_along_the_rim(tmp_path):
     body = BOX + MARKS.format(0, 1, 2, 3).replace('id="electrode-', 'class="e" name="')
     skin = described(
         tmp_path, body, electrodes='marked = "e"\nstart_angle_deg = 0\ndirection = "clockwise"'
@@ -159,7 +159,7 @@ def test_marks_without_numbers_lie_along_the_rim(tmp_path: Path) -> None:
     assert_centres(skin, [(70, 50), (40, 30), (10, 50), (40, 70)])
 
 
-def test_points_and_fractions(tmp_path: Path) -> None:
+def test_points_and_fractions(tmp_path):
     skin = described(
         tmp_path, BOX, electrodes="points_mm = [[40, 72], [8, 50], [40, 29], [70, 50]]"
     )
@@ -188,7 +188,7 @@ def dxf(folder: Path, units: int = 4) -> tuple[ezdxf.document.Drawing, Path]:
     ("units", "scale_mm", "width_mm"),
     [(4, None, 60), (5, None, 600), (1, None, 1524), (0, 2.0, 120)],
 )
-def test_dxf_units(tmp_path: Path, units: int, scale_mm: float | None, width_mm: float) -> None:
+def test_dxf_units(tmp_path, units, scale_mm, width_mm):
     document, path = dxf(tmp_path, units)
     document.modelspace().add_lwpolyline([(0, 0), (60, 0), (60, 40), (0, 40)], close=True)
     document.saveas(path)
@@ -196,7 +196,7 @@ def test_dxf_units(tmp_path: Path, units: int, scale_mm: float | None, width_mm:
     assert shape.bounding_box_mm == pytest.approx((0, 0, width_mm, width_mm * 2 / 3))
 
 
-def test_dxf_pieces_blocks_and_layers(tmp_path: Path) -> None:
+def test_dxf_pieces_blocks_and_layers(tmp_path):
     document, path = dxf(tmp_path)
     block = document.blocks.new("stadium")
     block.add_line((0, 0), (100, 0), {"layer": "rim"})
@@ -261,21 +261,21 @@ def test_dxf_pieces_blocks_and_layers(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_refused(
-    tmp_path: Path,
-    body: str,
-    skin: str,
-    electrodes: str,
-    head: str,
-    error: type[EitskinError],
-    message: str,
-) -> None:
+    tmp_path,
+    body,
+    skin,
+    electrodes,
+    head,
+    error,
+    message,
+):
     with pytest.raises(error, match=message) as caught:
         described(tmp_path, body, skin, electrodes, head)
     text = str(caught.value)
     assert "\n" not in text and ("a.svg" in text or "skin.toml" in text)
 
 
-def test_copies_of_copies_are_refused_at_once(tmp_path: Path) -> None:
+def test_copies_of_copies_are_refused_at_once(tmp_path):
     body = '<path id="c0" d="M0 0h9v9z"/>' + "".join(
         f'<g id="c{k + 1}">{f"""<use href="#c{k}"/>""" * 10}</g>' for k in range(12)
     )
@@ -283,7 +283,7 @@ def test_copies_of_copies_are_refused_at_once(tmp_path: Path) -> None:
         read_drawing(svg(tmp_path, body), DrawingReading())
 
 
-def test_other_refusals(tmp_path: Path) -> None:
+def test_other_refusals(tmp_path):
     (tmp_path / "a.png").write_bytes(b"")
     (tmp_path / "b.svg").write_bytes(b"<html/>")
     document, path = dxf(tmp_path, 0)
@@ -306,9 +306,7 @@ def test_other_refusals(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "library"), [("drawing_svg", "svgelements"), ("drawing_dxf", "ezdxf")]
 )
-def test_an_absent_library_is_named(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str, library: str
-) -> None:
+def test_an_absent_library_is_named(monkeypatch, tmp_path, name, library):
     path = tmp_path / ("a.svg" if library == "svgelements" else "a.dxf")
     path.write_text("x")
     monkeypatch.setitem(sys.modules, library, None)
@@ -317,14 +315,14 @@ def test_an_absent_library_is_named(
         read_drawing(path, DrawingReading())
 
 
-def test_examples_are_what_the_script_draws(tmp_path: Path) -> None:
+def test_examples_are_what_the_script_draws(tmp_path):
     write_drawings(tmp_path)
     assert (tmp_path / "hand.svg").read_text() == (EXAMPLES / "hand.svg").read_text() == hand_svg()
     drawn, kept = (outline(folder / "forearm.dxf", "skin") for folder in (tmp_path, EXAMPLES))
     np.testing.assert_allclose(drawn.vertices_mm, kept.vertices_mm, atol=1e-9)
 
 
-def test_drawings_give_the_shapes_that_they_were_drawn_from() -> None:
+def test_drawings_give_the_shapes_that_they_were_drawn_from():
     hand, _ = load_skin(EXAMPLES / "hand.toml")
     assert hand.outline.area_mm2 == pytest.approx(as_outline(hand_corners()).area_mm2, rel=1e-3)
     np.testing.assert_allclose(hand.electrode_centres_mm(), hand_places_mm(), atol=0.3)
@@ -336,7 +334,7 @@ def test_drawings_give_the_shapes_that_they_were_drawn_from() -> None:
         as_outline([Corner(0, 0, 9), Corner(10, 0, 9), Corner(10, 10, 9), Corner(0, 10, 9)])
 
 
-def test_a_model_does_not_need_the_drawing(tmp_path: Path) -> None:
+def test_a_model_does_not_need_the_drawing(tmp_path):
     skin = described(tmp_path, BOX)
     model = build_model(
         skin, adjacent(8), BuildSettings(rank=5, pixels_across=8, elements=300, samples=0)
@@ -345,7 +343,7 @@ def test_a_model_does_not_need_the_drawing(tmp_path: Path) -> None:
     assert decode_model(encode_model(model), "model").skin == skin
 
 
-def test_dxf_bytes_are_the_same_in_two_runs(tmp_path: Path) -> None:
+def test_dxf_bytes_are_the_same_in_two_runs(tmp_path):
     texts = []
     for _ in range(2):
         write_drawings(tmp_path)

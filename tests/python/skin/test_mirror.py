@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from eitskin.skin.mirror import rim_mirror
-from eitskin.skin.outline import Outline, disk, polygon
+from eitskin.skin.outline import disk, polygon
 from small_models import l_shape, rounded_rectangle
 
 
@@ -13,14 +13,14 @@ def field(place: complex, dipole: complex, a: complex, b: complex, at: np.ndarra
     return np.asarray(np.conj(dipole / (at - place) ** 2 - np.conj(dipole) / (a - b * at) ** 2))
 
 
-def test_of_a_disk() -> None:
+def test_of_a_disk():
     a, b = rim_mirror(disk(80.0), [(10.0, -20.0), (0.0, 0.0), (0.0, 39.0)])
     assert a == pytest.approx([40, 40, 40])
     assert b == pytest.approx([(10 + 20j) / 40, 0, -39j / 40])
 
 
 @pytest.mark.parametrize("dipole", [1.0, 1j, 0.6 - 0.8j])
-def test_no_current_crosses_the_rim_of_a_disk(dipole: complex) -> None:
+def test_no_current_crosses_the_rim_of_a_disk(dipole):
     place = 12 - 23j
     (a,), (b,) = rim_mirror(disk(80.0), [(place.real, place.imag)])
     normal = np.exp(1j * np.linspace(0, 2 * np.pi, 50))
@@ -30,7 +30,7 @@ def test_no_current_crosses_the_rim_of_a_disk(dipole: complex) -> None:
 
 
 @pytest.mark.parametrize("dipole", [1.0, 1j, 0.6 - 0.8j])
-def test_no_current_crosses_a_straight_edge(dipole: complex) -> None:
+def test_no_current_crosses_a_straight_edge(dipole):
     """The upper edge of a rectangle, 7 mm away: the mirror image lies as far beyond."""
     rectangle = polygon([(0, 0), (100, 0), (100, 50), (0, 50)])
     (a,), (b,) = rim_mirror(rectangle, [(40.0, 43.0)])
@@ -48,7 +48,7 @@ OUTLINES = {
 
 
 @pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
-def test_a_straight_mirror_is_the_image_beyond_the_nearest_edge(outline: Outline) -> None:
+def test_a_straight_mirror_is_the_image_beyond_the_nearest_edge(outline):
     """a / b is the image point, |b| = 1; on the rim it is the point itself, from within as on it
     and beyond."""
     low, high = np.min(outline.vertices_mm, axis=0), np.max(outline.vertices_mm, axis=0)

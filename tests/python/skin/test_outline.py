@@ -13,7 +13,7 @@ from eitskin.skin.outline import disk, polygon
 L_SHAPE = [(0, 0), (100, 0), (100, 30), (30, 30), (30, 100), (0, 100)]
 
 
-def test_disk_is_exact() -> None:
+def test_disk_is_exact():
     outline = disk(194.0)
     assert outline.perimeter_mm == pytest.approx(194 * pi, rel=1e-15)
     assert outline.area_mm2 == pytest.approx(97**2 * pi, rel=1e-15)
@@ -27,7 +27,7 @@ def test_disk_is_exact() -> None:
     assert outline.corner_arc_lengths_mm().size == 0
 
 
-def test_polygon_measures() -> None:
+def test_polygon_measures():
     outline = polygon(L_SHAPE)
     assert outline.diameter_mm is None
     assert outline.perimeter_mm == pytest.approx(400)
@@ -44,7 +44,7 @@ def test_polygon_measures() -> None:
     assert inside.tolist() == [True, True, True, False, False, False, True]
 
 
-def test_centre_of_area_and_of_a_concave_outline() -> None:
+def test_centre_of_area_and_of_a_concave_outline():
     assert polygon([(10, 10), (30, 10), (30, 20), (10, 20)]).centre_mm == pytest.approx((20, 15))
     outline = polygon(L_SHAPE)
     # The centre of area (35.6, 35.6) lies outside; the centre is the middle of the arm at that
@@ -58,7 +58,7 @@ def test_centre_of_area_and_of_a_concave_outline() -> None:
         assert dx * cos(radians(angle)) + dy * sin(radians(angle)) > 0
 
 
-def test_ray_takes_the_furthest_crossing_and_corners() -> None:
+def test_ray_takes_the_furthest_crossing_and_corners():
     notched = polygon([(-50, -50), (50, -50), (50, 50), (10, 50), (0, 10), (-10, 50), (-50, 50)])
     square = polygon([(-50, -50), (50, -50), (50, 50), (-50, 50)])
     assert square.point_at(square.arc_length_at_angle(45)) == pytest.approx((50, 50))
@@ -72,7 +72,7 @@ def test_ray_takes_the_furthest_crossing_and_corners() -> None:
     assert x <= spiral.centre_mm[0] and y == pytest.approx(spiral.centre_mm[1])
 
 
-def test_clockwise_is_turned_and_a_closing_point_dropped() -> None:
+def test_clockwise_is_turned_and_a_closing_point_dropped():
     forward = polygon(L_SHAPE)
     backward = polygon(L_SHAPE[::-1])
     closed = polygon([*L_SHAPE, L_SHAPE[0]])
@@ -98,14 +98,14 @@ def test_clockwise_is_turned_and_a_closing_point_dropped() -> None:
         ([(0, 0), (1000, 999.9), (1000, 1000)], "next to nothing"),
     ],
 )
-def test_refused_polygons(vertices: list[tuple[float, float]], message: str) -> None:
+def test_refused_polygons(vertices, message):
     with pytest.raises(GeometryError, match=message) as caught:
         polygon(vertices)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("diameter", [0.0, -5.0, 0.5, 1e6, float("nan"), float("inf")])
-def test_refused_disks(diameter: float) -> None:
+def test_refused_disks(diameter):
     with pytest.raises(GeometryError, match="diameter_mm"):
         disk(diameter)
 
@@ -116,7 +116,7 @@ def test_refused_disks(diameter: float) -> None:
     turn=st.floats(0, 6.28),
     clockwise=st.booleans(),
 )
-def test_any_star_shaped_outline(radii: list[float], turn: float, clockwise: bool) -> None:
+def test_any_star_shaped_outline(radii, turn, clockwise):
     angles = [turn + 2 * pi * k / len(radii) for k in range(len(radii))]
     points = [(r * cos(a), r * sin(a)) for r, a in zip(radii, angles, strict=True)]
     outline = polygon(points[::-1] if clockwise else points)

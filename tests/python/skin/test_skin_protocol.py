@@ -1,8 +1,5 @@
 """Protocols: their rows, reciprocity found from any table, and a hash that must never change."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,7 +19,7 @@ from eitskin.skin.protocol import (
 
 
 @pytest.mark.parametrize(("n", "rows"), [(4, 4), (8, 40), (16, 208), (32, 928)])
-def test_adjacent_rows(n: int, rows: int) -> None:
+def test_adjacent_rows(n, rows):
     protocol = adjacent(n)
     assert protocol.n_rows == rows == n * (n - 3)
     drive, measure = protocol.drive_measure[:, :2], protocol.drive_measure[:, 2:]
@@ -36,7 +33,7 @@ def test_adjacent_rows(n: int, rows: int) -> None:
     assert sorted([*reciprocity.first, *reciprocity.second]) == list(range(rows))
 
 
-def test_adjacent_order_is_fixed() -> None:
+def test_adjacent_order_is_fixed():
     rows = adjacent(16).drive_measure.tolist()
     assert rows[:2] == [[0, 1, 2, 3], [0, 1, 3, 4]]
     assert rows[12] == [0, 1, 14, 15]
@@ -45,12 +42,12 @@ def test_adjacent_order_is_fixed() -> None:
     assert rows[26:28] == [[2, 3, 0, 1], [2, 3, 4, 5]]
 
 
-def test_adjacent_is_kit4s_table(shared_data: Path) -> None:
+def test_adjacent_is_kit4s_table(shared_data):
     with np.load(shared_data / "kit4_dev.npz") as data:
         assert np.array_equal(adjacent(16).drive_measure, data["drive_measure"])
 
 
-def test_opposite_and_skip() -> None:
+def test_opposite_and_skip():
     across = opposite(16)
     assert across.n_rows == 16 * 12
     assert across.drive_measure[0].tolist() == [0, 8, 1, 2]
@@ -93,13 +90,13 @@ def test_opposite_and_skip() -> None:
         (lambda: protocol_from_table({"order": "by 2"}, 8, "x"), "x: protocol: order"),
     ],
 )  # fmt: skip
-def test_refused(make: Any, message: str) -> None:
+def test_refused(make, message):
     with pytest.raises(ProtocolError, match=message) as caught:
         make()
     assert "\n" not in str(caught.value)
 
 
-def test_rows_are_read_only_and_a_copy() -> None:
+def test_rows_are_read_only_and_a_copy():
     rows = np.array([[0, 1, 2, 3]])
     protocol = table(4, rows)
     rows[0, 0] = 3
@@ -109,7 +106,7 @@ def test_rows_are_read_only_and_a_copy() -> None:
         protocol.drive_measure[0, 0] = 1
 
 
-def test_hash_is_fnv_1a_of_the_documented_bytes() -> None:
+def test_hash_is_fnv_1a_of_the_documented_bytes():
     """The firmware computes the same; these values must never change."""
     value = 0xCBF29CE484222325
     for byte in [4, 0, 1, 0, 0, 1, 2, 3]:
@@ -120,7 +117,7 @@ def test_hash_is_fnv_1a_of_the_documented_bytes() -> None:
     assert adjacent(16).hash != skip(16, 1).hash != opposite(16).hash
 
 
-def test_reciprocity_with_flips() -> None:
+def test_reciprocity_with_flips():
     rows = [
         [0, 1, 4, 5],
         [5, 4, 0, 1],
@@ -138,7 +135,7 @@ def test_reciprocity_with_flips() -> None:
 
 @settings(max_examples=50, deadline=None)
 @given(st.integers(5, 20), st.integers(0, 2**32 - 1))
-def test_reciprocity_of_shuffled_and_flipped_tables(n: int, seed: int) -> None:
+def test_reciprocity_of_shuffled_and_flipped_tables(n, seed):
     """Fold an adjacent table whose rows were shuffled and whose pairs were flipped and swapped at
     random."""
     rng = np.random.default_rng(seed)
@@ -171,7 +168,7 @@ def test_reciprocity_of_shuffled_and_flipped_tables(n: int, seed: int) -> None:
          {"kind": "table", "table": [[0, 1, 2, 3], [3, 2, 5, 4]]}),
     ],
 )  # fmt: skip
-def test_table_round_trip(protocol: Protocol, kind: dict[str, Any]) -> None:
+def test_table_round_trip(protocol, kind):
     made = protocol_to_table(protocol)
     assert made == {**kind, "current_a": protocol.current_a}
     again = protocol_from_table(made, protocol.n_electrodes, "here")
@@ -181,7 +178,7 @@ def test_table_round_trip(protocol: Protocol, kind: dict[str, Any]) -> None:
     assert again.drive_order == protocol.drive_order
 
 
-def test_an_order_changes_when_a_row_is_measured_and_nothing_else() -> None:
+def test_an_order_changes_when_a_row_is_measured_and_nothing_else():
     plain = adjacent(16)
     by_7 = protocol_from_table({"order": "by 7"}, 16, "x")
     assert by_7.drive_order[:4] == (0, 7, 14, 5) and plain.drive_order == ()

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eitskin.errors import ConfigError, EitskinError, FileError, GeometryError, ProtocolError
+from eitskin.errors import ConfigError, FileError, GeometryError, ProtocolError
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.protocol import adjacent, opposite
@@ -20,7 +20,7 @@ def _angles(skin: Skin) -> np.ndarray[Any, Any]:
     return np.degrees(np.arctan2(y, x)) % 360
 
 
-def test_paper_skin() -> None:
+def test_paper_skin():
     skin = paper_skin()
     found = skin.outline.diameter_mm, skin.thickness_mm, skin.conductivity_s_per_m
     assert found == (194, 12, 0.01)
@@ -31,21 +31,21 @@ def test_paper_skin() -> None:
     assert (spans[:, 0] >= 0).all() and (spans[:, 0] < skin.outline.perimeter_mm).all()
 
 
-def test_clockwise_numbering_and_start() -> None:
+def test_clockwise_numbering_and_start():
     skin = Skin("tank", disk(280), Electrodes(16, 25, start_angle_deg=90, clockwise=True))
     np.testing.assert_allclose(_angles(skin), (90 - np.arange(16) * 22.5) % 360, atol=1e-9)
     skin = Skin("tank", disk(280), Electrodes(8, 25, start_angle_deg=-450))
     np.testing.assert_allclose(_angles(skin), (270 + np.arange(8) * 45) % 360, atol=1e-9)
 
 
-def test_kit4_angles(shared_data: Path) -> None:
+def test_kit4_angles(shared_data):
     with np.load(shared_data / "kit4_dev.npz") as data:
         angles = data["electrode_angle_deg"] % 360
     skin = Skin("kit4", disk(280), Electrodes(16, 25, start_angle_deg=90, clockwise=True))
     np.testing.assert_allclose(_angles(skin), angles, atol=1e-9)
 
 
-def test_positions_along_the_rim() -> None:
+def test_positions_along_the_rim():
     skin = Skin(
         "r",
         RECTANGLE,
@@ -60,7 +60,7 @@ def test_positions_along_the_rim() -> None:
     )
 
 
-def test_evenly_by_arc_length_on_a_polygon() -> None:
+def test_evenly_by_arc_length_on_a_polygon():
     skin = Skin("r", RECTANGLE, Electrodes(12, 5, start_angle_deg=0))
     np.testing.assert_allclose(
         skin.electrode_centres_mm()[:4], [(200, 50), (200, 100), (150, 100), (100, 100)]
@@ -81,7 +81,7 @@ def test_evenly_by_arc_length_on_a_polygon() -> None:
         (Electrodes(4, 1000), "do not fit"),
     ],
 )  # fmt: skip
-def test_overlap_is_refused(electrodes: Electrodes, message: str) -> None:
+def test_overlap_is_refused(electrodes, message):
     with pytest.raises(GeometryError, match=message):
         Skin("s", disk(194), electrodes)
 
@@ -100,14 +100,14 @@ def test_overlap_is_refused(electrodes: Electrodes, message: str) -> None:
         {"count": 4, "positions_mm": (0.0, 2.0, float("nan"), 3.0)},
     ],
 )
-def test_refused_electrodes(arguments: dict[str, Any]) -> None:
+def test_refused_electrodes(arguments):
     with pytest.raises(GeometryError, match="electrodes: "):
         Electrodes(**arguments)
 
 
 @pytest.mark.parametrize("key", ["conductivity_s_per_m", "thickness_mm"])
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
-def test_refused_sheet(key: str, value: float) -> None:
+def test_refused_sheet(key, value):
     with pytest.raises(GeometryError, match=key):
         Skin("s", disk(194), Electrodes(), **{key: value})
 
@@ -128,7 +128,7 @@ def test_refused_sheet(key: str, value: float) -> None:
     ],
     ids=lambda skin: skin.name,
 )
-def test_table_round_trip(skin: Skin) -> None:
+def test_table_round_trip(skin):
     assert skin_from_table(skin_to_table(skin), "here") == skin
 
 
@@ -138,7 +138,7 @@ def _write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_load_the_documented_file(tmp_path: Path) -> None:
+def test_load_the_documented_file(tmp_path):
     path = _write(
         tmp_path,
         """
@@ -164,7 +164,7 @@ current_a = 0.001
     assert protocol.current_a == 1e-3
 
 
-def test_load_with_defaults_and_a_polygon(tmp_path: Path) -> None:
+def test_load_with_defaults_and_a_polygon(tmp_path):
     path = _write(
         tmp_path,
         """
@@ -239,13 +239,13 @@ DISK = "[skin]\ndiameter_mm = 194\n"
         ("[skin\n", ConfigError, "not valid TOML"),
     ],
 )
-def test_refused_files(tmp_path: Path, text: str, error: type[EitskinError], message: str) -> None:
+def test_refused_files(tmp_path, text, error, message):
     with pytest.raises(error, match=message) as caught:
         load_skin(_write(tmp_path, text))
     assert "\n" not in str(caught.value)
     assert "skin.toml" in str(caught.value)
 
 
-def test_missing_file(tmp_path: Path) -> None:
+def test_missing_file(tmp_path):
     with pytest.raises(FileError, match="no such skin description"):
         load_skin(tmp_path / "none.toml")

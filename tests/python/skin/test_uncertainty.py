@@ -1,7 +1,6 @@
 """The table [uncertainty] of a skin's file: defaults, none, and what is refused."""
 
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,13 +12,13 @@ from eitskin.skin.uncertainty import LIMITS, Uncertainty
 SKIN: dict[str, Any] = {"skin": {"diameter_mm": 100.0}}
 
 
-def test_without_it_the_defaults() -> None:
+def test_without_it_the_defaults():
     assert skin_from_table(SKIN, "x").uncertainty == Uncertainty()
     assert skin_from_table({**SKIN, "uncertainty": {}}, "x").uncertainty == Uncertainty()
     assert "uncertainty" not in skin_to_table(paper_skin())
 
 
-def test_a_file_says_it(tmp_path: Path) -> None:
+def test_a_file_says_it(tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text('uncertainty = "none"\n[skin]\ndiameter_mm = 100\n')
     assert load_skin(path)[0].uncertainty is None
@@ -34,7 +33,7 @@ def test_a_file_says_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("uncertainty", [None, Uncertainty(seed=7, touch_contrast=(0.2, 0.9))])
-def test_a_table_gives_it_again(uncertainty: Uncertainty | None) -> None:
+def test_a_table_gives_it_again(uncertainty):
     skin = replace(paper_skin(), uncertainty=uncertainty)
     assert skin_from_table(skin_to_table(skin), "x") == skin
 
@@ -55,14 +54,14 @@ def test_a_table_gives_it_again(uncertainty: Uncertainty | None) -> None:
         ({"touch_contrast": [0, 2]}, "touch_contrast = 0 is out of range"),
     ],
 )
-def test_refused(value: object, said: str) -> None:
+def test_refused(value, said):
     with pytest.raises(ConfigError) as refused:
         skin_from_table({**SKIN, "uncertainty": value}, "x")
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_python_is_refused_the_same(name: str) -> None:
+def test_python_is_refused_the_same(name):
     high: Any = LIMITS[name][1] * 1.5
     if isinstance(getattr(Uncertainty(), name), tuple):
         high = (LIMITS[name][0], high)
@@ -70,5 +69,5 @@ def test_python_is_refused_the_same(name: str) -> None:
         replace(Uncertainty(), **{name: high})
 
 
-def test_every_number_has_its_limits() -> None:
+def test_every_number_has_its_limits():
     assert set(LIMITS) == {field.name for field in fields(Uncertainty)} - {"row_gains"}

@@ -31,7 +31,7 @@ def one_by_one(engine: str, frames: np.ndarray, quiet: np.ndarray) -> list[Recon
 
 @pytest.mark.parametrize("engine", ["c", "c64"])
 @pytest.mark.parametrize("threads", [1, 2, 5])
-def test_the_same_as_one_after_another(engine: str, threads: int) -> None:
+def test_the_same_as_one_after_another(engine, threads):
     frames, quiet = small().frames(41, COUNT), small().quiet(42, 8)
     frames[3, 5:9] = np.nan  # left out; the basis is made again, and once more for the next frame
     frames[11] = np.nan  # refused
@@ -57,7 +57,7 @@ def test_the_same_as_one_after_another(engine: str, threads: int) -> None:
     )
 
 
-def test_a_second_batch_and_no_touches() -> None:
+def test_a_second_batch_and_no_touches():
     frames, quiet = small().frames(43, 9), small().quiet(42, 8)
     batch = Batch(small_model(), threads=2, blob=small_blob())
     assert batch.tare(quiet[0]).frames == 1
@@ -68,7 +68,7 @@ def test_a_second_batch_and_no_touches() -> None:
     assert list(batch.each(frames[:0])) == []
 
 
-def test_options_masks_and_engines_reach_every_thread() -> None:
+def test_options_masks_and_engines_reach_every_thread():
     frames, quiet = small().frames(44, 12), small().quiet(42, 8)
     options = replace(default_options(small_model()), iterations=7, sign="both", diagnostics=0)
     mask = np.zeros(frames.shape[1], dtype=np.bool_)
@@ -81,7 +81,7 @@ def test_options_masks_and_engines_reach_every_thread() -> None:
         assert result.info.iterations in (0, 7) and result.info.masked == 6
 
 
-def test_reconstruct_many_names_the_frame() -> None:
+def test_reconstruct_many_names_the_frame():
     frames, quiet = small().frames(45, 5), small().quiet(42, 8)
     results = reconstruct_many(small_model(), frames, quiet, threads=2)
     expected = [
@@ -93,7 +93,7 @@ def test_reconstruct_many_names_the_frame() -> None:
         reconstruct_many(small_model(), frames, quiet, threads=2)
 
 
-def test_c_runs_without_pythons_lock() -> None:
+def test_c_runs_without_pythons_lock():
     """While one thread is in C, this one counts: it would stand still for as long if the lock were
     held."""
     frames, quiet = small().frames(46, 4), small().quiet(42, 8)
@@ -117,7 +117,7 @@ def test_c_runs_without_pythons_lock() -> None:
     assert counted[0] > 10_000
 
 
-def test_refusals() -> None:
+def test_refusals():
     for threads in (0, -1, 257):
         with pytest.raises(UsageError, match="1 to 256"):
             Batch(small_model(), threads=threads)

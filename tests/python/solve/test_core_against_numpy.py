@@ -24,7 +24,7 @@ SOLVED = ("iterations", "optimum")
 
 
 @pytest.fixture(params=SOLVERS)
-def solver(request: pytest.FixtureRequest) -> str:
+def solver(request) -> str:
     """Each solver in turn."""
     return str(request.param)
 
@@ -95,7 +95,7 @@ def agree(
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("drift", [True, False], ids=["project", "keep"])
-def test_same_images(storage: str, data_kind: str, drift: bool, solver: str) -> None:
+def test_same_images(storage, data_kind, drift, solver):
     made = engines(storage, data_kind, solver, project_reference=drift)
     for seed, sign in enumerate(SIGNS):
         for reconstructor in made.values():
@@ -107,7 +107,7 @@ def test_same_images(storage: str, data_kind: str, drift: bool, solver: str) -> 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", ["f32", "i8"])
-def test_same_images_with_rows_left_out(storage: str, data_kind: str, solver: str) -> None:
+def test_same_images_with_rows_left_out(storage, data_kind, solver):
     """Rows masked from the start, one of a reciprocal pair or both, and others that drop out in
     single frames."""
     s, generator = small(), np.random.default_rng(8)
@@ -128,7 +128,7 @@ def test_same_images_with_rows_left_out(storage: str, data_kind: str, solver: st
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
-def test_same_images_without_electrodes(storage: str, data_kind: str, solver: str) -> None:
+def test_same_images_without_electrodes(storage, data_kind, solver):
     """One, two, three electrodes out, of each sign: what is left is whitened again. In float32 its
     factors lose what the low regularisation does not hold, and noise in the data's last figure is
     raised as all noise is; float64 has the reference's answer.
@@ -154,7 +154,7 @@ def test_same_images_without_electrodes(storage: str, data_kind: str, solver: st
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", ["f32", "i8"])
-def test_same_images_after_a_noisy_tare(storage: str, data_kind: str, solver: str) -> None:
+def test_same_images_after_a_noisy_tare(storage, data_kind, solver):
     """The regularisation is raised tenfold; also with an electrode out."""
     s, made = small(), engines(storage, data_kind, solver)
     for reconstructor in made.values():
@@ -174,7 +174,7 @@ def test_same_images_after_a_noisy_tare(storage: str, data_kind: str, solver: st
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_same_facts_without_an_electrode(data_kind: str, solver: str) -> None:
+def test_same_facts_without_an_electrode(data_kind, solver):
     """Also where it was out when the reference was learned."""
     s, made = small(), engines("f32", data_kind, solver)
     out = (s.protocol.drive_measure == 9).any(axis=1)
@@ -199,7 +199,7 @@ def test_same_facts_without_an_electrode(data_kind: str, solver: str) -> None:
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_same_images_from_a_warm_start(data_kind: str, solver: str) -> None:
+def test_same_images_from_a_warm_start(data_kind, solver):
     """A touch that moves, jumps, lifts; a frame that is refused and one with dropouts in
     between."""
     s = small()
@@ -229,7 +229,7 @@ def test_same_images_from_a_warm_start(data_kind: str, solver: str) -> None:
 
 @pytest.mark.parametrize(("factor", "halvings"), [(1 / 3, 1), (1 / 16, 4), (1e-9, 8)])
 @pytest.mark.parametrize("solver", FISTAS)
-def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver: str) -> None:
+def test_same_recovery_from_a_step_too_long(factor, halvings, solver):
     """A model that understates its Lipschitz constant: the step is halved and the run starts over,
     or is given up as zero."""
     blob = bytearray(small_blob())
@@ -255,7 +255,7 @@ def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_same_facts(data_kind: str, solver: str) -> None:
+def test_same_facts(data_kind, solver):
     """LearnedReference and info of float64 C are the reference's."""
     made = engines("f16", data_kind, solver)
     quiet = small().quiet(3, 21)
@@ -287,7 +287,7 @@ def test_same_facts(data_kind: str, solver: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
-def test_a_frame_does_not_depend_on_those_before(engine: str) -> None:
+def test_a_frame_does_not_depend_on_those_before(engine):
     """Without a warm start the order of frames is nothing to an image, dropouts or not."""
     s = small()
     frames = s.frames(12, 4)
@@ -305,7 +305,7 @@ def test_a_frame_does_not_depend_on_those_before(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
-def test_a_row_masked_at_the_reference_stays_out_until_the_next(engine: str) -> None:
+def test_a_row_masked_at_the_reference_stays_out_until_the_next(engine):
     s = small()
     made = Reconstructor(small_model(), engine=engine)
     mask = np.zeros(208, dtype=bool)

@@ -38,7 +38,7 @@ def same(results: list[Reconstruction]) -> None:
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_small_models(solver: str, storage: str, data_kind: str, width: str) -> None:
+def test_small_models(solver, storage, data_kind, width):
     blob, s = small_blob(storage, data_kind), small()
     built = [
         CoreEngine(blob, width, prepared=prepared, portable=portable)
@@ -62,7 +62,7 @@ def test_small_models(solver: str, storage: str, data_kind: str, width: str) -> 
 
 @pytest.mark.parametrize("width", ["float32", "float64"])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_noisy_tare(solver: str, width: str) -> None:
+def test_a_noisy_tare(solver, width):
     """The regularisation of the whitening is raised."""
     blob, s = small_blob("i8"), small()
     built = [
@@ -80,7 +80,7 @@ def test_a_noisy_tare(solver: str, width: str) -> None:
 
 
 @pytest.mark.parametrize("width", ["float32", "float64"])
-def test_touches_of_simulated_frames(width: str) -> None:
+def test_touches_of_simulated_frames(width):
     _, blob = prebuilt()
     frames = session().as_frames()
     found = 0
@@ -97,7 +97,7 @@ def test_touches_of_simulated_frames(width: str) -> None:
     assert found >= 20
 
 
-def test_names_and_sizes() -> None:
+def test_names_and_sizes():
     """The portable kernels say so; the copies in panels, of S and of the working set, are what a
     prepared context has more."""
     model, blob = prebuilt()
@@ -116,7 +116,7 @@ def test_names_and_sizes() -> None:
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
-def test_units_of_the_frames_do_not_matter(scale: float) -> None:
+def test_units_of_the_frames_do_not_matter(scale):
     """A power of two would give the same bits; any other factor gives the same image to
     rounding."""
     _, blob = prebuilt()
@@ -137,7 +137,7 @@ def macs_of(iterations: int, **options: object) -> int:
     return engine.reconstruct(frames.voltage_v[0]).info.macs
 
 
-def test_macs_follow_the_work() -> None:
+def test_macs_follow_the_work():
     """Without zeros skipped: per iteration one S'r, one S x of the non-zeros, and the
     projection."""
     model, _ = prebuilt()
@@ -148,7 +148,7 @@ def test_macs_follow_the_work() -> None:
     assert macs[1] < 4 * whole
 
 
-def test_the_working_set_spares_macs() -> None:
+def test_the_working_set_spares_macs():
     """A look at every column at iterations 1 and 11 and for the certificate; a few columns at a
     time in between."""
     model, _ = prebuilt()
@@ -163,7 +163,7 @@ def test_the_working_set_spares_macs() -> None:
 
 @pytest.mark.parametrize("prepared", [True, False])
 @pytest.mark.parametrize("storage", STORAGES)
-def test_a_solver_takes_nothing_over_from_the_one_before(storage: str, prepared: bool) -> None:
+def test_a_solver_takes_nothing_over_from_the_one_before(storage, prepared):
     """The working set's columns are held unpacked; another solver on the same context must not read
     them for its own."""
     blob, s = small_blob(storage, "difference"), small()

@@ -111,7 +111,7 @@ def agree(results: dict[str, Reconstruction], loose: float = 0.0) -> int:
 
 
 @pytest.mark.parametrize("name", [*WORLDS, *UNTOUCHED])
-def test_all_engines_find_the_same_touches_in_other_worlds(name: str) -> None:
+def test_all_engines_find_the_same_touches_in_other_worlds(name):
     scenes = world(name)
     for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
         count = agree({engine: one(engine, quiet_v, frame_v) for engine in ENGINES})
@@ -119,7 +119,7 @@ def test_all_engines_find_the_same_touches_in_other_worlds(name: str) -> None:
 
 
 @pytest.mark.parametrize("columns", [1, 60, 120])
-def test_all_engines_stop_at_the_same_column(columns: int) -> None:
+def test_all_engines_stop_at_the_same_column(columns):
     """With the same touches, and a count that is said to be uncertain where they did."""
     for name in ("ellipses", "two_fingers_12_to_16_mm", "drift_2_percent_light"):
         quiet_v, frame_v = world(name).quiet_v[0], world(name).frames_v[0]
@@ -132,7 +132,7 @@ def test_all_engines_stop_at_the_same_column(columns: int) -> None:
         assert all(warned) or columns > 1
 
 
-def test_long_touches_are_ellipses_and_discs_are_not() -> None:
+def test_long_touches_are_ellipses_and_discs_are_not():
     """By the angle of the true long axis, or said to be a disc."""
     told = 0
     for name in ("ellipses", "fingers", "eight_at_4_radii", "uneven_20_percent"):
@@ -157,8 +157,8 @@ def test_long_touches_are_ellipses_and_discs_are_not() -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_touches_that_a_drift_of_the_skin_makes_are_found_without_the_test_alone(
-    engine: str,
-) -> None:
+    engine,
+):
     scenes = world("no_touch_drift_2_percent")
     for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
         assert not one(engine, quiet_v, frame_v).touches
@@ -167,9 +167,7 @@ def test_touches_that_a_drift_of_the_skin_makes_are_found_without_the_test_alone
 
 @pytest.mark.parametrize("name", ["fingers", "drift_2_percent_light", "uneven_20_percent"])
 @pytest.mark.parametrize("engine", ENGINES)
-def test_switched_off_it_is_as_if_the_model_did_not_say_what_it_may_be_wrong_by(
-    engine: str, name: str
-) -> None:
+def test_switched_off_it_is_as_if_the_model_did_not_say_what_it_may_be_wrong_by(engine, name):
     """Bit for bit; and without that section the options change nothing."""
     quiet_v, frame_v = world(name).quiet_v[0], world(name).frames_v[0]
     plain = one(engine, quiet_v, frame_v, errors=False)
@@ -183,7 +181,7 @@ def test_switched_off_it_is_as_if_the_model_did_not_say_what_it_may_be_wrong_by(
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_row_gains_can_be_switched_after_the_tare(engine: str) -> None:
+def test_row_gains_can_be_switched_after_the_tare(engine):
     """At once, without another tare, and back."""
     scenes = world("uneven_20_percent")
     expected = [
@@ -217,7 +215,7 @@ def exact() -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_row_gains_undo_what_multiplies_rows(engine: str) -> None:
+def test_row_gains_undo_what_multiplies_rows(engine):
     """A sheet that multiplies each row's voltages, of the reference as of touches: the same touches
     as without; where the reference is further from the model than a sheet makes it, or than
     reciprocity allows, rows are left as they are, the regularisation is the
@@ -247,7 +245,7 @@ def test_row_gains_undo_what_multiplies_rows(engine: str) -> None:
         assert 1 <= len(tested.touches) <= max(1, len(with_.touches))
 
 
-def test_all_engines_agree_with_rows_masked_and_lost() -> None:
+def test_all_engines_agree_with_rows_masked_and_lost():
     """Whether or not their reciprocals are in use."""
     fold, scenes = prebuilt()[0].fold, world("uneven_20_percent")
     quiet_v, frame_v = scenes.quiet_v[0], scenes.frames_v[0]
@@ -271,7 +269,7 @@ def test_all_engines_agree_with_rows_masked_and_lost() -> None:
 
 @pytest.mark.parametrize("frames", [1, 8])
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_noiseless_reference_makes_no_touch_of_a_millionth(engine: str, frames: int) -> None:
+def test_a_noiseless_reference_makes_no_touch_of_a_millionth(engine, frames):
     """Of a change of each row, at random or smooth, that a noiseless front end would show: some
     rows are then left out as outliers."""
     generator, scenes = np.random.default_rng(3), world("no_touch_noiseless")
@@ -288,8 +286,8 @@ def test_a_noiseless_reference_makes_no_touch_of_a_millionth(engine: str, frames
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_steps_of_a_converter_without_dither_are_no_touch_where_it_is_told_of_them(
-    engine: str,
-) -> None:
+    engine,
+):
     """Its quiet frames are all alike; a frame of steps would else be a change without noise."""
     scenes, without = world("no_touch_converter_without_dither", 4), 0
     for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):

@@ -70,7 +70,7 @@ def problem(
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
 @pytest.mark.parametrize("sign", ["increase", "decrease", "both"])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_same_optimum(solver: str, sign: str, share: float, drift: bool) -> None:
+def test_same_optimum(solver, sign, share, drift):
     """Objectives agree within the gap, predictions S x to its square root."""
     for seed in range(3):
         s, y, basis, lam = problem(seed, sign, share, drift)
@@ -92,7 +92,7 @@ def test_same_optimum(solver: str, sign: str, share: float, drift: bool) -> None
 
 @pytest.mark.parametrize("sign", ["increase", "both"])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_gap_bounds_the_error_all_the_way(solver: str, sign: str) -> None:
+def test_the_gap_bounds_the_error_all_the_way(solver, sign):
     """At every number of iterations the reported gap is at least what the objective lacks, and
     shrinks over the run."""
     s, y, basis, lam = problem(5, sign, 0.03, True)
@@ -112,7 +112,7 @@ def test_the_gap_bounds_the_error_all_the_way(solver: str, sign: str) -> None:
     assert gaps[5] < (0.05 if solver == "fista" else 0.25) * gaps[0]
 
 
-def test_the_gap_is_that_of_the_dual_point() -> None:
+def test_the_gap_is_that_of_the_dual_point():
     """The sum of terms that are not negative equals primal minus dual objective at the scaled
     residual."""
     s, y, basis, lam = problem(6, "both", 0.1, False)
@@ -130,7 +130,7 @@ def test_the_gap_is_that_of_the_dual_point() -> None:
 
 @pytest.mark.parametrize("width", ["float64", "float32"])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_core_stops_at_the_gap(solver: str, width: str) -> None:
+def test_the_core_stops_at_the_gap(solver, width):
     """C run to a gap on simulated frames: its coefficients are as near to the optimum as it
     says."""
     model, blob = prebuilt()
@@ -165,7 +165,7 @@ def test_the_core_stops_at_the_gap(solver: str, width: str) -> None:
         )
 
 
-def test_a_fixed_number_of_iterations_is_exactly_that() -> None:
+def test_a_fixed_number_of_iterations_is_exactly_that():
     engine = CoreEngine(small_blob())
     engine.set_reference(small().quiet(1, 8))
     for iterations in (1, 7, 60, 333):
@@ -174,7 +174,7 @@ def test_a_fixed_number_of_iterations_is_exactly_that() -> None:
         assert (info.iterations, info.stop) == (iterations, "iterations")
 
 
-def test_a_step_too_long_is_halved_until_it_converges() -> None:
+def test_a_step_too_long_is_halved_until_it_converges():
     """With a Lipschitz constant a sixteenth of the true one the reference recovers by itself."""
     s, y, basis, lam = problem(7, "increase", 0.05, True)
     run = replace(options("increase"), gap_every=5, iterations=20_000)
@@ -184,7 +184,7 @@ def test_a_step_too_long_is_halved_until_it_converges() -> None:
     assert hopeless.stop == "diverged" and hopeless.step_halvings == 8
 
 
-def test_orthonormal_basis() -> None:
+def test_orthonormal_basis():
     generator = np.random.default_rng(4)
     a, b = generator.normal(size=(2, 20))
     basis = orthonormal([a, 2 * a, b, a - b, np.zeros(20)], 20)

@@ -33,7 +33,7 @@ def solved(problems: Problems, width: str, **options: object) -> list[tuple[np.n
     return found
 
 
-def test_the_optimum_is_scikit_learns(problems: Problems) -> None:
+def test_the_optimum_is_scikit_learns(problems):
     """Objectives agree to what scikit-learn's own gap leaves open."""
     from sklearn import linear_model
 
@@ -53,7 +53,7 @@ def test_the_optimum_is_scikit_learns(problems: Problems) -> None:
 
 
 @pytest.mark.parametrize(("width", "bound"), [("float32", 1e-6), ("float64", 1e-12)])
-def test_the_active_set_finds_it(problems: Problems, width: str, bound: float) -> None:
+def test_the_active_set_finds_it(problems, width, bound):
     for k, (x, stop) in enumerate(solved(problems, width, solver="active-set")):
         assert stop == "optimum"
         assert (x >= 0).all() and -1e-12 <= problems.suboptimality(k, x) <= bound
@@ -61,13 +61,13 @@ def test_the_active_set_finds_it(problems: Problems, width: str, bound: float) -
 
 
 @pytest.mark.parametrize(("width", "bound"), [("float32", 1e-4), ("float64", 1e-4)])
-def test_coordinate_descent_comes_near(problems: Problems, width: str, bound: float) -> None:
+def test_coordinate_descent_comes_near(problems, width, bound):
     for k, (x, _) in enumerate(solved(problems, width, solver="coordinate", iterations=5000)):
         assert (x >= 0).all() and -1e-12 <= problems.suboptimality(k, x) <= bound
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_more_macs_give_a_lower_objective(problems: Problems, solver: str) -> None:
+def test_more_macs_give_a_lower_objective(problems, solver):
     """On the mean over the scenes; every limit holds."""
     engine, means = CoreEngine(problems.blob), []
     for limit in (1, 60_000, 120_000, 300_000, 1_000_000, 4_000_000):
@@ -91,7 +91,7 @@ def test_more_macs_give_a_lower_objective(problems: Problems, solver: str) -> No
     assert (np.diff(means[2:]) <= 1e-6).all()
 
 
-def test_the_reference_counts_no_macs() -> None:
+def test_the_reference_counts_no_macs():
     reconstructor = Reconstructor(small_model(), engine="numpy", blob=small_blob())
     with pytest.raises(UsageError, match="counts no multiply-accumulates"):
         reconstructor.with_options(mac_limit=5)

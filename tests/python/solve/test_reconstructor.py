@@ -1,7 +1,6 @@
 """The reconstructor as users see it: what it refuses, what it survives, and what it says of it."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -39,7 +38,7 @@ def one_line(error: pytest.ExceptionInfo[EitskinError]) -> str:
 @pytest.mark.parametrize(
     "other", [adjacent(32), opposite(16), table(16, adjacent(16).drive_measure[::-1])]
 )
-def test_another_protocol_is_refused_by_both_hashes(other: object) -> None:
+def test_another_protocol_is_refused_by_both_hashes(other):
     with pytest.raises(ProtocolError) as error:
         made().check_protocol(other)
     text = one_line(error)
@@ -52,7 +51,7 @@ def test_another_protocol_is_refused_by_both_hashes(other: object) -> None:
 @pytest.mark.parametrize(
     "frame", [np.ones(207), np.ones(209), np.ones((2, 208)), np.ones(0), 1.0, "volts", [1, [2]]]
 )
-def test_frames_of_another_shape(engine: str, frame: object) -> None:
+def test_frames_of_another_shape(engine, frame):
     with pytest.raises(FrameError) as error:
         made(engine).reconstruct(frame)
     assert one_line(error)
@@ -66,27 +65,27 @@ def test_frames_of_another_shape(engine: str, frame: object) -> None:
 @pytest.mark.parametrize(
     "frames", [np.ones((0, 208)), np.ones((2, 2, 208)), [], [[1.0] * 208, [1.0] * 207]]
 )
-def test_references_of_another_shape(engine: str, frames: object) -> None:
+def test_references_of_another_shape(engine, frames):
     with pytest.raises(FrameError) as error:
         made(engine).tare(frames)
     assert one_line(error).startswith("reference")
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_no_frame_before_a_reference(engine: str) -> None:
+def test_no_frame_before_a_reference(engine):
     with pytest.raises(FrameError, match="no reference frame has been set"):
         made(engine, quiet=False).reconstruct(session().frames_v[0])
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("count", [1, 4, 16])
-def test_an_all_zero_reference_is_refused(engine: str, count: int) -> None:
+def test_an_all_zero_reference_is_refused(engine, count):
     with pytest.raises(FrameError, match="all voltages are zero; is the skin driven and connected"):
         made(engine, quiet=False).tare(np.zeros((count, 208)))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_an_all_zero_frame_is_a_dead_front_end_not_a_quiet_skin(engine: str) -> None:
+def test_an_all_zero_frame_is_a_dead_front_end_not_a_quiet_skin(engine):
     reconstructor = made(engine)
     with pytest.raises(FrameError, match="all voltages are zero"):
         reconstructor.reconstruct(np.zeros(208))
@@ -95,7 +94,7 @@ def test_an_all_zero_frame_is_a_dead_front_end_not_a_quiet_skin(engine: str) -> 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_a_reference_must_be_whole(engine: str, value: float) -> None:
+def test_a_reference_must_be_whole(engine, value):
     for count in (1, 2, 8):
         quiet = session().quiet_v[:count].copy()
         quiet[count // 2, 11] = value
@@ -110,7 +109,7 @@ def test_a_reference_must_be_whole(engine: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_refused_single_reference_leaves_the_old_one(engine: str) -> None:
+def test_a_refused_single_reference_leaves_the_old_one(engine):
     reconstructor, frame = made(engine), session().frames_v[0]
     before = reconstructor.reconstruct(frame).image
     with pytest.raises(FrameError):
@@ -119,7 +118,7 @@ def test_a_refused_single_reference_leaves_the_old_one(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_refused_series_leaves_no_reference(engine: str) -> None:
+def test_a_refused_series_leaves_no_reference(engine):
     reconstructor = made(engine)
     with pytest.raises(FrameError):
         reconstructor.tare(np.zeros((8, 208)))
@@ -132,7 +131,7 @@ def test_a_refused_series_leaves_no_reference(engine: str) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("value", "count"), [(np.nan, 1), (np.inf, 3), (np.nan, 12)])
-def test_some_bad_channels_cost_little(engine: str, value: float, count: int) -> None:
+def test_some_bad_channels_cost_little(engine, value, count):
     reconstructor, generator = made(engine), np.random.default_rng(count)
     for frame in session().frames_v[:6]:
         whole = reconstructor.reconstruct(frame)
@@ -148,7 +147,7 @@ def test_some_bad_channels_cost_little(engine: str, value: float, count: int) ->
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_whole_electrode_lost(engine: str) -> None:
+def test_a_whole_electrode_lost(engine):
     """Every row that touches electrode 5: both rows of a pair drop out, and are projected away.
     Touches near it suffer."""
     reconstructor = made(engine)
@@ -164,7 +163,7 @@ def test_a_whole_electrode_lost(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_too_many_bad_channels(engine: str) -> None:
+def test_too_many_bad_channels(engine):
     """Half of the rows are the default limit; max_masked changes it."""
     reconstructor, frame = made(engine), session().frames_v[0].copy()
     frame[:104] = np.nan
@@ -182,7 +181,7 @@ def test_too_many_bad_channels(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_saturated_channels_are_left_out(engine: str) -> None:
+def test_saturated_channels_are_left_out(engine):
     reconstructor, frame = made(engine), session().frames_v[1]
     whole = reconstructor.reconstruct(frame)
     limit = 1.5 * float(np.abs(session().quiet_v).max())
@@ -205,7 +204,7 @@ def test_saturated_channels_are_left_out(engine: str) -> None:
 @pytest.mark.parametrize(
     "rows", [np.zeros(207, dtype=bool), np.zeros(208), [1, 2], np.zeros((208, 1), dtype=bool)]
 )
-def test_masks_of_another_shape(engine: str, rows: object) -> None:
+def test_masks_of_another_shape(engine, rows):
     with pytest.raises(UsageError, match="one truth value for each of 208 rows"):
         made(engine).mask_rows(rows)
 
@@ -214,7 +213,7 @@ def test_masks_of_another_shape(engine: str, rows: object) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_no_change_gives_no_touch(engine: str) -> None:
+def test_no_change_gives_no_touch(engine):
     reconstructor = made(engine)
     result = reconstructor.reconstruct(session().reference_v)
     # numpy's mean of the quiet frames is this very frame; the core's differs from it by rounding
@@ -227,7 +226,7 @@ def test_no_change_gives_no_touch(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ["c", "numpy"])
-def test_false_alarms(engine: str) -> None:
+def test_false_alarms(engine):
     """Of 200 quiet frames at 60 dB, after 64 for the reference, at most 2 % show a touch."""
     quiet = session("quiet", 1, seed=11)
     exact, sigma = quiet.exact_quiet_v, quiet.noise_v
@@ -244,7 +243,7 @@ def test_false_alarms(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_drift_of_the_gain_costs_little(engine: str) -> None:
+def test_drift_of_the_gain_costs_little(engine):
     """5 % more on all channels: under 2 % of the peak with the reference's direction left out, most
     of it without."""
     lost = {}
@@ -260,7 +259,7 @@ def test_drift_of_the_gain_costs_little(engine: str) -> None:
     assert lost[False] > 0.2
 
 
-def test_a_reference_upside_down_gives_the_same_image() -> None:
+def test_a_reference_upside_down_gives_the_same_image():
     """Swapped wires turn every sign; the gain learns it."""
     frames, quiet = session().frames_v[:3], session().quiet_v
     ours, turned = made(), made(quiet=False)
@@ -275,7 +274,7 @@ def test_a_reference_upside_down_gives_the_same_image() -> None:
 
 
 @pytest.mark.parametrize("engine", ["c", "numpy"])
-def test_ids_follow_moving_touches(engine: str) -> None:
+def test_ids_follow_moving_touches(engine):
     """Two touches pass, one lifts and comes back elsewhere: each keeps its id, the newcomer gets
     another."""
     steps = np.linspace(0, 1, 8)
@@ -314,7 +313,7 @@ def test_ids_follow_moving_touches(engine: str) -> None:
     )
 
 
-def test_a_warm_start_is_nearer_after_few_iterations_and_leaves_no_ghost() -> None:
+def test_a_warm_start_is_nearer_after_few_iterations_and_leaves_no_ghost():
     """Resting touches: after 10 frames of 20 iterations each the optimum is nearer; after lift-off
     nothing is left."""
     for frame in session().frames_v[:4]:
@@ -390,9 +389,7 @@ BAD_OPTIONS = [
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("changes", "text"), BAD_OPTIONS, ids=option_name)
-def test_bad_options_are_named_and_the_old_ones_stay(
-    engine: str, changes: dict[str, object], text: str
-) -> None:
+def test_bad_options_are_named_and_the_old_ones_stay(engine, changes, text):
     reconstructor = made(engine, iterations=7)
     before = reconstructor.options
     with pytest.raises(UsageError) as error:
@@ -405,7 +402,7 @@ def test_bad_options_are_named_and_the_old_ones_stay(
 @pytest.mark.parametrize(
     "changes", [c for c, _ in BAD_OPTIONS[:-1] if c.get("iterations") is not True], ids=option_name
 )
-def test_the_core_refuses_them_by_itself(changes: dict[str, object]) -> None:
+def test_the_core_refuses_them_by_itself(changes):
     """Python's check and the core's have the same bounds: what passes here would run on a board."""
     engine = CoreEngine(prebuilt()[1])
     with pytest.raises(UsageError):
@@ -427,18 +424,18 @@ EDGES = {
 
 
 @pytest.mark.parametrize("name", EDGES)
-def test_the_edges_of_the_ranges_are_inside_for_all(name: str) -> None:
+def test_the_edges_of_the_ranges_are_inside_for_all(name):
     for engine in ENGINES:
         made(engine, quiet=False, **{name: EDGES[name]})
 
 
-def test_every_option_has_a_range() -> None:
+def test_every_option_has_a_range():
     tried = {name for changes, _ in BAD_OPTIONS[:-1] for name in changes}
     assert tried == set(Options.__dataclass_fields__)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_what_options_do(engine: str) -> None:
+def test_what_options_do(engine):
     frame = session(scenes=40).frames_v[2]
     base = made(engine).reconstruct(frame)
     assert base.info.lambda_ == pytest.approx(0.03 * base.info.lambda_max, rel=1e-6)
@@ -457,7 +454,7 @@ def test_what_options_do(engine: str) -> None:
 # ---- files and engines ----
 
 
-def test_from_a_file(tmp_path: Path) -> None:
+def test_from_a_file(tmp_path):
     path = tmp_path / "small.eitm"
     path.write_bytes(small_blob())
     for engine in ENGINES:
@@ -471,14 +468,14 @@ def test_from_a_file(tmp_path: Path) -> None:
         Reconstructor.from_file(path)
 
 
-def test_unknown_engines_and_refused_models() -> None:
+def test_unknown_engines_and_refused_models():
     with pytest.raises(UsageError, match="engine 'gpu' is not known; use one of c, c64, numpy"):
         Reconstructor(prebuilt()[0], engine="gpu")
     with pytest.raises(ModelError, match="checksum does not fit"):
         CoreEngine(tiny_blob()[:-1] + b"x")
 
 
-def test_results_do_not_change_afterwards() -> None:
+def test_results_do_not_change_afterwards():
     """Images are copies: the next frame does not write into them."""
     reconstructor = made()
     first = reconstructor.reconstruct(session().frames_v[0])
@@ -489,7 +486,7 @@ def test_results_do_not_change_afterwards() -> None:
     assert made("c64").reconstruct(session().frames_v[0]).image.dtype == np.float64
 
 
-def test_two_reconstructors_share_nothing() -> None:
+def test_two_reconstructors_share_nothing():
     a, b = made(), made()
     a.with_options(sign="both", iterations=3)
     assert b.options.iterations == 60

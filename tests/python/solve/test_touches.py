@@ -49,19 +49,19 @@ def compare(model: Model, quiet: np.ndarray, frames: np.ndarray, **options: obje
     return count
 
 
-def test_simulated_frames_of_the_paper_skin() -> None:
+def test_simulated_frames_of_the_paper_skin():
     frames = session(scenes=40).as_frames()
     assert compare(prebuilt()[0], frames.reference_voltage_v, frames.voltage_v) >= 60
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
-def test_small_models(storage: str, data_kind: str) -> None:
+def test_small_models(storage, data_kind):
     s = small()
     assert compare(small_model(storage, data_kind), s.quiet(2, 32), s.frames(7, 10)) >= 10
 
 
-def test_both_signs_and_dropouts() -> None:
+def test_both_signs_and_dropouts():
     s = small()
     frames = s.frames(17, 12, "both")
     frames[3, 20:26] = np.nan
@@ -77,13 +77,13 @@ def test_both_signs_and_dropouts() -> None:
         ("detection_factor", 0.0),
     ],
 )
-def test_other_options(name: str, value: float) -> None:
+def test_other_options(name, value):
     frames = session(scenes=40).as_frames()
     compare(prebuilt()[0], frames.reference_voltage_v, frames.voltage_v[:10], **{name: value})
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_touches_are_where_they_were_put(engine: str) -> None:
+def test_touches_are_where_they_were_put(engine):
     """One touch of 9 mm and contrast 5 at several places, simulated without noise on another
     mesh."""
     places = [(0.0, 0.0), (40.0, 10.0), (-20.0, -60.0), (55.0, -45.0), (-70.0, 20.0)]
@@ -107,7 +107,7 @@ def test_touches_are_where_they_were_put(engine: str) -> None:
         assert touches[0].explained > 0.9
 
 
-def test_touches_come_strongest_first_with_ids_of_their_own() -> None:
+def test_touches_come_strongest_first_with_ids_of_their_own():
     frames = session(scenes=40).as_frames()
     made = Reconstructor(prebuilt()[0])
     made.tare(frames.reference_voltage_v)
@@ -122,7 +122,7 @@ def test_touches_come_strongest_first_with_ids_of_their_own() -> None:
     assert most == 3
 
 
-def test_a_resistive_change_is_a_touch_of_negative_strength() -> None:
+def test_a_resistive_change_is_a_touch_of_negative_strength():
     s, model = small(), small_model()
     near = np.linalg.norm(s.linear.grid.centres_mm() - (10, 15), axis=1) <= 8
     x, y = s.linear.grid.centres_mm()[near].mean(axis=0)

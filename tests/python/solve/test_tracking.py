@@ -46,7 +46,7 @@ def stream() -> tuple[np.ndarray, np.ndarray]:
 
 
 def options(**changes: object) -> Options:
-    return replace(tracking(default_options(prebuilt()[0])), **changes)  # type: ignore[arg-type]
+    return replace(tracking(default_options(prebuilt()[0])), **changes)
 
 
 def told(chosen: Options) -> list[tuple[Touch, ...]]:
@@ -68,7 +68,7 @@ def told(chosen: Options) -> list[tuple[Touch, ...]]:
     ],
     ids=str,
 )
-def test_the_core_follows_as_the_reference_does(changes: dict[str, object]) -> None:
+def test_the_core_follows_as_the_reference_does(changes):
     """What the core finds in each frame, followed by numpy, is what the core tells: ids, places,
     sizes, order, held ones."""
     quiet_v, frames_v = stream()
@@ -107,7 +107,7 @@ def test_the_core_follows_as_the_reference_does(changes: dict[str, object]) -> N
     assert most >= 3
 
 
-def test_tracking_tells_fewer_false_touches_and_fewer_ids() -> None:
+def test_tracking_tells_fewer_false_touches_and_fewer_ids():
     """Of a detection threshold that lets noise pass, and without the test of touches, which does
     not."""
     low = {"detection_factor": 0.7, "touch_test": 0}
@@ -118,7 +118,7 @@ def test_tracking_tells_fewer_false_touches_and_fewer_ids() -> None:
     assert sum(map(len, tracked)) < sum(map(len, bare))
 
 
-def test_what_a_board_sets_is_what_python_sets() -> None:
+def test_what_a_board_sets_is_what_python_sets():
     """eits_options_track and ``tracking``: the same float32 numbers."""
     engine = CoreEngine(prebuilt()[1])
     ffi, lib = engine._ffi, engine._lib
@@ -133,7 +133,7 @@ def test_what_a_board_sets_is_what_python_sets() -> None:
     assert here.tracks and not usual.tracks
 
 
-def test_each_frame_by_itself_is_as_it_was() -> None:
+def test_each_frame_by_itself_is_as_it_was():
     """Off by default: touches and places are those of a core that forgets before every frame."""
     quiet_v, frames_v = stream()
     made = [Reconstructor(prebuilt()[0], blob=prebuilt()[1]) for _ in range(2)]
@@ -147,7 +147,7 @@ def test_each_frame_by_itself_is_as_it_was() -> None:
         ]
 
 
-def test_touches_stay_on_the_skin() -> None:
+def test_touches_stay_on_the_skin():
     """A finger that leaves at 20 mm a frame and is waited for does not go on beyond the rim."""
     grid: Grid = prebuilt()[0].grid
     tracker, chosen = Tracker(grid), options(track_hold=50)
@@ -160,7 +160,7 @@ def test_touches_stay_on_the_skin() -> None:
     assert 80 < places[-1][0].x_mm < 97 + 2 * grid.pixel_mm
 
 
-def test_pairs_are_the_nearest_first() -> None:
+def test_pairs_are_the_nearest_first():
     distance = np.array([[3.0, 1.0], [2.0, 1.5]])
     assert nearest_pairs(distance, 10.0) == [(0, 1), (1, 0)]
     assert nearest_pairs(distance, 1.2) == [(0, 1)]

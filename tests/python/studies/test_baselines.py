@@ -11,7 +11,7 @@ J = GENERATOR.normal(size=(20, 35)) @ np.diag(np.geomspace(1, 0.05, 35))
 DV = GENERATOR.normal(size=(4, 20))
 
 
-def test_back_projection_divides_by_the_sensitivity() -> None:
+def test_back_projection_divides_by_the_sensitivity():
     image = baselines.back_projection(J).reconstruct(DV)
     expected = [
         [sum(J[i, j] * dv[i] for i in range(20)) / sum(abs(J[:, j])) for j in range(35)]
@@ -26,7 +26,7 @@ def test_back_projection_divides_by_the_sensitivity() -> None:
 
 
 @pytest.mark.parametrize("strength", [1e-4, 1e-2, 1.0])
-def test_gauss_newton_solves_the_normal_equations(strength: float) -> None:
+def test_gauss_newton_solves_the_normal_equations(strength):
     a = strength * np.linalg.eigvalsh(J.T @ J).max()
     expected = np.linalg.solve(J.T @ J + a * np.eye(35), J.T @ DV.T).T
     assert baselines.gauss_newton(J, strength).reconstruct(DV) == pytest.approx(
@@ -35,7 +35,7 @@ def test_gauss_newton_solves_the_normal_equations(strength: float) -> None:
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0])
-def test_noser_solves_the_weighted_normal_equations(exponent: float) -> None:
+def test_noser_solves_the_weighted_normal_equations(exponent):
     prior = np.diag(J.T @ J) ** exponent
     a = 0.01 * np.linalg.eigvalsh(J.T @ J).max()
     expected = np.linalg.solve(J.T @ J + a * np.diag(prior / prior.mean()), J.T @ DV.T).T
@@ -44,13 +44,13 @@ def test_noser_solves_the_weighted_normal_equations(exponent: float) -> None:
     )
 
 
-def test_noser_without_exponent_is_gauss_newton() -> None:
+def test_noser_without_exponent_is_gauss_newton():
     assert baselines.noser(J, 0.1, 0.0).matrix == pytest.approx(
         baselines.gauss_newton(J, 0.1).matrix
     )
 
 
-def test_strength_is_free_of_units() -> None:
+def test_strength_is_free_of_units():
     one = baselines.noser(J, 0.01).reconstruct(DV)
     assert 1e6 * baselines.noser(J * 1e6, 0.01).reconstruct(DV) == pytest.approx(
         one, rel=1e-7, abs=1e-10
@@ -58,7 +58,7 @@ def test_strength_is_free_of_units() -> None:
 
 
 @pytest.mark.parametrize("steps", [1, 2, 5])
-def test_conjugate_gradient_minimises_over_the_krylov_space(steps: int) -> None:
+def test_conjugate_gradient_minimises_over_the_krylov_space(steps):
     """After k steps CGLS has the least |J x - dv| over span{(J'J)^i J'dv, i < k}."""
     image = baselines.ConjugateGradient(J, steps).reconstruct(DV)
     for dv, x in zip(DV, image, strict=True):
@@ -70,7 +70,7 @@ def test_conjugate_gradient_minimises_over_the_krylov_space(steps: int) -> None:
         assert x == pytest.approx(best, abs=1e-7)
 
 
-def test_conjugate_gradient_ends_at_the_solution_and_stays() -> None:
+def test_conjugate_gradient_ends_at_the_solution_and_stays():
     tall = J[:, :8]
     exact = np.linalg.lstsq(tall, DV.T, rcond=None)[0].T
     for steps in (8, 40):
@@ -81,7 +81,7 @@ def test_conjugate_gradient_ends_at_the_solution_and_stays() -> None:
 
 
 @pytest.mark.parametrize("signed", [False, True])
-def test_fista_reaches_the_optimum_of_another_solver(signed: bool) -> None:
+def test_fista_reaches_the_optimum_of_another_solver(signed):
     from sklearn import linear_model
 
     method = baselines.PlainFista(J, 6000, 0.1, signed)
@@ -100,7 +100,7 @@ def test_fista_reaches_the_optimum_of_another_solver(signed: bool) -> None:
         assert 0 < np.count_nonzero(best) < 20
 
 
-def test_fista_optimality_and_lambda_max() -> None:
+def test_fista_optimality_and_lambda_max():
     method = baselines.PlainFista(J, 8000, 0.3)
     x = method.reconstruct(DV)
     slope = (DV - x @ J.T) @ J
@@ -112,7 +112,7 @@ def test_fista_optimality_and_lambda_max() -> None:
     assert all(np.count_nonzero(row) <= 1 for row in almost.reconstruct(DV))
 
 
-def test_fista_iterations_follow_the_paper() -> None:
+def test_fista_iterations_follow_the_paper():
     """Two iterations written out: x1 from 0; momentum (t1 - 1) / t2 is 0 at first, (t2 - 1) / t3
     then."""
     dv = DV[:1]
@@ -131,7 +131,7 @@ def test_fista_iterations_follow_the_paper() -> None:
         assert baselines.PlainFista(J, k, 0.1).reconstruct(dv) == pytest.approx(x, abs=1e-13)
 
 
-def test_frame_of_nothing_gives_an_image_of_nothing() -> None:
+def test_frame_of_nothing_gives_an_image_of_nothing():
     for method in (
         baselines.back_projection(J),
         baselines.gauss_newton(J, 0.1),
@@ -143,7 +143,7 @@ def test_frame_of_nothing_gives_an_image_of_nothing() -> None:
         assert (method.reconstruct(np.zeros(20)) == np.zeros((1, 35))).all(), method.name
 
 
-def test_many_frames_are_as_one_by_one() -> None:
+def test_many_frames_are_as_one_by_one():
     for method in (
         baselines.ConjugateGradient(J, 4),
         baselines.PlainFista(J, 30, 0.05),
@@ -155,7 +155,7 @@ def test_many_frames_are_as_one_by_one() -> None:
         )
 
 
-def test_bad_frames_and_parameters_are_refused() -> None:
+def test_bad_frames_and_parameters_are_refused():
     method = baselines.gauss_newton(J, 0.1)
     with pytest.raises(FrameError, match="20 rows"):
         method.reconstruct(np.zeros((2, 19)))

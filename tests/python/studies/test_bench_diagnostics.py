@@ -28,14 +28,14 @@ FIRST_CELL = re.compile(r"^\| ([^|]+) \|", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("diagnostics") / "page.md"
     path.write_text(PAGE.read_text())
     return path
 
 
 @pytest.fixture(scope="module")
-def result(page: Path) -> dict[str, list[dict[str, object]]]:
+def result(page) -> dict[str, list[dict[str, object]]]:
     """A small run, by the command line."""
     sizes = f"--scenes {SCENES} --crowds 2 --imperfect 1 --seed {SEED}"
     with pytest.MonkeyPatch.context() as patch:
@@ -60,7 +60,7 @@ def lost(rate: dict[str, object], which: str = "lost") -> float:
     return float(found["mean"])
 
 
-def test_what_is_certain_is_counted(result: dict[str, list[dict[str, object]]]) -> None:
+def test_what_is_certain_is_counted(result):
     assert len(result["rates"]) == 3 * len(FAULTS) + 2
     assert all(one["scenes"] == SCENES for one in result["rates"])
     lifted = "touch during the tare, then lifted"
@@ -90,7 +90,7 @@ def test_what_is_certain_is_counted(result: dict[str, list[dict[str, object]]]) 
     assert {one["effect"] for one in result["imperfect"]} == set(IMPERFECT)
 
 
-def test_counts_are_those_of_the_frames(result: dict[str, list[dict[str, object]]]) -> None:
+def test_counts_are_those_of_the_frames(result):
     """A detached electrode once more, by hand."""
     model, blob = load_prebuilt()
     solver, named = Reconstructor(model, blob=blob), 0
@@ -104,21 +104,19 @@ def test_counts_are_those_of_the_frames(result: dict[str, list[dict[str, object]
     assert named / SCENES == rate(result, DETACHED)["named"]
 
 
-def test_wires_exchanged_twice_are_right_again() -> None:
+def test_wires_exchanged_twice_are_right_again():
     rows = swapped(3, 8).drive_measure
     assert (np.isin(rows, 3) == np.isin(ROWS, 8)).all() and not (rows == ROWS).all()
 
 
-def test_intervals() -> None:
+def test_intervals():
     mean = bench_diagnostics.mean_of([*[0.0] * 10, *[1.0] * 10])
     assert mean is not None and bench_diagnostics.mean_of([]) is None
     assert mean.mean == 0.5 and mean.worst_tenth == 1.0
     assert mean.half_95 == pytest.approx(1.96 * np.sqrt(0.25 * 20 / 19 / 20))
 
 
-def test_the_page_is_filled_and_has_its_rows(
-    result: dict[str, list[dict[str, object]]], page: Path
-) -> None:
+def test_the_page_is_filled_and_has_its_rows(result, page):
     """The fixture's page is a copy of ours; what no command writes stays."""
     written, ours = page.read_text(), PAGE.read_text()
     assert "`eitskin bench diagnostics --scenes 4 " in written
@@ -130,6 +128,6 @@ def test_the_page_is_filled_and_has_its_rows(
     assert FIRST_CELL.findall(written) == shown and DETACHED in shown
 
 
-def test_sizes_out_of_range_are_refused() -> None:
+def test_sizes_out_of_range_are_refused():
     for arguments in ("--scenes 1", "--crowds 0", "--imperfect 0", "--seed -1"):
         assert main(["bench", "diagnostics", *arguments.split()]) == 2

@@ -12,7 +12,7 @@ from eitskin_studies.benchmarks import energy
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "board-cost.md"
 
 
-def test_a_point_takes_the_processor_while_it_solves_and_all_else_for_the_frame() -> None:
+def test_a_point_takes_the_processor_while_it_solves_and_all_else_for_the_frame():
     point = next(one for one in load_front().points if one.name == "standard")
     one = energy.energy_of(point, Conditions())
     assert one is not None and one.scan_ms == 20.8
@@ -22,7 +22,7 @@ def test_a_point_takes_the_processor_while_it_solves_and_all_else_for_the_frame(
     assert rest == pytest.approx(energy.measuring_mw()) == pytest.approx(792, abs=1)
 
 
-def test_the_cheapest_keeps_its_accuracy_and_sleep_saves() -> None:
+def test_the_cheapest_keeps_its_accuracy_and_sleep_saves():
     result = energy.run()
     cheaper = [one for one in result.points if one.frame_mj < result.cheapest.frame_mj]
     assert all(one.miou < energy.KEPT_MIOU <= result.cheapest.miou for one in cheaper)
@@ -33,9 +33,7 @@ def test_the_cheapest_keeps_its_accuracy_and_sleep_saves() -> None:
         assert means == sorted(means, reverse=True) and means[-1] < 0.2 * means[0]
 
 
-def test_the_command_fills_its_marks_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_fills_its_marks_alone(tmp_path, capsys):
     page = tmp_path / PAGE.name
     page.write_bytes(PAGE.read_bytes())
     assert main(["bench", "energy", "--json", "--page", str(page)]) == 0

@@ -7,7 +7,7 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin_studies.benchmarks.frame import pyeit_frames, run, to_text
 
 
-def test_all_are_timed_and_said() -> None:
+def test_all_are_timed_and_said():
     times = run(3)
     assert set(times.p50_us) == {
         "C: solve", "C: touches", "Python: frame to touches", "Python: frame to touches, warm",
@@ -20,7 +20,7 @@ def test_all_are_timed_and_said() -> None:
     assert all(any(line.startswith(name) for line in lines) for name in times.p50_us)
 
 
-def test_the_peer_sees_the_touch() -> None:
+def test_the_peer_sees_the_touch():
     """pyEIT's image of the golden frame is not that of no touch: its rows are in its own order."""
     golden = load_prebuilt()[0].golden
     reference, frame = golden.reference_v.astype(np.float64), golden.frame_v.astype(np.float64)

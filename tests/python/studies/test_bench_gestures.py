@@ -1,7 +1,6 @@
 """Gestures drawn, simulated, told and judged."""
 
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from eitskin_studies.gestures.judged import GestureCount, ToldGesture, judge, to
 from eitskin_studies.gestures.simulated import RATE_HZ, Simulator, found_touches
 
 
-def test_a_session_has_every_kind_within_the_skin_and_depends_on_its_seed_alone() -> None:
+def test_a_session_has_every_kind_within_the_skin_and_depends_on_its_seed_alone():
     session = draw(97.0, 5, "test", 0)
     assert Counter(one.kind for one in session.gestures) == dict.fromkeys(KINDS, EACH)
     assert repr(session.tracks) == repr(draw(97.0, 5, "test", 0).tracks)
@@ -29,7 +28,7 @@ def test_a_session_has_every_kind_within_the_skin_and_depends_on_its_seed_alone(
             assert reach <= 97.0 - RIM_MM + 1e-9
 
 
-def test_simulated_gestures_are_told_and_kept(tmp_path: Path) -> None:
+def test_simulated_gestures_are_told_and_kept(tmp_path):
     model, blob = load_prebuilt()
     session = draw(97.0, 1, "test", 0, each=1, kinds=("tap", "swipe"))
     simulator = Simulator(model, tmp_path)
@@ -73,9 +72,7 @@ def told(kind: str, at_s: float, direction_deg: float = 0.0) -> ToldGesture:
         (("pinch",), [told("rotate", 0.3)], 0, {"rotate": 1}),
     ],
 )
-def test_what_is_right_and_what_is_invented(
-    kinds: tuple[str, ...], what: list[ToldGesture], right: int, invented: dict[str, int]
-) -> None:
+def test_what_is_right_and_what_is_invented(kinds, what, right, invented):
     count = GestureCount()
     count.add(judge(done(*kinds), what))
     assert (count.right_gestures, dict(count.invented)) == (right, invented)

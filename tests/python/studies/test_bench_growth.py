@@ -19,7 +19,7 @@ POINTS = (
 )
 
 
-def test_counts_are_exact_and_models_are_kept(tmp_path: Path) -> None:
+def test_counts_are_exact_and_models_are_kept(tmp_path):
     first = bench_growth.run(2, tmp_path, points=POINTS)
     kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     again = bench_growth.run(1, tmp_path, points=POINTS)
@@ -44,7 +44,7 @@ def test_counts_are_exact_and_models_are_kept(tmp_path: Path) -> None:
     assert json.loads(json.dumps(first.as_dict()))["points"][0]["macs"] == few.macs
 
 
-def test_the_exponent_of_a_power() -> None:
+def test_the_exponent_of_a_power():
     base = bench_growth.Growth("s", 1, 1, 1, 1, 1, 0.0, 0.0, 1, 1.0, 0.0, (0.0, 0.0))
     points = [
         bench_growth.replace(base, value=value, macs=5.0 * value**1.5) for value in (2, 4, 16)
@@ -52,7 +52,7 @@ def test_the_exponent_of_a_power() -> None:
     assert bench_growth.exponent(points, lambda p: p.macs) == pytest.approx(1.5)
 
 
-def test_batches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_batches(tmp_path, capsys):
     result = bench_batches.run(16, 2, [1, 2])
     assert [(s.name, s.threads) for s in result.speeds] == [
         ("one after another", 1), ("batch", 1), ("C alone", 1), ("batch", 2), ("C alone", 2),

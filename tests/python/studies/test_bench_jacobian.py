@@ -10,7 +10,7 @@ from eitskin.errors import MissingExtraError, UsageError
 from eitskin_studies.benchmarks import jacobian as bench_jacobian
 
 
-def test_both_compute_the_same_jacobian() -> None:
+def test_both_compute_the_same_jacobian():
     result = bench_jacobian.run(elements=(800, 1600), rounds=1, model_elements=800)
     assert json.loads(json.dumps(result)) == result
     for case, asked in zip(result["jacobian"], (800, 1600), strict=True):
@@ -26,7 +26,7 @@ def test_both_compute_the_same_jacobian() -> None:
     assert f"pyeit {result['versions']['pyeit']}" in shown
 
 
-def test_without_pyeit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pyeit(monkeypatch):
     found = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "pyeit" else found(name)
@@ -35,6 +35,6 @@ def test_without_pyeit(monkeypatch: pytest.MonkeyPatch) -> None:
         bench_jacobian.run()
 
 
-def test_refused_rounds() -> None:
+def test_refused_rounds():
     with pytest.raises(UsageError, match="at least 1"):
         bench_jacobian.run(rounds=0)

@@ -16,7 +16,7 @@ case dot;-;1;1;1;80;100,100,100
 """
 
 
-def test_the_slowest_of_three_limits() -> None:
+def test_the_slowest_of_three_limits():
     width = bench_kernels.judge("f32", OUTPUT)
     assert (width.kernels, width.fma_per_ns, width.chain_ns) == ("avx2", 50.0, 1.0)
     panels, mul, dot = width.judged

@@ -23,7 +23,7 @@ def told(number: int, *places: tuple[float, float], named: str = "") -> Told:
         (named,) if named else (), 8.0, 1.0, True)  # fmt: skip
 
 
-def test_what_is_told_of_presses() -> None:
+def test_what_is_told_of_presses():
     presses = [Press(0.05, 0.0, 0.3, 0.0, 0.0), Press(0.61, 0.0, 0.9, 40.0, 0.0)]
     presses.append(Press(1.25, 0.0, 1.5, 0.0, 0.0))
     frames = [
@@ -41,7 +41,7 @@ def test_what_is_told_of_presses() -> None:
     assert (early.with_false, early.false_touches, early.missed) == (2, 4, 2)
 
 
-def test_presses_are_drawn_apart_and_inside(tmp_path: Path) -> None:
+def test_presses_are_drawn_apart_and_inside(tmp_path):
     presses = latency.draw(20, 0.03, 5)
     scene = load_scene(latency._written(tmp_path, "x", presses, 1))
     assert len(scene.touches) == 20 and scene.rate_hz == pytest.approx(48.077, abs=1e-3)
@@ -52,7 +52,7 @@ def test_presses_are_drawn_apart_and_inside(tmp_path: Path) -> None:
     assert one.contrast[0] == pytest.approx(3.0, abs=1e-3)
 
 
-def test_a_run_fills_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_fills_the_page(tmp_path, monkeypatch):
     monkeypatch.setattr(latency, "RISES_MS", (30,))
     result = latency.run(1, 0, 1)
     assert [one.method for one in result.judged] == [latency.DRIVES, latency.WHOLE]

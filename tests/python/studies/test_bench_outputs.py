@@ -12,14 +12,14 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "outputs.md"
 PARTS = ["scan", "solve", "link", "host", "sink udp", "contact to udp", "sink tuio"]
 
 
-def test_taps_are_scenes(tmp_path: Path) -> None:
+def test_taps_are_scenes(tmp_path):
     path = tmp_path / "taps.toml"
     path.write_text(outputs._scene([(0.1, 0.2), (0.5, 0.6)], 0.8, 500.0, 1))
     scene = load_scene(path)
     assert (scene.frames, len(scene.touches)) == (400, 2)
 
 
-def test_the_page_has_the_places(tmp_path: Path) -> None:
+def test_the_page_has_the_places(tmp_path):
     counts = [{"url": name, "sent": 9, "dropped": 0, "failed": 0} for name in outputs.SINKS]
     load = outputs.Load(600.0, 28800, counts, 120.0, 120.5, 0.15)
     times = dict.fromkeys([*PARTS, "contact to tuio"], (1.0, 2.0))
@@ -32,7 +32,7 @@ def test_the_page_has_the_places(tmp_path: Path) -> None:
     assert "23 of 24 contacts" in outputs.as_text(result)
 
 
-def test_a_tap_through_everything() -> None:
+def test_a_tap_through_everything():
     result = outputs.run(taps=1, seconds=0.5, load_s=1.0, seed=2)
     assert list(result.parts_ms) == [*PARTS, "contact to tuio"]
     assert (result.taps, result.sunk) == (1, 24) and result.load is not None

@@ -6,7 +6,7 @@ from eitskin.scene.registry import BUILT_IN
 from eitskin_studies.benchmarks import scenes as bench_scenes
 
 
-def test_the_effects_table_has_none_each_and_all() -> None:
+def test_the_effects_table_has_none_each_and_all():
     result = bench_scenes.effects_table(frames=3, rounds=1)
     cases = result["cases"]
     assert list(cases) == ["none", *BUILT_IN, "all"]
@@ -16,7 +16,7 @@ def test_the_effects_table_has_none_each_and_all() -> None:
     assert "gel_drying" in bench_scenes.effects_text(result) and json.dumps(result)
 
 
-def test_the_scenes_table_has_both_ways_and_what_bounds_a_dataset() -> None:
+def test_the_scenes_table_has_both_ways_and_what_bounds_a_dataset():
     result = bench_scenes.scenes_table(frames=6, scenes=4, elements=600, rounds=1)
     ways = result["moving"]["ways"]
     assert (ways["update"]["factorisations"], ways["factorise"]["factorisations"]) == (1, 6)

@@ -19,7 +19,7 @@ def problems() -> Problems:
     return make_problems("rank 64", model, blob, session(scenes=2))
 
 
-def test_suboptimality_is_judged_in_float64(problems: Problems) -> None:
+def test_suboptimality_is_judged_in_float64(problems):
     zero = np.zeros(problems.s.shape[1])
     assert problems.objective(0, zero) == pytest.approx(
         0.5 * problems.y[0] @ problems.y[0], rel=1e-14
@@ -30,9 +30,7 @@ def test_suboptimality_is_judged_in_float64(problems: Problems) -> None:
     ).all()  # where no sign differs, equal but for rounding
 
 
-def test_all_that_is_installed_reaches_its_level(
-    problems: Problems, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_all_that_is_installed_reaches_its_level(problems, monkeypatch):
     monkeypatch.setattr(bench_solve, "LEVELS", (1e-2,))
     seen = set()
     for candidate in bench_solve_peers.candidates(problems):
@@ -48,7 +46,7 @@ def test_all_that_is_installed_reaches_its_level(
         ), name
 
 
-def test_what_is_absent_is_named() -> None:
+def test_what_is_absent_is_named():
     result = {
         "machine": "m",
         "versions": {"numpy": "2", "celer": None},

@@ -36,7 +36,7 @@ def info(**changes: object) -> BoardInfo:
         "faults": 0, "volts_per_code_nv": 805664, "drive": 1, "settings": 0,
         "source_ua_rms": 350, "current_ua_rms": 0, "current_limit_ua_rms": 437,
     }  # fmt: skip
-    return BoardInfo(**(values | changes))  # type: ignore[arg-type]
+    return BoardInfo(**(values | changes))
 
 
 def raw_frames(open_electrode: int | None = None) -> list[RawFrame]:
@@ -48,7 +48,7 @@ def raw_frames(open_electrode: int | None = None) -> list[RawFrame]:
     return [RawFrame(k, 20_800 * k, 20_780, 0, v, quality) for k, v in enumerate(volts)]
 
 
-def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board() -> None:
+def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board():
     fault = Fault(FaultCode.ELECTRODE_OPEN, True, 3, 5, 0)
     run = RawRun([], raw_frames(open_electrode=5), [fault, replace(fault, raised=False)], missing=2)
     board = info(faults=1 << FaultCode.ELECTRODE_OPEN | 1 << FaultCode.WATCHDOG)
@@ -67,7 +67,7 @@ def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board() -> Non
     assert not any("import" in text for text in report.lines())
 
 
-def test_protocols_that_need_no_model() -> None:
+def test_protocols_that_need_no_model():
     for protocol in (adjacent(16), opposite(16), skip(16, 3), adjacent(8), skip(11, 2)):
         board = info(model_crc=1, protocol_hash=protocol.hash, n_electrodes=protocol.n_electrodes)
         assert scanned_protocol(board, None, "x").hash == protocol.hash
@@ -77,7 +77,7 @@ def test_protocols_that_need_no_model() -> None:
     assert found == prebuilt()[0].protocol.hash
 
 
-def test_the_prebuilt_model_is_known_by_its_checksum() -> None:
+def test_the_prebuilt_model_is_known_by_its_checksum():
     known = find_model(info(), None, "x")
     assert known is not None and known.blob == prebuilt()[1]
     assert (
@@ -94,7 +94,7 @@ def test_the_prebuilt_model_is_known_by_its_checksum() -> None:
         need_model(info(model_bytes=0), None, "x", "a picture")
 
 
-def test_only_frames_that_are_whole_become_a_frames_file() -> None:
+def test_only_frames_that_are_whole_become_a_frames_file():
     whole, cut = raw_frames(), raw_frames(open_electrode=5)
     known = KnownModel(*prebuilt())
 
@@ -115,7 +115,7 @@ def test_only_frames_that_are_whole_become_a_frames_file() -> None:
         made([], whole)
 
 
-def test_of_two_tares_the_last_counts() -> None:
+def test_of_two_tares_the_last_counts():
     from eitskin.device.live import LiveFrame
 
     def live(raw: RawFrame, quiet: bool) -> LiveFrame:
@@ -128,7 +128,7 @@ def test_of_two_tares_the_last_counts() -> None:
     assert run.left_out == 4
 
 
-def test_what_a_line_carries() -> None:
+def test_what_a_line_carries():
     everything = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
     assert (
         least_every(info(), Stream.TOUCHES, 1_000_000)

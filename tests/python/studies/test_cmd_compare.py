@@ -2,11 +2,10 @@
 
 import argparse
 import json
-from pathlib import Path
 
 import pytest
 
-from eitskin.errors import ConfigError, EitskinError, FileError, UsageError
+from eitskin.errors import ConfigError, FileError, UsageError
 from eitskin_studies.cli import cmd_compare
 
 FEW = ["--scenes", "3", "--train", "2", "--seed", "4"]
@@ -19,7 +18,7 @@ def run(*arguments: str) -> int:
     return int(options.run(options))
 
 
-def test_table_files_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_table_files_and_pictures(tmp_path, capsys):
     files = [tmp_path / name for name in ("scenes.png", "curves.png", "numbers.csv")]
     drawn = ["--picture", str(files[0]), "--curves", str(files[1]), "--csv", str(files[2])]
     status = run(*FEW, *drawn, "--snr-db", "50", "--lookup", "nearest")
@@ -32,7 +31,7 @@ def test_table_files_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert files[0].read_bytes()[1:4] == files[1].read_bytes()[1:4] == b"PNG"
 
 
-def test_json_has_every_method_and_only_json(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_has_every_method_and_only_json(capsys):
     assert run(*FEW, "--json", "--lookup", "bilinear") == 0
     values = json.loads(capsys.readouterr().out)
     assert values["settings"]["lookup"] == "bilinear"
@@ -52,16 +51,14 @@ def test_json_has_every_method_and_only_json(capsys: pytest.CaptureFixture[str])
         (["--skin", "nowhere.toml"], FileError, "nowhere.toml"),
     ],
 )
-def test_bad_arguments_are_refused_before_the_work(
-    arguments: list[str], error: type[EitskinError], text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_arguments_are_refused_before_the_work(arguments, error, text, capsys):
     with pytest.raises(error, match=text) as caught:
         run(*arguments)
     assert "\n" not in str(caught.value)
     assert capsys.readouterr().out == ""
 
 
-def test_own_skin(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_own_skin(tmp_path, capsys):
     skin = tmp_path / "skin.toml"
     skin.write_text(
         '[skin]\nname = "square"\npolygon_mm = [[0, 0], [150, 0], [150, 150], [0, 150]]\n'

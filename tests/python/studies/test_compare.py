@@ -40,7 +40,7 @@ def comparison() -> Comparison:
     return compare(SKIN, PROTOCOL, SMALL, families=quick)
 
 
-def test_results_are_what_their_parts_give(comparison: Comparison) -> None:
+def test_results_are_what_their_parts_give(comparison):
     """Thresholds, parameter and MIoU of the second method, worked out again from frames and
     truth."""
     setup, result = comparison.setup, comparison.results[1]
@@ -67,7 +67,7 @@ def test_results_are_what_their_parts_give(comparison: Comparison) -> None:
     assert result.miou_summary.mean > comparison.results[0].miou_summary.mean
 
 
-def test_both_methods_saw_the_same_scenes(comparison: Comparison) -> None:
+def test_both_methods_saw_the_same_scenes(comparison):
     assert comparison.test.touches == random_touches(SKIN.outline, 3, 8, "test")
     assert comparison.train.touches == random_touches(SKIN.outline, 3, 6, "train")
     assert all(len(r.miou) == len(r.matchings) == len(r.found_mm) == 8 for r in comparison.results)
@@ -75,7 +75,7 @@ def test_both_methods_saw_the_same_scenes(comparison: Comparison) -> None:
     assert 0.83 < comparison.ceiling < 0.9
 
 
-def test_counts_add_up(comparison: Comparison) -> None:
+def test_counts_add_up(comparison):
     touches = sum(len(scene.touches) for scene in comparison.test.touches.scenes)
     for result in comparison.results:
         assert sum(m.hits + m.misses for m in result.matchings) == touches
@@ -89,14 +89,14 @@ def test_counts_add_up(comparison: Comparison) -> None:
         assert result.position_summary.count == sum(m.hits for m in result.matchings)
 
 
-def test_the_same_arguments_give_the_same_numbers(comparison: Comparison) -> None:
+def test_the_same_arguments_give_the_same_numbers(comparison):
     again = compare(SKIN, PROTOCOL, SMALL, families=quick)
     assert to_json(again) == to_json(comparison)
     assert to_csv(again) == to_csv(comparison)
     assert to_text(again) == to_text(comparison)
 
 
-def test_training_does_not_see_the_test_set(comparison: Comparison) -> None:
+def test_training_does_not_see_the_test_set(comparison):
     fewer = compare(SKIN, PROTOCOL, replace(SMALL, scenes=3), families=quick)
     for short, full in zip(fewer.results, comparison.results, strict=True):
         assert (short.value, short.threshold) == (full.value, full.threshold)
@@ -104,7 +104,7 @@ def test_training_does_not_see_the_test_set(comparison: Comparison) -> None:
         assert short.miou == pytest.approx(full.miou[:3])
 
 
-def test_bilinear_lookup_changes_the_numbers_and_says_so(comparison: Comparison) -> None:
+def test_bilinear_lookup_changes_the_numbers_and_says_so(comparison):
     other = compare(SKIN, PROTOCOL, replace(SMALL, lookup="bilinear"), families=quick)
     assert other.ceiling > 0.94
     assert "bilinear" in dict(header(other))["MIoU"]
@@ -135,7 +135,7 @@ class Oracle:
         ]
 
 
-def test_a_method_may_learn_and_may_find_touches_itself() -> None:
+def test_a_method_may_learn_and_may_find_touches_itself():
     made: list[Oracle] = []
 
     def families(setup: Setup) -> tuple[Family, ...]:
@@ -155,7 +155,7 @@ def test_a_method_may_learn_and_may_find_touches_itself() -> None:
     assert "own touches" in dict(header(outcome))["positions"]
 
 
-def test_baselines_do_not_have_those_abilities() -> None:
+def test_baselines_do_not_have_those_abilities():
     grid = grid_for(SKIN.outline, 6)
     jacobian = np.random.default_rng(0).normal(size=(10, grid.n_pixels))
     families = baseline_methods(jacobian, grid)
@@ -175,7 +175,7 @@ def test_baselines_do_not_have_those_abilities() -> None:
     assert all(method.reconstruct(np.ones((2, 10))).shape == (2, grid.n_pixels) for method in made)
 
 
-def test_text_names_every_condition(comparison: Comparison) -> None:
+def test_text_names_every_condition(comparison):
     text = to_text(comparison)
     for part in (
         "test-s3-n8 (seed 3)", "train-s3-n6 (seed 3)", "60 dB", "20 log10(rms(V0) / sigma)",
@@ -191,7 +191,7 @@ def test_text_names_every_condition(comparison: Comparison) -> None:
     assert f"{comparison.results[1].miou_summary.mean:.3f}" in lines[-1]
 
 
-def test_json_is_json_and_csv_is_csv(comparison: Comparison) -> None:
+def test_json_is_json_and_csv_is_csv(comparison):
     values = json.loads(json.dumps(to_json(comparison), allow_nan=False))
     assert values["settings"]["seed"] == 3 and values["pixels"] == 812
     assert len(values["methods"][0]["miou_over_threshold"]) == len(values["thresholds"]) == 49
@@ -203,7 +203,7 @@ def test_json_is_json_and_csv_is_csv(comparison: Comparison) -> None:
     assert noser == pytest.approx(comparison.results[1].miou, abs=1e-6)
 
 
-def test_noise_free_frames_do_no_worse(comparison: Comparison) -> None:
+def test_noise_free_frames_do_no_worse(comparison):
     clean = compare(
         SKIN,
         PROTOCOL,
@@ -214,7 +214,7 @@ def test_noise_free_frames_do_no_worse(comparison: Comparison) -> None:
     assert "no noise" in dict(header(clean))["SNR"]
 
 
-def test_progress_is_told_all_work() -> None:
+def test_progress_is_told_all_work():
     told: list[tuple[str, int]] = []
 
     def watch(items: Sequence[object], what: str) -> Sequence[object]:
@@ -227,7 +227,7 @@ def test_progress_is_told_all_work() -> None:
     assert told == [("simulating (train)", 1), ("simulating (test)", 2), ("reconstructing", 2)]
 
 
-def test_impossible_settings_are_refused() -> None:
+def test_impossible_settings_are_refused():
     with pytest.raises(UsageError, match="at least 1 scene"):
         CompareSettings(scenes=0)
     with pytest.raises(UsageError, match="nearest, bilinear"):

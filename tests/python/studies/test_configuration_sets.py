@@ -1,7 +1,6 @@
 """Configurations: what a set may say, and what the built-in one holds."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,7 @@ from eitskin_studies.tradeoff.configuration_sets import load_set
 from eitskin_studies.tradeoff.default_set import KNOBS, SCALE, default_set
 
 
-def test_the_built_in_set_turns_every_knob_and_every_solver() -> None:
+def test_the_built_in_set_turns_every_knob_and_every_solver():
     configurations = default_set()
     assert len({one.name for one in configurations}) == len(configurations)
     assert {one.solver for one in configurations} == set(SOLVERS)
@@ -27,7 +26,7 @@ def test_the_built_in_set_turns_every_knob_and_every_solver() -> None:
     assert all(configuration_from(one.as_dict(), "set") == one for one in configurations)
 
 
-def test_own_sets_share_defaults(tmp_path: Path) -> None:
+def test_own_sets_share_defaults(tmp_path):
     path = tmp_path / "set.toml"
     path.write_text(
         '[defaults]\nrank = 32\nstorage = "i8"\n[[configuration]]\nname = "a"\n'
@@ -56,7 +55,7 @@ def test_own_sets_share_defaults(tmp_path: Path) -> None:
         ("defaults = 3", "tables"),
     ],
 )
-def test_bad_sets_are_refused_in_a_line(tmp_path: Path, text: str, said: str) -> None:
+def test_bad_sets_are_refused_in_a_line(tmp_path, text, said):
     path = tmp_path / "set.toml"
     path.write_text(text)
     with pytest.raises(ConfigError, match=said) as caught:

@@ -32,7 +32,7 @@ def session() -> Simulated:
     return simulate(SKIN, PROTOCOL, touches, mesh=mesh_for_elements(SKIN, 3000))
 
 
-def test_every_form_shows_and_finds_single_touches(setup: Setup, session: Simulated) -> None:
+def test_every_form_shows_and_finds_single_touches(setup, session):
     dv = session.differences_v()
     for family in core_methods(setup):
         method = family.make(family.values[0])
@@ -46,7 +46,7 @@ def test_every_form_shows_and_finds_single_touches(setup: Setup, session: Simula
             assert len(xy) == 1 and np.hypot(*(xy[0] - place)) < 2.0, method.name
 
 
-def test_frames_of_a_set_do_not_depend_on_their_order(setup: Setup, session: Simulated) -> None:
+def test_frames_of_a_set_do_not_depend_on_their_order(setup, session):
     method = core_methods(setup)[0].make(0.0)
     assert isinstance(method, Learns)
     method.learn(session.quiet_v)
@@ -54,12 +54,12 @@ def test_frames_of_a_set_do_not_depend_on_their_order(setup: Setup, session: Sim
     assert (method.reconstruct(dv[::-1].copy())[::-1] == method.reconstruct(dv)).all()
 
 
-def test_it_must_learn_first(setup: Setup) -> None:
+def test_it_must_learn_first(setup):
     with pytest.raises(UsageError, match="quiet frames"):
         core_methods(setup)[0].make(0.0).reconstruct(np.zeros((1, 208)))
 
 
-def test_it_is_among_the_methods_that_are_compared(setup: Setup) -> None:
+def test_it_is_among_the_methods_that_are_compared(setup):
     names = [family.make(family.values[0]).name for family in methods(setup)]
     assert len(set(names)) == len(names)
     assert any(name.startswith("eitskin 30, image") for name in names) and "NOSER" in names

@@ -1,7 +1,5 @@
 """A picture for every effect, and what is refused."""
 
-from pathlib import Path
-
 import pytest
 
 from eitskin.errors import UsageError
@@ -13,12 +11,12 @@ from eitskin_studies.pictures.touch_pictures import draw_touch
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def test_every_effect_has_a_picture() -> None:
+def test_every_effect_has_a_picture():
     assert set(SHOWN) == set(SKETCHES) == set(BUILT_IN)
 
 
 @pytest.mark.parametrize("name", ["background", "phase", "bridged"])
-def test_pictures_are_drawn_small_and_the_same_again(name: str, tmp_path: Path) -> None:
+def test_pictures_are_drawn_small_and_the_same_again(name, tmp_path):
     for run in ("first", "second"):
         draw_effect(tmp_path / run, name)
     first = (tmp_path / "first").read_bytes()
@@ -26,13 +24,13 @@ def test_pictures_are_drawn_small_and_the_same_again(name: str, tmp_path: Path) 
     assert first.startswith(PNG) and 2_000 < len(first) < 60_000
 
 
-def test_an_unknown_effect_is_refused(tmp_path: Path) -> None:
+def test_an_unknown_effect_is_refused(tmp_path):
     with pytest.raises(UsageError, match="no picture of an effect 'noice'; did you mean 'noise'"):
         draw_effect(tmp_path / "x.png", "noice")
     assert not (tmp_path / "x.png").exists()
 
 
-def test_a_touchs_law_and_shape_are_drawn(tmp_path: Path) -> None:
+def test_a_touchs_law_and_shape_are_drawn(tmp_path):
     for name in ("insulating", "finger"):
         draw_touch(tmp_path / name, name)
         assert (tmp_path / name).read_bytes().startswith(PNG)

@@ -56,7 +56,7 @@ def few() -> tuple[Candidate, ...]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("algorithms")
 
 
@@ -68,12 +68,12 @@ def small(folder: Path, monkeypatch: pytest.MonkeyPatch, share: float = 0.03) ->
 
 
 @pytest.fixture(scope="module")
-def outcome(folder: Path) -> ExperimentOutcome:
+def outcome(folder) -> ExperimentOutcome:
     with pytest.MonkeyPatch.context() as patch:
         return algorithms.run(small(folder, patch))
 
 
-def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome: ExperimentOutcome) -> None:
+def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome):
     """A fixed t of 0.1 puts them near the paper's 0.4 to 0.5, their own t does not; converged FISTA
     does not mind."""
     by_name = {one["name"]: one for one in outcome.data["methods"]}
@@ -94,7 +94,7 @@ def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome: ExperimentOu
     )
 
 
-def test_tables_agree_with_the_data(outcome: ExperimentOutcome) -> None:
+def test_tables_agree_with_the_data(outcome):
     tables = {table.name: table for table in outcome.tables}
     assert set(tables) == {"fixed", "best", "counts", "thresholds", "why"}
     for row, one in zip(tables["fixed"].rows, outcome.data["methods"], strict=True):
@@ -108,15 +108,11 @@ def test_tables_agree_with_the_data(outcome: ExperimentOutcome) -> None:
     assert "seed 100002" in outcome.words["conditions"]
 
 
-def test_what_is_kept_is_not_computed_again(
-    folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_kept_is_not_computed_again(folder, outcome, monkeypatch):
     goes_on(lambda: algorithms.run(small(folder, monkeypatch)), outcome)
 
 
-def test_a_cut_run_goes_on_and_gives_the_same(
-    folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cut_run_goes_on_and_gives_the_same(folder, outcome, monkeypatch):
     """The last third of the results gone, with a torn line: only what is missing is reconstructed
     again."""
     lines = (folder / "results.jsonl").read_bytes().splitlines(keepends=True)
@@ -132,7 +128,7 @@ def test_a_cut_run_goes_on_and_gives_the_same(
     assert len(made) == len(lines) - cut
 
 
-def test_sets_are_apart_and_of_their_numbers() -> None:
+def test_sets_are_apart_and_of_their_numbers():
     outline = paper_skin().outline
     for number, name in NUMBERS.items():
         drawn = touch_set(outline, number, 5, 7)
@@ -148,7 +144,7 @@ def test_sets_are_apart_and_of_their_numbers() -> None:
         assert (apart[~np.eye(len(places), dtype=bool)] >= 12).all()
 
 
-def test_tuning_and_test_scenes_have_seeds_of_their_own(tmp_path: Path) -> None:
+def test_tuning_and_test_scenes_have_seeds_of_their_own(tmp_path):
     field = Field(
         workspace_in(tmp_path, ExperimentSettings(seed=4), plain),
         paper_skin(),
@@ -159,16 +155,16 @@ def test_tuning_and_test_scenes_have_seeds_of_their_own(tmp_path: Path) -> None:
     assert field.seed_and_count(TUNING) == (100_004, 20) and field.seed_and_count("test") == (4, 60)
 
 
-def test_every_method_says_what_it_costs(outcome: ExperimentOutcome) -> None:
+def test_every_method_says_what_it_costs(outcome):
     kmacs = {one["name"]: one["kmac"] for one in outcome.data["methods"]}
     pixels_by_rows = 812 * 208 / 1e3
     assert kmacs["NOSER"] == kmacs["GREIT-like"] == pytest.approx(pixels_by_rows)
     assert kmacs["plain FISTA 300, non-negative"] == pytest.approx(601 * pixels_by_rows)
     assert 50 < kmacs["eitskin 60, image"] < 5000
-    assert np.isnan(macs_of(object(), np.zeros((2, 208)))).all()  # type: ignore[arg-type]
+    assert np.isnan(macs_of(object(), np.zeros((2, 208)))).all()
 
 
-def test_candidates() -> None:
+def test_candidates():
     all_of_them = candidates()
     assert len({one.name for one in all_of_them}) == len(all_of_them) == 13
     assert all(one.fixed in one.values for one in all_of_them)
@@ -176,12 +172,12 @@ def test_candidates() -> None:
     assert sorted(next(e for e in all_of_them if e.name == "NOSER").values)[4] == FIXED_STRENGTH
 
 
-def test_it_fills_its_page(outcome: ExperimentOutcome, tmp_path: Path) -> None:
+def test_it_fills_its_page(outcome, tmp_path):
     assert set(outcome.pictures) == {"images.png", "masks.png", "curves.png", "bars.png"}
     assert "whatever their parameter" in fills_its_page(outcome, "algorithms", tmp_path)
 
 
-def test_what_it_refuses(tmp_path: Path) -> None:
+def test_what_it_refuses(tmp_path):
     with pytest.raises(UsageError, match="at least 1 scene"):
         touch_set(paper_skin().outline, 2, 1, 0)
     assert metrics.THRESHOLDS.index(FIXED_THRESHOLD) == 4

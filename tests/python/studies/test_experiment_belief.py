@@ -1,7 +1,6 @@
 """The study of belief: confidence, places and counts of every set, and numbers by hand."""
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -27,7 +26,7 @@ FRAMES: list[dict[str, Any]] = [
 ]
 
 
-def test_numbers_by_hand() -> None:
+def test_numbers_by_hand():
     covered, counted = coverage(FRAMES), counts(FRAMES)
     assert (covered.hits, covered.count) == (1, 2)
     told = [(b.said, b.true.hits, b.true.count) for b in curve({"a": FRAMES})]
@@ -36,7 +35,7 @@ def test_numbers_by_hand() -> None:
     assert [(one.hits, one.count) for one in found] == [(2, 4), (1, 2), (1, 2), (3, 4)]
 
 
-def test_every_set_is_seen_and_a_finished_run_fills_its_page(tmp_path: Path) -> None:
+def test_every_set_is_seen_and_a_finished_run_fills_its_page(tmp_path):
     assert load("belief") is belief
 
     def run() -> ExperimentOutcome:

@@ -1,17 +1,12 @@
 """The study of stretched and bent skins: a fresh tare helps, and its page is filled."""
 
-from pathlib import Path
-
-import pytest
 from study_pages import fills_its_page
 
 from eitskin_studies.experiments import deformation
 from eitskin_studies.experiments.experiment import ExperimentSettings, plain, workspace_in
 
 
-def test_it_fills_its_page_and_a_stretch_costs_touches(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_fills_its_page_and_a_stretch_costs_touches(tmp_path, monkeypatch):
     monkeypatch.setattr(deformation, "SIMULATED_ELEMENTS", 2000)
     monkeypatch.setattr(deformation, "UNTOUCHED", 5)
     outcome = deformation.run(workspace_in(tmp_path, ExperimentSettings(share=0.04), plain))

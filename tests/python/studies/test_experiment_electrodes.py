@@ -1,7 +1,6 @@
 """The experiment on electrodes and patterns: every pattern out of one solve, what time allows,
 settings chosen elsewhere."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from eitskin_studies.experiments.electrodes import measuring, patterns, tables, 
 
 
 @pytest.mark.parametrize("pattern", list(patterns.PATTERNS))
-def test_every_pattern_comes_out_of_the_transfer_matrix(pattern: str) -> None:
+def test_every_pattern_comes_out_of_the_transfer_matrix(pattern):
     skin = Skin("disk", disk(194.0), Electrodes(16))
     mesh = mesh_for_elements(skin, 800)
     sigma = np.random.default_rng(3).uniform(0.005, 0.05, mesh.n_elements)
@@ -34,7 +33,7 @@ def test_every_pattern_comes_out_of_the_transfer_matrix(pattern: str) -> None:
     np.testing.assert_allclose(stacked, [direct, 2 * direct], rtol=1e-9, atol=1e-12)
 
 
-def test_what_fits_into_a_frame() -> None:
+def test_what_fits_into_a_frame():
     assert patterns.samples_within(208) == 80 and patterns.scan_ms(208, 80) == pytest.approx(20.8)
     assert patterns.samples_within(928) == 0
     scans = {count: patterns.within_time(adjacent(count)) for count in (16, 32, 64)}
@@ -44,7 +43,7 @@ def test_what_fits_into_a_frame() -> None:
     assert patterns.scan_ms(adjacent(64).n_rows, 80) == pytest.approx(390.4)
 
 
-def test_unique_rows_hold_each_voltage_once() -> None:
+def test_unique_rows_hold_each_voltage_once():
     scan = patterns.unique_rows(skip(16, 2))
     assert scan.n_rows == 104 and (scan.reciprocal_pairs().second == -1).all()
     thinned = patterns.unique_rows(adjacent(16), 4)
@@ -56,7 +55,7 @@ def test_unique_rows_hold_each_voltage_once() -> None:
     }
 
 
-def test_another_regularisation_is_the_model_built_with_it() -> None:
+def test_another_regularisation_is_the_model_built_with_it():
     skin = Skin("disk", disk(194.0), Electrodes(16))
     linear = linearise(skin, adjacent(16), pixels_across=12, elements=800)
     usual = make_model(skin, adjacent(16), linear, BuildSettings(rank=40))
@@ -94,7 +93,7 @@ def _few(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(tuning, name, values)
 
 
-def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_run_and_one_that_goes_on(monkeypatch, tmp_path):
     _few(monkeypatch)
     first = electrodes.run(coarse(tmp_path, 0.03, 2000))
     by_name = {table.name: table for table in first.tables}
@@ -117,9 +116,7 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     fills_its_page(first, "electrodes", tmp_path)
 
 
-def test_scenes_are_solved_once_for_every_pattern(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_scenes_are_solved_once_for_every_pattern(monkeypatch, tmp_path):
     _few(monkeypatch)
     solved = []
     whole = ForwardModel.voltages
@@ -136,7 +133,7 @@ def test_scenes_are_solved_once_for_every_pattern(
     assert len(solved) == sum(len(drawn.scenes) for drawn in shop.sets.values()) + parts
 
 
-def test_the_least_distance_that_is_told_apart() -> None:
+def test_the_least_distance_that_is_told_apart():
     def exact(*shares: float) -> dict[str, Any]:
         pairs = zip(measuring.PAIR_MM, shares, strict=True)
         return {

@@ -1,8 +1,5 @@
 """The study of the fast path: it fills its page."""
 
-from pathlib import Path
-
-import pytest
 from study_pages import fills_its_page
 
 from eitskin_studies.experiments import fast_path
@@ -10,7 +7,7 @@ from eitskin_studies.experiments.experiment import ExperimentSettings, plain, wo
 from eitskin_studies.experiments.fast_path import beyond
 
 
-def test_it_fills_its_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_fills_its_page(tmp_path, monkeypatch):
     chosen = ("press, rise 30 ms", "swipe at 600 mm/s", "two fingers at once, rise 0 ms")
     rows = [row for row in fast_path.rows() if row.name in chosen]
     monkeypatch.setattr(fast_path, "ELEMENTS", 3500)

@@ -24,18 +24,16 @@ from eitskin_studies.experiments.write import to_json
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome]:
+def done(tmp_path_factory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("force")
     return folder, force.run(coarse(folder, 0.01, 1500, seed=2))
 
 
-def test_a_run_that_goes_on_computes_nothing_again(done: tuple[Path, ExperimentOutcome]) -> None:
+def test_a_run_that_goes_on_computes_nothing_again(done):
     goes_on(lambda: force.run(coarse(done[0], 0.01, 1500, seed=2)), done[1], solves=True)
 
 
-def test_every_table_has_its_place_on_the_page(
-    done: tuple[Path, ExperimentOutcome], tmp_path: Path
-) -> None:
+def test_every_table_has_its_place_on_the_page(done, tmp_path):
     outcome = done[1]
     assert [table.name for table in outcome.tables] == [
         "slopes",
@@ -53,18 +51,18 @@ def test_every_table_has_its_place_on_the_page(
 
 
 def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(
-    done: tuple[Path, ExperimentOutcome],
-) -> None:
+    done,
+):
     slopes = {name: one["a_gram"] for name, one in json.loads(to_json(done[1]))["slopes"].items()}
     assert slopes[PEAK][0] < 0.3 * slopes[PEAK][-1]
     assert slopes[PEAK][0] < slopes[PEAK][1] < slopes[PEAK][2] < slopes[PEAK][3]
     assert slopes[TOUCH][0] == pytest.approx(slopes[TOUCH][-1], rel=0.35)  # on a coarse mesh
 
 
-def test_calibrated_touches_read_one_load_alike(done: tuple[Path, ExperimentOutcome]) -> None:
+def test_calibrated_touches_read_one_load_alike(done):
     told = {
         (one["reading"], one["snr_db"]): anywhere.Anywhere.from_dict(one)
-        for one in done[1].data["anywhere"]  # type: ignore[union-attr]
+        for one in done[1].data["anywhere"]
     }
     assert set(told) == {(name, snr) for name in READOUTS for snr in force.SNRS_DB}
     touch, peak = told[TOUCH, 72.0], told[PEAK, 72.0]
@@ -72,7 +70,7 @@ def test_calibrated_touches_read_one_load_alike(done: tuple[Path, ExperimentOutc
     assert anywhere.scatter(touch.calibrated) < 0.1 < 0.2 < anywhere.scatter(peak.raw)
 
 
-def test_less_noise_shows_less_load(done: tuple[Path, ExperimentOutcome]) -> None:
+def test_less_noise_shows_less_load(done):
     found = [detection.Detection.from_dict(one) for one in done[1].data["detection"]]
     thresholds = np.array([[one.threshold(radius)[0] for radius in range(4)] for one in found])
     assert (thresholds[0] > thresholds[-1]).all() and (thresholds[-1] < 20).all()
@@ -83,8 +81,8 @@ def test_less_noise_shows_less_load(done: tuple[Path, ExperimentOutcome]) -> Non
 
 
 def test_under_the_sheet_the_peak_rises_outwards_and_means_see_less(
-    done: tuple[Path, ExperimentOutcome],
-) -> None:
+    done,
+):
     slopes, smallest, reach = done[1].tables[5:]
     rising = {row[0]: row[-2] for row in slopes.rows}
     assert rising[PEAK] == "yes" and len(smallest.rows) == 6
@@ -103,7 +101,7 @@ def test_under_the_sheet_the_peak_rises_outwards_and_means_see_less(
 # ---- pieces ----
 
 
-def test_the_sheet_presses_with_what_the_papers_gel_stands() -> None:
+def test_the_sheet_presses_with_what_the_papers_gel_stands():
     assert SHEET.pressure_kpa(200) == pytest.approx(5.16, abs=0.01)
     assert SHEET.pressure_kpa(scenes.SHEET_G[1]) < GEL_LIMIT_KPA < NOMINAL.pressure_kpa(50)
     same = 50 * NOMINAL.pressure_kpa(50) / SHEET.pressure_kpa(50)
@@ -111,7 +109,7 @@ def test_the_sheet_presses_with_what_the_papers_gel_stands() -> None:
     assert SHEET.radius_mm(50) == SHEET.radius_mm(200) and "1.3 to 5.2 kPa" in sheet.pressures()
 
 
-def test_the_law_is_what_the_page_says() -> None:
+def test_the_law_is_what_the_page_says():
     assert NOMINAL.radius_mm(50) == pytest.approx(4.8, abs=0.05)
     assert NOMINAL.radius_mm(200) == pytest.approx(7.6, abs=0.05)
     assert NOMINAL.contrast(50) == pytest.approx(1.9, abs=0.05)
@@ -121,13 +119,13 @@ def test_the_law_is_what_the_page_says() -> None:
     assert spread == pytest.approx(0.2, rel=0.1)
 
 
-def test_tuning_and_reported_places_differ() -> None:
+def test_tuning_and_reported_places_differ():
     tuned, reported = scenes.spiral(100_001, 24, 97.0), scenes.spiral(1, 36, 97.0)
     assert np.hypot(*reported.T).max() < 97 * scenes.OUTERMOST
     assert np.hypot(*(tuned[:, None] - reported[None]).transpose(2, 0, 1)).min() > 0.1
 
 
-def test_the_least_load_lies_between_two() -> None:
+def test_the_least_load_lies_between_two():
     loads = np.array([1.0, 4.0, 16.0])
     assert detection.least_load(loads, np.array([0.0, 0.8, 1.0])) == pytest.approx(8.0)
     assert detection.least_load(loads, np.array([0.95, 1.0, 1.0])) == 1.0
@@ -137,21 +135,21 @@ def test_the_least_load_lies_between_two() -> None:
     )  # once seen is not always seen
 
 
-def test_false_alarms_have_the_exact_bound() -> None:
+def test_false_alarms_have_the_exact_bound():
     one = detection.Detection(60.0, np.array([1.0]), np.ones((4, 1)), np.ones((4, 1)), 0, 299)
     assert one.false_share() == (0.0, pytest.approx(0.00997, abs=1e-5))  # 3 / n
     found = detection.Detection(60.0, one.loads_g, one.hits, one.tries, 5, 5).false_share()
     assert found == (1.0, 1.0)
 
 
-def test_readings_survive_the_store() -> None:
+def test_readings_survive_the_store():
     one = {"a": Readout(np.array([1.0, np.nan]), np.array([(1.0, 2.0), (np.nan, np.nan)]), 3.0)}
     again = from_lists(json.loads(json.dumps(as_lists(one))))
     np.testing.assert_array_equal(again["a"].value, one["a"].value)
     np.testing.assert_array_equal(again["a"].place_mm, one["a"].place_mm)
 
 
-def test_scatter_is_around_each_loads_own_mean() -> None:
+def test_scatter_is_around_each_loads_own_mean():
     errors = np.array([[0.1, -0.3], [0.1, -0.3], [0.1, -0.3]])
     assert anywhere.scatter(errors) == pytest.approx(0)
     assert anywhere.scatter(np.array([[0.01], [-0.01]])) == pytest.approx(0.01 * np.sqrt(2))

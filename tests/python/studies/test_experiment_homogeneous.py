@@ -38,12 +38,12 @@ def small(folder: Path, patch: pytest.MonkeyPatch, data: Path | None = None) -> 
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("homogeneous")
 
 
 @pytest.fixture(scope="module")
-def outcome(folder: Path) -> ExperimentOutcome:
+def outcome(folder) -> ExperimentOutcome:
     with pytest.MonkeyPatch.context() as patch:
         return homogeneous.run(small(folder, patch))
 
@@ -53,7 +53,7 @@ def spread(outcome: ExperimentOutcome, name: str, measure: str = "spread") -> fl
     return float(np.mean([one[measure] for one in case["uniformity_percent"]]))
 
 
-def test_an_even_disk_is_a_u_for_each_drive() -> None:
+def test_an_even_disk_is_a_u_for_each_drive():
     folded = fold_for(PROTOCOL).of(EVEN_V)
     assert folded.shape == (16, 13)
     assert folded == pytest.approx(np.tile(folded[0], (16, 1)), rel=1e-9)
@@ -64,7 +64,7 @@ def test_an_even_disk_is_a_u_for_each_drive() -> None:
     )
 
 
-def test_the_fold_does_not_mind_order_and_polarity() -> None:
+def test_the_fold_does_not_mind_order_and_polarity():
     generator = np.random.default_rng(2)
     order, turned = generator.permutation(208), ROWS.copy()
     turned[::3] = turned[::3][:, [0, 1, 3, 2]]
@@ -80,7 +80,7 @@ def test_the_fold_does_not_mind_order_and_polarity() -> None:
     assert vars(one) == pytest.approx(vars(same))
 
 
-def test_measures_see_what_they_are_for() -> None:
+def test_measures_see_what_they_are_for():
     fold = fold_for(PROTOCOL)
     one = EVEN_V.copy()
     one[fold.row[5, 6]] *= 1.16
@@ -111,12 +111,12 @@ def test_measures_see_what_they_are_for() -> None:
         (Protocol(16, ROWS[[0, *range(207)]].astype(np.uint8)), "208 rows are not one for each"),
     ],
 )
-def test_scans_that_cannot_be_folded(protocol: Protocol, match: str) -> None:
+def test_scans_that_cannot_be_folded(protocol, match):
     with pytest.raises(FrameError, match=match):
         fold_for(protocol)
 
 
-def test_each_effect_moves_what_physics_says(outcome: ExperimentOutcome) -> None:
+def test_each_effect_moves_what_physics_says(outcome):
     usual = spread(outcome, INSTRUMENT)
     assert usual < 1.0
     half, one, two = (
@@ -137,7 +137,7 @@ def test_each_effect_moves_what_physics_says(outcome: ExperimentOutcome) -> None
     assert spread(outcome, "contacts ±95 %") < 1.5
 
 
-def test_the_doctor_names_what_is_broken(outcome: ExperimentOutcome) -> None:
+def test_the_doctor_names_what_is_broken(outcome):
     found = {one["name"]: one["findings"] for one in outcome.data["cases"]}
     for name, diagnostic in (
         ("an electrode off", "dead-electrode"),
@@ -148,15 +148,11 @@ def test_the_doctor_names_what_is_broken(outcome: ExperimentOutcome) -> None:
     assert found[INSTRUMENT] == [[], []] and found[IDEAL] == [[]]
 
 
-def test_what_is_kept_is_not_computed_again(
-    folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_kept_is_not_computed_again(folder, outcome, monkeypatch):
     goes_on(lambda: homogeneous.run(small(folder, monkeypatch)), outcome)
 
 
-def test_only_what_is_missing_is_computed(
-    folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_what_is_missing_is_computed(folder, outcome, monkeypatch):
     lines = (folder / "results.jsonl").read_bytes().splitlines(keepends=True)
     (folder / "results.jsonl").write_bytes(b"".join(lines[:-2]) + lines[-2][:99])
     made: list[str] = []
@@ -168,12 +164,12 @@ def test_only_what_is_missing_is_computed(
     assert made == [CASES[-1].name] * 2
 
 
-def test_without_a_tank_the_page_says_so(outcome: ExperimentOutcome) -> None:
+def test_without_a_tank_the_page_says_so(outcome):
     assert "left out" in outcome.words["measured"] and FILE in outcome.words["measured"]
     assert all(one["name"] != homogeneous.MEASURED_TANK for one in outcome.data["cases"])
 
 
-def test_a_file_that_is_no_tank(tmp_path: Path) -> None:
+def test_a_file_that_is_no_tank(tmp_path):
     assert load_tank(None) is None and load_tank(tmp_path) is None
     (tmp_path / FILE).write_bytes(b"no archive")
     with pytest.raises(FileError, match="these are not the tank's frames"):
@@ -183,7 +179,7 @@ def test_a_file_that_is_no_tank(tmp_path: Path) -> None:
         load_tank(tmp_path)
 
 
-def test_the_measured_tank(shared_data: Path) -> None:
+def test_the_measured_tank(shared_data):
     tank = load_tank(shared_data)
     assert tank is not None
     reference = tank.frames.reference_voltage_v.mean(axis=0)
@@ -193,5 +189,5 @@ def test_the_measured_tank(shared_data: Path) -> None:
     )  # as docs/guide/tank.md says
 
 
-def test_pictures_and_page(outcome: ExperimentOutcome, tmp_path: Path) -> None:
+def test_pictures_and_page(outcome, tmp_path):
     fills_its_page(outcome, "homogeneous", tmp_path)

@@ -14,12 +14,12 @@ from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, R
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome]:
+def done(tmp_path_factory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("levers")
     return folder, levers.run(coarse(folder, 0.05))
 
 
-def test_every_lever_is_on_every_set(done: tuple[Path, ExperimentOutcome]) -> None:
+def test_every_lever_is_on_every_set(done):
     searches, images = done[1].data["searches"], done[1].data["images"]
     assert set(searches) == {one.name for one in SEARCHES}
     assert set(images) == {one.name for one in IMAGES}
@@ -30,7 +30,7 @@ def test_every_lever_is_on_every_set(done: tuple[Path, ExperimentOutcome]) -> No
     )
 
 
-def test_what_coupling_explains_and_refining_costs(done: tuple[Path, ExperimentOutcome]) -> None:
+def test_what_coupling_explains_and_refining_costs(done):
     searches, images = done[1].data["searches"], done[1].data["images"]
     eight = "8 at 4 radii, 80 dB"
     alone, whole = searches["peaks alone"][eight], searches["all (the default)"][eight]
@@ -42,14 +42,12 @@ def test_what_coupling_explains_and_refining_costs(done: tuple[Path, ExperimentO
             assert base["macs"] < images[one.name]["60"]["macs"] < 2.2 * base["macs"]
 
 
-def test_the_default_is_among_them() -> None:
+def test_the_default_is_among_them():
     assert {one.options["touch_fit"] for one in SEARCHES if one.name == "all (the default)"} == {
         ALL_TOUCH_FIT
     }
 
 
-def test_it_goes_on_and_fills_its_page(
-    done: tuple[Path, ExperimentOutcome], tmp_path: Path
-) -> None:
+def test_it_goes_on_and_fills_its_page(done, tmp_path):
     goes_on(lambda: levers.run(coarse(done[0], 0.05)), done[1])
     fills_its_page(done[1], "levers", tmp_path)

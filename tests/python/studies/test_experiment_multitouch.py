@@ -53,13 +53,13 @@ def _run(folder: Path, patch: pytest.MonkeyPatch) -> ExperimentOutcome:
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome]:
+def done(tmp_path_factory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("multitouch")
     with pytest.MonkeyPatch.context() as patch:
         return folder, _run(folder, patch)
 
 
-def test_outcome_has_every_cell(done: tuple[Path, ExperimentOutcome]) -> None:
+def test_outcome_has_every_cell(done):
     outcome = done[1]
     tables = {table.name: table for table in outcome.tables}
     assert [row[0] for row in tables["exact-ring"].rows] == [str(k) for k in range(2, 13)]
@@ -71,7 +71,7 @@ def test_outcome_has_every_cell(done: tuple[Path, ExperimentOutcome]) -> None:
     assert single["exact"]["mean"] == 1 and single["median_mm"]["value"] < 1.5
 
 
-def test_more_touches_are_harder(done: tuple[Path, ExperimentOutcome]) -> None:
+def test_more_touches_are_harder(done):
     exact: dict[int, list[float]] = {}
     for one in done[1].data["counts"]:
         if one["method"] == "default" and one["places"] == NARROW:
@@ -79,14 +79,12 @@ def test_more_touches_are_harder(done: tuple[Path, ExperimentOutcome]) -> None:
     assert np.mean([exact[k] for k in (2, 3)]) > np.mean([exact[k] for k in (11, 12)]) + 0.3
 
 
-def test_it_goes_on_and_fills_its_page(
-    done: tuple[Path, ExperimentOutcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_goes_on_and_fills_its_page(done, tmp_path, monkeypatch):
     goes_on(lambda: _run(done[0], monkeypatch), done[1])
     assert "| touches | default, 40 dB |" in fills_its_page(done[1], "multitouch", tmp_path)
 
 
-def test_ring_is_that_of_the_library() -> None:
+def test_ring_is_that_of_the_library():
     library = find_scene("ring7").touches
     scene = draw(Cell(RING, 7, 1), OUTLINE, 1, 1).scenes[0]
     assert {(t.radius_mm, t.contrast) for t in scene.touches} == {(8.0, 9.0)} and len(library) == 7
@@ -97,7 +95,7 @@ def test_ring_is_that_of_the_library() -> None:
 
 
 @pytest.mark.parametrize(("geometry", "least_mm"), [(WIDE, 36.0), (NARROW, 22.5)])
-def test_random_places_keep_their_distance(geometry: str, least_mm: float) -> None:
+def test_random_places_keep_their_distance(geometry, least_mm):
     for scene in draw(Cell(geometry, 12, 3), OUTLINE, 5, 3).scenes:
         centres = scene.centres_mm()
         apart = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))[
@@ -106,7 +104,7 @@ def test_random_places_keep_their_distance(geometry: str, least_mm: float) -> No
         assert apart.min() >= least_mm
 
 
-def test_mixed_scenes_depend_on_seed_and_number_only() -> None:
+def test_mixed_scenes_depend_on_seed_and_number_only():
     cell = mixed_cells()[1]
     many, few, other = (
         draw(cell, OUTLINE, seed, count) for seed, count in ((1, 26), (1, 5), (2, 5))
@@ -117,12 +115,12 @@ def test_mixed_scenes_depend_on_seed_and_number_only() -> None:
     assert cell.geometry == MIXED and len({t.radius_mm for t in many.scenes[23].touches}) == 12
 
 
-def test_too_many_are_refused() -> None:
+def test_too_many_are_refused():
     with pytest.raises(GeometryError, match="do not fit"):
         draw(Cell(WIDE, 40, 1), OUTLINE, 1, 1)
 
 
-def test_what_does_not_fit_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_does_not_fit_is_said(tmp_path, monkeypatch):
     from eitskin_studies.experiments.multitouch.tables import exact_table
     from eitskin_studies.experiments.multitouch.test_data import TouchData
 
@@ -136,19 +134,19 @@ def test_what_does_not_fit_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert all("do not fit" in row[1] for row in exact_table(twelve, WIDE, "x").rows)
 
 
-def test_targets_have_more_scenes() -> None:
+def test_targets_have_more_scenes():
     usual = {(cell.geometry, cell.touches): cell.usual for cell in counting_cells()}
     assert len(usual) == 33 and usual[WIDE, 8] >= 4 * usual[WIDE, 7]
 
 
-def test_wilson_interval() -> None:
+def test_wilson_interval():
     eight = share(8, 10)  # R: binom::binom.wilson(8, 10)
     assert eight.low == pytest.approx(0.4901625, abs=1e-6)
     assert eight.high == pytest.approx(0.9433178, abs=1e-6)
     assert share(0, 5).low == 0 and share(5, 5).high == 1 and math.isnan(share(0, 0).mean)
 
 
-def test_score_of_places() -> None:
+def test_score_of_places():
     truth = [np.array([[0.0, 0.0], [40.0, 0.0]]), np.array([[0.0, 0.0]])]
     found = [np.array([[1.0, 0.0], [40.0, 3.0]]), np.array([[30.0, 0.0]])]
     one = score(truth, found, [1000, 3000])
@@ -158,7 +156,7 @@ def test_score_of_places() -> None:
     assert math.isnan(quantile([], 0.5).value)
 
 
-def test_area_under_roc() -> None:
+def test_area_under_roc():
     assert auc([0.1, 0.4, 0.35, 0.8], [False, False, True, True]) == 0.75
     assert auc([1, 1, 1], [True, False, False]) == 0.5 and math.isnan(auc([1.0], [True]))
     false, true = roc([0.1, 0.4, 0.35, 0.8], [False, False, True, True])
@@ -173,7 +171,7 @@ def _seen(places: list[tuple[float, float]], explained: list[float]) -> SeenFram
     )
 
 
-def test_features_of_a_frame() -> None:
+def test_features_of_a_frame():
     two = _seen([(0.0, 0.0), (27.0, 0.0)], [0.5, 0.01])
     assert nearest(two) == pytest.approx(1.5)
     assert features(two, nearest(two), 9.0) == pytest.approx((2, 1.5, 1, 0.2, 10, 0.5))
@@ -193,7 +191,7 @@ def _frames(count: int, seed: int) -> list[ScoredFrame]:
     return made
 
 
-def test_rule_learns_what_matters() -> None:
+def test_rule_learns_what_matters():
     rule, test = fit_rule(_frames(1500, 1)), _frames(1500, 2)
     weights = np.abs(rule.weights)
     assert rule.weights[3] < 0 and weights.argmax() == 3
@@ -208,14 +206,14 @@ def test_rule_learns_what_matters() -> None:
     assert not rule.says([nothing])[0]
 
 
-def test_reliability_of_known_chances() -> None:
+def test_reliability_of_known_chances():
     exact = np.arange(1000) % 10 < 7
     shown = reliability(np.full(1000, 0.7), exact)
     assert shown.error == pytest.approx(0) and shown.brier == pytest.approx(0.21)
     assert shown.truth[7].mean == 0.7 and math.isnan(shown.chance[0])
 
 
-def test_nonlinear_fit_knows_its_slope() -> None:
+def test_nonlinear_fit_knows_its_slope():
     skin = paper_skin()
     fits = Truthful(skin, adjacent(skin.electrodes.count))
     at, contrasts = (

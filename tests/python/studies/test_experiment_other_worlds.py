@@ -32,12 +32,12 @@ def _run(folder: Path) -> ExperimentOutcome:
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome]:
+def done(tmp_path_factory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("worlds")
     return folder, _run(folder)
 
 
-def test_every_set_is_scored_and_the_worst_come_first(done: tuple[Path, ExperimentOutcome]) -> None:
+def test_every_set_is_scored_and_the_worst_come_first(done):
     assert load("other-worlds") is other_worlds
     outcome = done[1]
     assert [one["name"] for one in outcome.data["scores"]] == list(WORLDS)
@@ -50,16 +50,14 @@ def test_every_set_is_scored_and_the_worst_come_first(done: tuple[Path, Experime
     assert outcome.words["summary"].startswith(f"In {len(fails.rows)} of {len(WORLDS)} sets")
 
 
-def test_a_finished_run_is_read_again_and_fills_its_page(
-    done: tuple[Path, ExperimentOutcome], tmp_path: Path
-) -> None:
+def test_a_finished_run_is_read_again_and_fills_its_page(done, tmp_path):
     folder, outcome = done
     goes_on(lambda: _run(folder), outcome)
     page = fills_its_page(outcome, "other-worlds", tmp_path)
     assert page.index("## What fails") < page.index("## What holds")
 
 
-def test_an_ellipse_is_off_by_its_angle_and_aspect_from_the_true_one() -> None:
+def test_an_ellipse_is_off_by_its_angle_and_aspect_from_the_true_one():
     radians = np.radians(170.0)
     one = WORLDS["ellipses"]
     true = TrueTouch(5.0, -8.0, 9.0, 4.0, named_shape("ellipse", 2.0, -20.0))
@@ -72,7 +70,7 @@ def test_an_ellipse_is_off_by_its_angle_and_aspect_from_the_true_one() -> None:
         "made", one, (TouchScene("a", (true,)),) * 2, frame[:, None], frame, frame[:, 0]
     )
     answers = iter([[found], [disc]])
-    seen = ellipses_of(lambda *_: next(answers), of)  # type: ignore[arg-type]
+    seen = ellipses_of(lambda *_: next(answers), of)
     assert seen["matched"] == 2 and len(seen["said"]) == 1
     angle, aspect, as_disc, as_ellipse = seen["said"][0]
     assert (angle, aspect) == pytest.approx((10.0, 0.1), abs=1e-3)

@@ -1,7 +1,5 @@
 """The study of the paper's weights: where they are put, and its page."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from study_pages import coarse, fills_its_page, goes_on
@@ -13,9 +11,7 @@ from eitskin_studies.experiments import paper
 
 
 @pytest.mark.parametrize("from_rim_mm", paper.READINGS.values())
-def test_weights_stand_where_the_skin_is_most_sensitive(
-    from_rim_mm: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_weights_stand_where_the_skin_is_most_sensitive(from_rim_mm, monkeypatch):
     monkeypatch.setattr(paper, "MODEL_ELEMENTS", 1500)
     skin = paper_skin()
     places = np.array(paper._places(skin, adjacent(16), from_rim_mm))
@@ -29,7 +25,7 @@ def test_weights_stand_where_the_skin_is_most_sensitive(
     assert nearest[:4].max() < middle + from_rim_mm
 
 
-def test_small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_small(tmp_path, monkeypatch):
     monkeypatch.setattr(paper, "MODEL_ELEMENTS", 1500)
     monkeypatch.setattr(paper, "NOISES", 1)
     outcome = paper.run(coarse(tmp_path, 0.1, 1500))

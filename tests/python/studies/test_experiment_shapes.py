@@ -33,7 +33,7 @@ from eitskin_studies.experiments.shapes.variants import ShapeVariant, variants
 
 
 @pytest.fixture(scope="module")
-def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ShapeVariant]:
+def known(tmp_path_factory) -> dict[str, ShapeVariant]:
     """The skins by name."""
     return {one.name: one for one in variants(tmp_path_factory.mktemp("drawings"))}
 
@@ -47,9 +47,7 @@ def _small(
     return shapes.run(coarse(folder, 0.03, 2000))
 
 
-def test_a_run_and_one_that_goes_on(
-    monkeypatch: pytest.MonkeyPatch, known: dict[str, ShapeVariant], tmp_path: Path
-) -> None:
+def test_a_run_and_one_that_goes_on(monkeypatch, known, tmp_path):
     first = _small(monkeypatch, known, tmp_path)
     assert [table.name for table in first.tables] == ["skins", "found", "lost"]
     for result in first.data["shapes"].values():
@@ -60,7 +58,7 @@ def test_a_run_and_one_that_goes_on(
     fills_its_page(first, "shapes", tmp_path)
 
 
-def test_sets_depend_on_the_seed_only(known: dict[str, ShapeVariant], tmp_path: Path) -> None:
+def test_sets_depend_on_the_seed_only(known, tmp_path):
     def drawn(seed: int) -> Any:
         maker = measuring.Maker(
             workspace_in(tmp_path, ExperimentSettings(seed=seed, share=0.02), plain),
@@ -73,7 +71,7 @@ def test_sets_depend_on_the_seed_only(known: dict[str, ShapeVariant], tmp_path: 
     assert drawn(1)[0][0].touches != drawn(1)[1][0].touches
 
 
-def test_sizes_are_those_that_the_page_says(known: dict[str, ShapeVariant]) -> None:
+def test_sizes_are_those_that_the_page_says(known):
     rectangle = as_outline(rectangle_corners())
     assert rectangle.bounding_box_mm == pytest.approx((-100, -70, 100, 70))
     assert rectangle.area_mm2 == pytest.approx(200 * 140 - (4 - math.pi) * 400, rel=1e-3)
@@ -86,7 +84,7 @@ def test_sizes_are_those_that_the_page_says(known: dict[str, ShapeVariant]) -> N
     assert known["hand, 16 placed"].skin.outline == known["hand, 16 in pairs"].skin.outline
 
 
-def test_regions(known: dict[str, ShapeVariant]) -> None:
+def test_regions(known):
     assert hand_region([tip for _, tip, _ in FINGERS.values()]) == list(FINGERS)
     assert hand_region([(85, 60)]) == ["palm"]
     disk = known["disk, 16"]
@@ -94,7 +92,7 @@ def test_regions(known: dict[str, ShapeVariant]) -> None:
     assert found == ["innermost third", "middle third", "rim third"]
 
 
-def test_a_finger_with_one_electrode_is_blind(known: dict[str, ShapeVariant]) -> None:
+def test_a_finger_with_one_electrode_is_blind(known):
     """All current through a finger passes its only electrode, and so would all that is measured
     there: no row has both."""
     seen = {}
@@ -108,6 +106,6 @@ def test_a_finger_with_one_electrode_is_blind(known: dict[str, ShapeVariant]) ->
     assert seen["hand, 16 in pairs"] > 10 * seen["hand, 16 placed"]
 
 
-def test_shares_have_a_width_where_all_agree() -> None:
+def test_shares_have_a_width_where_all_agree():
     assert share_text([1] * 20) == "100 % (84 to 100)"
     assert share_text([0, 1] * 50) == "50 % (40 to 60)"

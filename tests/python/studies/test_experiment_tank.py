@@ -47,9 +47,7 @@ from eitskin_studies.experiments.tank.tanks import (
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "tank_kit4.toml"
 
 
-def test_without_frames_it_says_what_to_give(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_frames_it_says_what_to_give(tmp_path, capsys):
     found = main(["study", "tank", "-o", str(tmp_path / "out"), "--no-pictures"])
     assert found == UsageError.exit_code
     said = capsys.readouterr().err.strip()
@@ -58,13 +56,13 @@ def test_without_frames_it_says_what_to_give(
         folder_of(tmp_path)
 
 
-def test_the_tank_is_that_of_the_example() -> None:
+def test_the_tank_is_that_of_the_example():
     skin, protocol = tank()
     example, scan = load_skin(EXAMPLE)
     assert (skin, protocol.hash) == (example, scan.hash)
 
 
-def test_kinds_of_data_agree_for_small_changes() -> None:
+def test_kinds_of_data_agree_for_small_changes():
     reference = np.array([2.0, -1.0, 0.5])
     frame = reference * (1 + 1e-6 * np.array([[1.0, -2.0, 3.0]]))
     plain_v = datum("difference", frame, reference)
@@ -72,7 +70,7 @@ def test_kinds_of_data_agree_for_small_changes() -> None:
     assert datum("log-ratio", frame, reference) == pytest.approx(plain_v, rel=1e-5)
 
 
-def test_atoms_are_discs() -> None:
+def test_atoms_are_discs():
     grid = grid_for(tank()[0].outline, 32)
     assert np.array_equal(disc_kernel(grid, 0), np.eye(grid.n_pixels))
     kernel = disc_kernel(grid, 2.0)
@@ -81,7 +79,7 @@ def test_atoms_are_discs() -> None:
     assert kernel[:, middle].sum() == pytest.approx(np.pi * 4, rel=0.03)
 
 
-def test_one_sign_is_judged_as_everywhere_and_a_wrong_sign_counts() -> None:
+def test_one_sign_is_judged_as_everywhere_and_a_wrong_sign_counts():
     generator = np.random.default_rng(3)
     shown, true = generator.random((2, 500)) < 0.3
     none = np.zeros(500, dtype=bool)
@@ -90,7 +88,7 @@ def test_one_sign_is_judged_as_everywhere_and_a_wrong_sign_counts() -> None:
     assert signed_miou(none, true, true, none) < 0.51
 
 
-def test_places_of_both_signs_share_a_threshold() -> None:
+def test_places_of_both_signs_share_a_threshold():
     grid = grid_for(tank()[0].outline, 32)
     centres = grid.centres_mm()
     at = np.array([[60.0, 0.0], [-60.0, 0.0]])
@@ -102,7 +100,7 @@ def test_places_of_both_signs_share_a_threshold() -> None:
     assert [len(part) for part in places(image, grid.index, centres, 0.5)] == [1, 0]
 
 
-def test_truth_that_is_further_off_scores_less() -> None:
+def test_truth_that_is_further_off_scores_less():
     points = metrics.raster_inside(tank()[0].outline, 4.0).points_mm
     centres, radii = np.array([[30.0, 10.0]]), np.array([25.0])
     truth = metrics.disc_mask(points, centres, radii)
@@ -111,7 +109,7 @@ def test_truth_that_is_further_off_scores_less() -> None:
     assert jittered_truth(points, truth, centres, radii, 4.0, 1, 10) == scores[1]
 
 
-def test_signs_turn_about_half_and_nothing_else() -> None:
+def test_signs_turn_about_half_and_nothing_else():
     drawn = random_touches(tank()[0].outline, 1, 30, "tank mixed", RULES)
     turned = with_signs(drawn)
     before = [touch for scene in drawn.scenes for touch in scene.touches]
@@ -124,7 +122,7 @@ def test_signs_turn_about_half_and_nothing_else() -> None:
     assert with_signs(drawn).scenes == turned.scenes
 
 
-def test_simulated_noise_is_the_share_of_each_change(tmp_path: Path) -> None:
+def test_simulated_noise_is_the_share_of_each_change(tmp_path):
     workspace = workspace_in(tmp_path, ExperimentSettings(), plain)
     raster = metrics.raster_inside(tank()[0].outline, 5.0)
     clean, noisy = (simulated(workspace, 1, 4, True, raster, share) for share in (0.0, 0.05))
@@ -137,7 +135,7 @@ def test_simulated_noise_is_the_share_of_each_change(tmp_path: Path) -> None:
     assert sum(map(len, clean.conductive_mm)) + sum(map(len, clean.resistive_mm)) >= 4
 
 
-def test_levers_are_named_by_what_differs() -> None:
+def test_levers_are_named_by_what_differs():
     assert words_of(Levers()) == "defaults"
     assert words_of(Levers(regularisation=0.1, blur=1.0)) == "mu 0.1, blur of 1 pixels"
     assert len(set(one_by_one("difference"))) == len(one_by_one("difference"))
@@ -166,9 +164,7 @@ def with_few_values(patch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
-def outcome(
-    shared_data: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Workspace, ExperimentOutcome]:
+def outcome(shared_data, tmp_path_factory) -> tuple[Workspace, ExperimentOutcome]:
     """The whole study on few scenes and few levers."""
     workspace = workspace_in(
         tmp_path_factory.mktemp("tank"), ExperimentSettings(share=0.05, data=shared_data), plain
@@ -178,7 +174,7 @@ def outcome(
         return workspace, study.run(workspace)
 
 
-def test_every_method_every_kind_every_frame(outcome: tuple[Workspace, ExperimentOutcome]) -> None:
+def test_every_method_every_kind_every_frame(outcome):
     results = outcome[1].data["results"]
     kinds = {(one["name"], one["kind"]) for one in results}
     names = {name for name, _ in kinds} - {CHOSEN, TUNED_DISCS}
@@ -191,8 +187,8 @@ def test_every_method_every_kind_every_frame(outcome: tuple[Workspace, Experimen
 
 
 def test_discs_on_ratios_find_every_metal_object_and_reach_the_target(
-    outcome: tuple[Workspace, ExperimentOutcome],
-) -> None:
+    outcome,
+):
     discs = next(
         one
         for one in outcome[1].data["results"]
@@ -203,28 +199,26 @@ def test_discs_on_ratios_find_every_metal_object_and_reach_the_target(
 
 
 def test_atoms_show_large_objects_better_than_pixels(
-    outcome: tuple[Workspace, ExperimentOutcome],
-) -> None:
+    outcome,
+):
     means = {str(one["levers"]): np.mean(one["touch_like"]) for one in outcome[1].data["levers"]}
     assert means[str(vars(Levers(atom=2.0)))] > means[str(vars(Levers()))] + 0.03
 
 
-def test_a_run_that_goes_on_computes_nothing_again(
-    outcome: tuple[Workspace, ExperimentOutcome], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_goes_on_computes_nothing_again(outcome, monkeypatch):
     workspace, first = outcome
     with_few_values(monkeypatch)
     again = workspace_in(workspace.folder, workspace.settings, plain)
     goes_on(lambda: study.run(again), first, solves=True)
 
 
-def test_it_fills_its_page(outcome: tuple[Workspace, ExperimentOutcome], tmp_path: Path) -> None:
+def test_it_fills_its_page(outcome, tmp_path):
     assert set(outcome[1].pictures) == {"touch_like.png", "all_frames.png", "curves.png"}
     # all frames: the same function as touch-like ones, in half a minute
     fills_its_page(outcome[1], "tank", tmp_path, but=("all_frames.png",))
 
 
-def test_measured_frames_as_they_are_said_to_be(shared_data: Path) -> None:
+def test_measured_frames_as_they_are_said_to_be(shared_data):
     frames = phantoms(shared_data)
     assert set(TOUCH_LIKE) <= set(frames.frame_name)
     assert 0.02 < np.median(reciprocal_share(frames)) < 0.1

@@ -1,8 +1,6 @@
 """The experiment on touches in time: its streams, its counting, and that it goes on where it was
 stopped."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from study_pages import fills_its_page, goes_on
@@ -31,7 +29,7 @@ from eitskin_studies.experiments.tracking.streams import (
 
 
 @pytest.fixture
-def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+def workspace(tmp_path, monkeypatch) -> Workspace:
     """Coarse meshes, one SNR, one speed."""
     monkeypatch.setattr(measured, "ELEMENTS", 1500)
     monkeypatch.setattr(streams.TouchStream.scene, "__defaults__", (1500,))
@@ -40,7 +38,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     return workspace_in(tmp_path / "out", ExperimentSettings(share=0.05), plain)
 
 
-def test_the_whole_and_again(workspace: Workspace, tmp_path: Path) -> None:
+def test_the_whole_and_again(workspace, tmp_path):
     outcome = tracking.run(workspace)
     assert {table.name for table in outcome.tables} == {"tracking", "parts", "choices", "passing"}
     assert len(outcome.tables[1].rows) == 8
@@ -50,7 +48,7 @@ def test_the_whole_and_again(workspace: Workspace, tmp_path: Path) -> None:
     )
 
 
-def test_streams_are_those_of_their_seed_and_fingers_stay_apart() -> None:
+def test_streams_are_those_of_their_seed_and_fingers_stay_apart():
     outline = paper_skin().outline
     drawn = random_streams(outline, 3, "test", 200, 6)
     assert [one.facts() for one in drawn[:2]] == [
@@ -73,7 +71,7 @@ def test_streams_are_those_of_their_seed_and_fingers_stay_apart() -> None:
             )  # it lands lightly
 
 
-def test_fingers_that_pass_come_near() -> None:
+def test_fingers_that_pass_come_near():
     for one in passing_streams(1, 50, 3):
         nearest = min(
             np.hypot(*np.diff(one.true_mm(k)[1], axis=0)[0]) - one.true_mm(k)[2].sum()
@@ -90,7 +88,7 @@ def at(number: int, x_mm: float) -> Touch:
     return Touch(number, x_mm, 0.0, 8.0, 1.0, 0.5)
 
 
-def test_what_is_counted() -> None:
+def test_what_is_counted():
     """Two fingers, at 0 mm in frames 2 to 9 and at 60 mm in frames 4 to 9; twelve frames are
     told."""
     stream = TouchStream("two", 0, (finger(2, 9, 0.0), finger(4, 9, 60.0)))
@@ -113,13 +111,13 @@ def test_what_is_counted() -> None:
     assert count_stream(stream, [()] * 12, 0).never == 2 and TrackCount(**count.as_dict()) == count
 
 
-def test_an_id_that_goes_on_as_another_finger_is_no_ghost() -> None:
+def test_an_id_that_goes_on_as_another_finger_is_no_ghost():
     stream = TouchStream("handed on", 0, (finger(0, 4, 0.0), finger(5, 9, 20.0)))
     told = [(at(1, 0.0),)] * 5 + [(at(1, 20.0),)] * 5
     assert count_stream(stream, told, 0).ghost == [0, 0]
 
 
-def test_the_best_pairs_may_not_be_the_nearest() -> None:
+def test_the_best_pairs_may_not_be_the_nearest():
     distance = np.array([[1.0, 3.0], [2.0, 9.0]])
     assert measured.best_pairs(distance, 10.0) == [(0, 1), (1, 0)]
     assert measured.nearest_pairs(distance, 10.0) == [(0, 0), (1, 1)]
@@ -127,6 +125,6 @@ def test_the_best_pairs_may_not_be_the_nearest() -> None:
     assert measured.best_pairs(np.zeros((0, 2)), 1.0) == []
 
 
-def test_a_share_that_cannot_be() -> None:
+def test_a_share_that_cannot_be():
     with pytest.raises(UsageError, match="--share 0"):
         ExperimentSettings(share=0)

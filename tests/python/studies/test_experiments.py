@@ -41,11 +41,11 @@ class Small:
         table = Table("small", ("what", "value"), (("mean", f"{values['mean']:g}"),))
         return ExperimentOutcome(
             (table,), values, {"small.png": lambda path: path.write_bytes(b"png")}, {"said": "so"}
-        )  # type: ignore[arg-type]
+        )
 
 
 @pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> Small:
+def small(monkeypatch) -> Small:
     one = Small()
     monkeypatch.setitem(registry.EXPERIMENTS, "small", "one number")
     monkeypatch.setattr(registry, "load", lambda _: one)
@@ -53,7 +53,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> Small:
 
 
 @pytest.mark.parametrize("name", registry.EXPERIMENTS)
-def test_each_has_a_title_and_a_page_that_its_command_fills(name: str) -> None:
+def test_each_has_a_title_and_a_page_that_its_command_fills(name):
     experiment = registry.load(name)
     assert experiment.TITLE and callable(experiment.run)
     page = (PAGES / f"{name}.md").read_text(encoding="utf-8")
@@ -62,9 +62,7 @@ def test_each_has_a_title_and_a_page_that_its_command_fills(name: str) -> None:
     assert f"[{name}]({name}.md)" in (PAGES / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_command_lists_runs_and_goes_on(
-    small: Small, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_lists_runs_and_goes_on(small, tmp_path, capsys):
     assert main(["study", "list"]) == 0
     assert "small        one number" in capsys.readouterr().out
     page = tmp_path / "small.md"
@@ -104,9 +102,7 @@ def test_the_command_lists_runs_and_goes_on(
         (["tank", "--data", "no/such"], "no such folder"),
     ],
 )
-def test_what_cannot_be_is_refused_on_one_line(
-    arguments: list[str], text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_is_refused_on_one_line(arguments, text, tmp_path, capsys):
     file = tmp_path / "file"
     file.write_bytes(b"")
     assert main(["study", *(str(file) if one == "FILE" else one for one in arguments)]) != 0
@@ -114,7 +110,7 @@ def test_what_cannot_be_is_refused_on_one_line(
     assert out == "" and text in err and err.count("\n") == 1
 
 
-def test_a_page_without_its_marks_stays_as_it_is(tmp_path: Path) -> None:
+def test_a_page_without_its_marks_stays_as_it_is(tmp_path):
     outcome = Small().run(workspace_in(tmp_path / "out", ExperimentSettings(), plain))
     write_all(outcome, tmp_path / "out", pictures=False)
     page = tmp_path / "small.md"
@@ -125,7 +121,7 @@ def test_a_page_without_its_marks_stays_as_it_is(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "small.png").exists()
 
 
-def test_a_torn_line_is_computed_again(tmp_path: Path) -> None:
+def test_a_torn_line_is_computed_again(tmp_path):
     one = Small()
     one.run(workspace_in(tmp_path, ExperimentSettings(), plain))
     kept = tmp_path / "results.jsonl"
@@ -136,7 +132,7 @@ def test_a_torn_line_is_computed_again(tmp_path: Path) -> None:
     assert one.computed == 2
 
 
-def test_sets_to_choose_on_are_not_those_that_are_reported() -> None:
+def test_sets_to_choose_on_are_not_those_that_are_reported():
     settings = ExperimentSettings(seed=7, share=0.1)
     assert settings.tuning_seed != settings.seed
     assert (settings.count(40), settings.count(3)) == (4, 2)

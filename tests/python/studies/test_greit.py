@@ -24,7 +24,7 @@ def smooth(grid: Grid, rows: int) -> np.ndarray:
 J = smooth(GRID, 60)
 
 
-def test_a_small_target_is_shown_as_a_disc_at_its_place() -> None:
+def test_a_small_target_is_shown_as_a_disc_at_its_place():
     method = train_greit(J, GRID).method(1e-6)
     for pixel in (40, 101, 150):
         image = method.reconstruct(J[:, pixel])[0]
@@ -37,7 +37,7 @@ def test_a_small_target_is_shown_as_a_disc_at_its_place() -> None:
         assert image[away > 2.5 * DISC_RADIUS * HALF_MM].max() < 0.35 * image.max()
 
 
-def test_it_is_the_closed_form_and_noise_smooths() -> None:
+def test_it_is_the_closed_form_and_noise_smooths():
     training = train_greit(J, GRID, targets=300)
     weight = 1e-3
     noise = weight * np.linalg.eigvalsh(training.spread).max() * np.eye(60)
@@ -48,7 +48,7 @@ def test_it_is_the_closed_form_and_noise_smooths() -> None:
     assert sizes == sorted(sizes, reverse=True)
 
 
-def test_units_and_seeds() -> None:
+def test_units_and_seeds():
     one, again, other = (
         train_greit(J, GRID, targets=200, seed=seed).method(1e-4).matrix for seed in (3, 3, 4)
     )
@@ -57,7 +57,7 @@ def test_units_and_seeds() -> None:
     assert 1e-6 * scaled == pytest.approx(one, rel=1e-7)
 
 
-def test_what_it_refuses() -> None:
+def test_what_it_refuses():
     with pytest.raises(UsageError, match="a Jacobian of 3 pixels"):
         train_greit(J[:, :3], GRID)
     with pytest.raises(UsageError, match="at least 1 target"):
@@ -91,7 +91,7 @@ class Counting(np.ndarray):
         lambda j: baselines.PlainFista(j, 5, 0.1),
     ],
 )
-def test_macs_are_those_of_the_products(make) -> None:  # type: ignore[no-untyped-def]
+def test_macs_are_those_of_the_products(make):
     method = make(J.view(Counting))
     Counting.macs = 0
     frames = np.random.default_rng(1).normal(size=(3, 60))

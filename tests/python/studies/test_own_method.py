@@ -44,7 +44,7 @@ def install_by_hand(package: Path, site: Path) -> None:
     (info / "entry_points.txt").write_text("\n".join(lines))
 
 
-def test_the_example_is_installed_and_compared(tmp_path: Path) -> None:
+def test_the_example_is_installed_and_compared(tmp_path):
     install_by_hand(EXAMPLE, tmp_path)
     paths = [str(tmp_path), os.environ.get("PYTHONPATH", "")]
     done = subprocess.run(
@@ -59,7 +59,7 @@ def test_the_example_is_installed_and_compared(tmp_path: Path) -> None:
     assert name == "truncated SVD" and value in (20, 40, 60, 80) and 0.6 < miou < 1
 
 
-def test_the_page_shows_the_example() -> None:
+def test_the_page_shows_the_example():
     page = (ROOT / "docs" / "guide" / "own-method.md").read_text(encoding="utf-8")
     assert "(../../examples/python/own_method/own_method.py)" in page
     table = (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")
@@ -75,10 +75,8 @@ def test_the_page_shows_the_example() -> None:
         ("builtins:repr", "returned no Family"),
     ],
 )
-def test_what_is_no_method_is_refused_by_name(
-    value: str, said: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_no_method_is_refused_by_name(value, said, monkeypatch):
     entry = EntryPoint("mine", value, methods.ENTRY_POINT_GROUP)
     monkeypatch.setattr(methods, "entry_points", lambda group: [entry])
     with pytest.raises(UsageError, match=f"method 'mine' .*{said}"):
-        methods.own_methods(SimpleNamespace())  # type: ignore[arg-type]
+        methods.own_methods(SimpleNamespace())

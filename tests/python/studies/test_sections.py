@@ -35,14 +35,14 @@ columns = ["valve (95 %)"]
 
 
 @pytest.fixture
-def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def page(tmp_path, monkeypatch) -> Path:
     (tmp_path / "pages.toml").write_text(PARTS)
     monkeypatch.setattr(sections, "PARTS", tmp_path / "pages.toml")
     (tmp_path / "page.md").write_text(BARE)
     return tmp_path / "page.md"
 
 
-def test_a_page_shows_its_part_of_a_table(page: Path) -> None:
+def test_a_page_shows_its_part_of_a_table(page):
     fill_marks(page, "some", ({"words": "so \\1"}, {"t": TABLE, "left": TABLE}))
     shown = "| value (95 %) | what |\n|---|---|\n| 2 | b |"
     words = "<!-- words -->\nso \\1\n<!-- end words -->"
@@ -52,7 +52,7 @@ def test_a_page_shows_its_part_of_a_table(page: Path) -> None:
     assert "| a | one | .5 (.4 to .6) |" in page.read_text()
 
 
-def test_a_sentence_takes_cells(page: Path) -> None:
+def test_a_sentence_takes_cells(page):
     fill_marks(page, "said", ({}, {"t": TABLE}))
     assert "<!-- words -->\n.5 of 2, (not measured)\n" in page.read_text()
     fill_marks(page, "said", ({}, {}))  # a part of the page's tables: the sentence stays
@@ -60,7 +60,7 @@ def test_a_sentence_takes_cells(page: Path) -> None:
         fill_marks(page, "unclear", ({}, {"t": (TABLE[0], TABLE[1] * 2)}))
 
 
-def test_what_is_not_there_is_named_and_nothing_is_written(page: Path) -> None:
+def test_what_is_not_there_is_named_and_nothing_is_written(page):
     with pytest.raises(ConfigError, match="has no marks <!-- left -->"):
         fill_marks(page, "other", ({}, {"t": TABLE, "left": TABLE}))
     with pytest.raises(
@@ -70,12 +70,12 @@ def test_what_is_not_there_is_named_and_nothing_is_written(page: Path) -> None:
     assert page.read_text() == BARE
 
 
-def test_prose_is_wrapped_and_code_is_not(page: Path) -> None:
+def test_prose_is_wrapped_and_code_is_not(page):
     text = f"- {'word ' * 18}`a command of several words`.\n- next"
     fill_marks(page, "some", ({"words": text}, {}))
     lines = page.read_text().split("<!-- words -->\n")[1].splitlines()
     assert lines[:3] == [f"- {'word ' * 18}".strip(), "  `a command of several words`.", "- next"]
 
 
-def test_a_table_for_a_terminal() -> None:
+def test_a_table_for_a_terminal():
     assert text_table(("a", "bb"), [("ccc", "d")]) == "a    bb\nccc   d"

@@ -23,7 +23,7 @@ from eitskin_studies.tradeoff.table import best_points
 from made_points import COLD, HERE, POINTS, point, target
 
 
-def test_the_front_is_what_nothing_beats() -> None:
+def test_the_front_is_what_nothing_beats():
     best = pareto(
         POINTS[:4], lambda p: p.cost("instructions", "f767", HERE), lambda p: p.accuracy(HERE)
     )
@@ -31,7 +31,7 @@ def test_the_front_is_what_nothing_beats() -> None:
     assert [one.name for one in best_points(POINTS, HERE)] == ["a", "b", "c", "big"]
 
 
-def test_instructions_are_estimated_from_points_of_the_same_storage_and_solver() -> None:
+def test_instructions_are_estimated_from_points_of_the_same_storage_and_solver():
     packed = Configuration("i8", storage="i8")
     assert estimated_instructions(COLD, packed, (1000.0, 3000.0)) is None
     table = [*COLD, point("i8 too", 0.8, 900e3, storage="i8")]
@@ -40,7 +40,7 @@ def test_instructions_are_estimated_from_points_of_the_same_storage_and_solver()
     assert found == {"kind": "estimated", "mean": 2000, "most": 6000, "instructions_per_mac": 2.0}
 
 
-def test_the_recorded_results_are_of_the_built_in_set_and_reach_the_targets() -> None:
+def test_the_recorded_results_are_of_the_built_in_set_and_reach_the_targets():
     front = recorded_front()
     names = {one.name for one in front.points}
     missing = {one.name for one in default_set()} - names
@@ -69,7 +69,7 @@ def test_the_recorded_results_are_of_the_built_in_set_and_reach_the_targets() ->
         ).fits_f767
 
 
-def test_what_ships_is_short_and_chooses_the_same() -> None:
+def test_what_ships_is_short_and_chooses_the_same():
     made = front_from(json.loads(to_json(in_short(Front({"seed": 1}, POINTS)))), "file")
     assert [one.name for one in made.points] == [one.name for one in POINTS]
     assert choose(made.points[:-1], target("10ms")).name == "c"
@@ -85,7 +85,7 @@ def test_what_ships_is_short_and_chooses_the_same() -> None:
                 assert whole.cost(unit, board, HERE, worst) == short.cost(unit, board, HERE, worst)
 
 
-def test_the_page_shows_the_recorded_results(tmp_path: Path) -> None:
+def test_the_page_shows_the_recorded_results(tmp_path):
     page = Path(__file__).resolve().parents[3] / "docs" / "results" / "tradeoff.md"
     text, front = page.read_text(encoding="utf-8"), recorded_front()
     assert all((page.parent / PICTURES / name).is_file() for name in DRAWN)

@@ -47,7 +47,7 @@ def plain(items: Iterable[Any], what: str) -> Iterable[Any]:
     return items
 
 
-def test_models_get_the_errors_that_each_alone_would_get() -> None:
+def test_models_get_the_errors_that_each_alone_would_get():
     shop = ModelShop(paper_skin(), adjacent(16))
     uncertainty = replace(DEFAULT_UNCERTAINTY, samples=2)
     alone = [
@@ -73,16 +73,16 @@ def comparable(front: Front) -> Any:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("tradeoff")
 
 
 @pytest.fixture(scope="module")
-def front(folder: Path) -> Front:
+def front(folder) -> Front:
     return run(PAIR, TINY, folder, plain)
 
 
-def test_every_configuration_is_measured_on_every_set(front: Front) -> None:
+def test_every_configuration_is_measured_on_every_set(front):
     assert [one.name for one in front.points] == ["cheap", "dear", "warm"]
     for one in front.points:
         assert {name: set(cells) for name, cells in one.scores.items()} == {
@@ -101,11 +101,11 @@ def test_every_configuration_is_measured_on_every_set(front: Front) -> None:
     assert cheap.costs["flash_bytes"] < dear.costs["flash_bytes"]
     assert warm.costs["flash_bytes"] < dear.costs["flash_bytes"]
     assert (dear.costs["acquisition_us"], warm.costs["acquisition_us"]) == (20_800, 10_400)
-    assert dear.score(where)["iterations"] == 60  # type: ignore[index]
+    assert dear.score(where)["iterations"] == 60
     assert best_points(front.points, where) == [cheap, dear]
 
 
-def test_tables_hold_a_row_a_cell(front: Front) -> None:
+def test_tables_hold_a_row_a_cell(front):
     lines = to_csv(front).splitlines()
     assert len(lines) == 1 + 3 * 3 * 2
     assert {
@@ -121,7 +121,7 @@ def test_tables_hold_a_row_a_cell(front: Front) -> None:
     assert "* dear" in to_text(front, Conditions())
 
 
-def test_a_second_run_measures_nothing(front: Front, folder: Path) -> None:
+def test_a_second_run_measures_nothing(front, folder):
     before = (folder / RESULTS).read_bytes()
     again = run(PAIR, TINY, folder, plain)
     assert to_json(as_dict(again)) == to_json(as_dict(front))
@@ -129,9 +129,7 @@ def test_a_second_run_measures_nothing(front: Front, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("cut", [0.3, 0.7, 0.95])
-def test_a_run_that_was_cut_goes_on_to_the_same_table(
-    front: Front, folder: Path, tmp_path: Path, cut: float
-) -> None:
+def test_a_run_that_was_cut_goes_on_to_the_same_table(front, folder, tmp_path, cut):
     """Cut anywhere, also within a line."""
     whole = (folder / RESULTS).read_bytes()
     (tmp_path / RESULTS).write_bytes(whole[: int(cut * len(whole))])
@@ -147,7 +145,7 @@ def test_a_run_that_was_cut_goes_on_to_the_same_table(
     assert set(good) == kept and len(good) == len(kept) and len(lines) <= len(kept) + 1
 
 
-def test_a_killed_command_goes_on(tmp_path: Path) -> None:
+def test_a_killed_command_goes_on(tmp_path):
     (tmp_path / "set.toml").write_text(
         '[[configuration]]\nname = "a"\nrank = 24\npixels = 14\niterations = 8\n'
         '[[configuration]]\nname = "b"\nrank = 32\npixels = 16\n'
@@ -215,7 +213,7 @@ def session(name: str, count: int = 3) -> FrameSession:
     return SceneFactory(paper_skin(), adjacent(16), 5, ELEMENTS).session(name, count, plain)
 
 
-def test_random_scenes_are_those_of_compare() -> None:
+def test_random_scenes_are_those_of_compare():
     skin, protocol = paper_skin(), adjacent(16)
     theirs = simulate(
         skin,
@@ -231,7 +229,7 @@ def test_random_scenes_are_those_of_compare() -> None:
     assert not np.array_equal(held.frames_v[:, 0], held.frames_v[:, -1])
 
 
-def test_noise_falls_with_the_root_of_the_samples_and_stays_the_same_noise() -> None:
+def test_noise_falls_with_the_root_of_the_samples_and_stays_the_same_noise():
     one = session("random")
     noise = {
         s: one.measured(40.0, s, "full", 1).frames_v[:, 0] - one.exact_v for s in (20, 80, 320)
@@ -246,7 +244,7 @@ def test_noise_falls_with_the_root_of_the_samples_and_stays_the_same_noise() -> 
     assert fine.std() == pytest.approx(expected, rel=0.15)
 
 
-def test_a_reciprocal_scan_copies_what_it_does_not_measure() -> None:
+def test_a_reciprocal_scan_copies_what_it_does_not_measure():
     one = session("random")
     fold = one.protocol.reciprocal_pairs()
     full, half = (one.measured(60.0, 80, scan, 1) for scan in ("full", "reciprocal"))
@@ -258,7 +256,7 @@ def test_a_reciprocal_scan_copies_what_it_does_not_measure() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in SETS if name != "train"])
-def test_sets_hold_what_they_say(name: str) -> None:
+def test_sets_hold_what_they_say(name):
     outline = paper_skin().outline
     drawn = SETS[name].draw(outline, 3, 4)
     assert len(drawn.scenes) == 4 and drawn.scenes[:2] == SETS[name].draw(outline, 3, 2).scenes
@@ -284,7 +282,7 @@ def test_sets_hold_what_they_say(name: str) -> None:
     assert len({SETS[one].draw(outline, 3, 1).role for one in SETS}) == len(SETS)
 
 
-def test_drift_is_in_the_frames_and_not_in_the_reference() -> None:
+def test_drift_is_in_the_frames_and_not_in_the_reference():
     drifting = session("drift")
     steady = replace(drifting, exact_v=drifting.exact_v)
     assert np.array_equal(steady.exact_quiet_v, drifting.exact_quiet_v)
@@ -306,12 +304,12 @@ def test_drift_is_in_the_frames_and_not_in_the_reference() -> None:
         ({"snrs_db": (60.0, float("nan"))}, "SNRs"),
     ],
 )
-def test_bad_settings_are_refused(changes: dict[str, Any], said: str) -> None:
+def test_bad_settings_are_refused(changes, said):
     with pytest.raises(UsageError, match=said):
         replace(TINY, **changes)
 
 
-def test_a_rank_that_cannot_be_is_refused_before_the_work(tmp_path: Path) -> None:
+def test_a_rank_that_cannot_be_is_refused_before_the_work(tmp_path):
     with pytest.raises(EitskinError, match="'big': rank = 105 is out of range; use 1 to 104"):
         run([Configuration("big", rank=105)], TINY, tmp_path / "none", plain)
     assert not (tmp_path / "none").exists()

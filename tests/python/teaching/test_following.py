@@ -64,7 +64,7 @@ def errors_mm(core: Reconstructor) -> np.ndarray:
     return np.linalg.norm(np.array(at) - place, axis=1)
 
 
-def test_drift_between_presses_does_no_harm(model: Model) -> None:
+def test_drift_between_presses_does_no_harm(model):
     core = Reconstructor(model)
     assert core.options.reference_frames == 512  # taught models ask for it
     stays, follows = [], []
@@ -74,7 +74,7 @@ def test_drift_between_presses_does_no_harm(model: Model) -> None:
     assert np.median(follows) < 5 < 10 < np.median(stays)
 
 
-def test_every_engine_follows_alike(model: Model) -> None:
+def test_every_engine_follows_alike(model):
     """Presses on a skin that drifts, and a hand that rests while it dries; one frame to tare by, so
     that false touches are held back by what they explain."""
     quiet, untouched, pressed, _ = drifting()
@@ -96,7 +96,7 @@ def test_every_engine_follows_alike(model: Model) -> None:
     assert held_back > 0
 
 
-def test_a_resting_hand_does_not_fade_while_the_sheet_dries(model: Model) -> None:
+def test_a_resting_hand_does_not_fade_while_the_sheet_dries(model):
     """A hold of 600 frames, in which an even sheet dries by 5 %: the mean force of 10 frames."""
     one, core, worst = presses(1, seed=5), Reconstructor(model), {}
     untouched, press = one.untouched[0], one.difference[0]
@@ -112,7 +112,7 @@ def test_a_resting_hand_does_not_fade_while_the_sheet_dries(model: Model) -> Non
     assert worst[TIME] < 0.05 < 0.2 < worst[0]
 
 
-def test_the_librarys_resting_hand_does_not_fade() -> None:
+def test_the_librarys_resting_hand_does_not_fade():
     """Ten minutes on a gel that dries, a frame each 16 s, on a skin taught by 12 simulated
     presses."""
     skin, protocol = paper_skin(), adjacent(16)
@@ -137,7 +137,7 @@ def test_the_librarys_resting_hand_does_not_fade() -> None:
 
 
 @pytest.mark.parametrize(("share", "grows"), [(1.0, 8), (0.3, 4)])
-def test_a_slow_light_touch_is_not_taken_for_drift(model: Model, share: float, grows: int) -> None:
+def test_a_slow_light_touch_is_not_taken_for_drift(model, share, grows):
     """It grows for so many time constants, and is as strong in the end as one that came at once;
     nothing is left behind when it lifts."""
     one, core = presses(1, seed=5), Reconstructor(model)

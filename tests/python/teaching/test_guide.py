@@ -55,7 +55,7 @@ class Finger:
         return file, said
 
 
-def test_good_presses_are_taken_with_the_frame_before(tmp_path: Path) -> None:
+def test_good_presses_are_taken_with_the_frame_before(tmp_path):
     finger = Finger().good(0).good(1).good(2).add(20)
     _, said = finger.guided(tmp_path / "p.npz", 3)
     presses = load_presses(tmp_path / "p.npz")
@@ -77,7 +77,7 @@ def test_good_presses_are_taken_with_the_frame_before(tmp_path: Path) -> None:
     ],
     ids=["short", "sinking", "slipping"],
 )
-def test_a_bad_press_is_asked_for_again(bad, why: str, tmp_path: Path) -> None:
+def test_a_bad_press_is_asked_for_again(bad, why, tmp_path):
     finger = Finger().add(20)
     bad(finger)
     _, said = finger.good(1).add(20).guided(tmp_path / "p.npz", 1)
@@ -97,7 +97,7 @@ def test_a_bad_press_is_asked_for_again(bad, why: str, tmp_path: Path) -> None:
     ],
     ids=["before rest", "as rest ends", "lifted before rest", "lifted when told to press"],
 )
-def test_a_press_before_the_first_is_not_the_first(early, said: str, tmp_path: Path) -> None:
+def test_a_press_before_the_first_is_not_the_first(early, said, tmp_path):
     finger = Finger()
     early(finger)
     _, events = finger.good(0).good(1).add(20).guided(tmp_path / "p.npz", 2)
@@ -107,7 +107,7 @@ def test_a_press_before_the_first_is_not_the_first(early, said: str, tmp_path: P
     assert np.abs(presses.difference - 0.05 * finger.pattern[:2]).max() < 2e-3
 
 
-def test_a_killed_session_goes_on_and_can_go_back(tmp_path: Path) -> None:
+def test_a_killed_session_goes_on_and_can_go_back(tmp_path):
     path = tmp_path / "p.npz"
     first, _ = Finger().good(0).good(1).guided(path, 3)
     with pytest.raises(FileError, match="another process records to it"):
@@ -123,7 +123,7 @@ def test_a_killed_session_goes_on_and_can_go_back(tmp_path: Path) -> None:
         PressFile(path, plan_of(3), adjacent(8), "")
 
 
-def test_begun_again_the_old_presses_stay_until_the_first_new_one(tmp_path: Path) -> None:
+def test_begun_again_the_old_presses_stay_until_the_first_new_one(tmp_path):
     old, link = tmp_path / "old.npz", tmp_path / "p.npz"
     Finger().good(0).good(1).add(20).guided(old, 2)[0].close()
     link.symlink_to(old)
@@ -134,7 +134,7 @@ def test_begun_again_the_old_presses_stay_until_the_first_new_one(tmp_path: Path
     assert file.back() == 1 and link.is_symlink() and not old.exists()
 
 
-def test_presses_that_another_program_wrote_meanwhile_stay(tmp_path: Path) -> None:
+def test_presses_that_another_program_wrote_meanwhile_stay(tmp_path):
     path, frame = tmp_path / "p.npz", np.ones(ROWS.n_rows)
     files = [PressFile(path, plan_of(2), ROWS, "") for _ in range(2)]
     files[0].add(0, frame, 2 * frame, 0.0)
@@ -144,7 +144,7 @@ def test_presses_that_another_program_wrote_meanwhile_stay(tmp_path: Path) -> No
     assert np.array_equal(load_presses(path).pressed, [2 * frame, 2 * frame])
 
 
-def test_places_spread_over_the_skin(tmp_path: Path) -> None:
+def test_places_spread_over_the_skin(tmp_path):
     skin = Skin("disk", disk(100.0), Electrodes(count=8, width_mm=5.0))
     plan = plan_places(skin, opposite(8), 12)
     assert np.linalg.norm(plan.place_mm, axis=1).max() < 46
@@ -158,14 +158,14 @@ def test_places_spread_over_the_skin(tmp_path: Path) -> None:
     ("text", "said"),
     [("a,b\n1,2\n", "x_mm,y_mm"), ("x_mm,y_mm\n1,\n", "line 2"), ("x_mm,y_mm\n1,two\n", "two")],
 )
-def test_a_plan_that_is_none(text: str, said: str, tmp_path: Path) -> None:
+def test_a_plan_that_is_none(text, said, tmp_path):
     (tmp_path / "plan.csv").write_text(text)
     with pytest.raises(FrameError, match=said):
         load_plan(tmp_path / "plan.csv")
 
 
 @pytest.mark.parametrize("kind", ["sim", "emu"])
-def test_a_whole_session(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_whole_session(kind, tmp_path, capsys):
     """Plan, practise 20 presses, fit, check, then touch with the taught model, as a person would;
     the board's images are this host's."""
     skin, plan, scene, presses, physics, model, run = (

@@ -1,7 +1,6 @@
 """The library's hydrogel scene: its front end misleads the model from physics, not a taught one."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -48,7 +47,7 @@ def by_physics(model: Model, judged: Presses, sign: str) -> tuple[np.ndarray, np
     return error, count
 
 
-def test_physics_fails_and_teaching_works(tmp_path: Path) -> None:
+def test_physics_fails_and_teaching_works(tmp_path):
     plan, text = plan_of_scene("hydrogel")
     assert len(plan) == TAUGHT and "start_angle_deg" in text
     draw = np.random.default_rng(9)

@@ -1,8 +1,6 @@
 """A file of presses gives back what was written, and what cannot be presses is refused in a line
 that says which press and what to do."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -19,7 +17,7 @@ def some(count: int = 3) -> Presses:
     )
 
 
-def test_a_file_gives_back_its_presses(tmp_path: Path) -> None:
+def test_a_file_gives_back_its_presses(tmp_path):
     whole = joined(some(), some(2))
     save_presses(tmp_path / "a.npz", whole)
     read = load_presses(tmp_path / "a.npz")
@@ -28,7 +26,7 @@ def test_a_file_gives_back_its_presses(tmp_path: Path) -> None:
     assert read.depth_mm is None and (read.take([1, 3]).untouched == whole.untouched[[1, 3]]).all()
 
 
-def test_what_cannot_be_presses_is_refused(tmp_path: Path) -> None:
+def test_what_cannot_be_presses_is_refused(tmp_path):
     arrays = {
         "untouched": some().untouched,
         "pressed": some().pressed,

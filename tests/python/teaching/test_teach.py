@@ -1,6 +1,5 @@
 """A model taught from a few presses finds others without any sign; odd places are told."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,7 @@ from eitskin.teaching.left_out import (
     without_own,
 )
 from eitskin.teaching.make import taught_model
-from eitskin.teaching.presses import Presses, shifted
+from eitskin.teaching.presses import shifted
 from eitskin.teaching.teach import Taught, solve_presses, teach
 from simulated_presses import RADIUS_MM, SKIN, TRUE, presses
 
@@ -30,7 +29,7 @@ def taught() -> Taught:
     return teach(presses(30), SKIN)
 
 
-def test_presses_never_seen_are_found(taught: Taught) -> None:
+def test_presses_never_seen_are_found(taught):
     error, count, *_ = solve_presses(taught.model, presses(40, seed=2))
     assert np.median(error) < 0.05 * 2 * RADIUS_MM and np.mean(count == 1) > 0.9
     own = taught.report["error_mm"]["held_out_median"]
@@ -41,7 +40,7 @@ def test_presses_never_seen_are_found(taught: Taught) -> None:
     assert taught.report["notes"][0].startswith("touches have a force: depth")
 
 
-def test_ellipses_cover_about_what_they_say(taught: Taught) -> None:
+def test_ellipses_cover_about_what_they_say(taught):
     """Thirty presses tell their factor badly, for which reason the model has none."""
     judged, factor = presses(100, seed=2), ellipse_factor(taught.held.mahalanobis2)
     assert taught.model.place_factor == 0 and taught.report["ellipse_factor"] is None
@@ -50,7 +49,7 @@ def test_ellipses_cover_about_what_they_say(taught: Taught) -> None:
     assert ellipse_factor(np.arange(1.0, 51.0)) == 46 / CHI2_90
 
 
-def test_a_press_left_out_has_no_part_in_the_noise() -> None:
+def test_a_press_left_out_has_no_part_in_the_noise():
     """Products are those of the inverse covariance without its residual."""
     draw = np.random.default_rng(4)
     residual, data = draw.normal(size=8), draw.normal(size=(3, 8))
@@ -60,7 +59,7 @@ def test_a_press_left_out_has_no_part_in_the_noise() -> None:
     assert white @ white.T == pytest.approx(data @ inverse @ data.T)
 
 
-def test_shuffled_places_teach_nothing() -> None:
+def test_shuffled_places_teach_nothing():
     """Such a model is refused; made all the same, it answers about the middle, or anywhere."""
     some = presses(30)
     shuffled = replace(some, place_mm=some.place_mm[np.random.default_rng(3).permutation(30)])
@@ -71,7 +70,7 @@ def test_shuffled_places_teach_nothing() -> None:
     assert np.median(error) > 0.25 * 2 * RADIUS_MM
 
 
-def test_the_file_brings_its_own_options_and_every_engine_agrees(taught: Taught) -> None:
+def test_the_file_brings_its_own_options_and_every_engine_agrees(taught):
     model = decode_model(encode_model(taught.model), "taught")
     some = presses(8, seed=5)
     away = np.linalg.norm(some.place_mm[:, None] - some.place_mm, axis=2)
@@ -110,7 +109,7 @@ def test_the_file_brings_its_own_options_and_every_engine_agrees(taught: Taught)
     assert exact >= 3
 
 
-def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught: Taught) -> None:
+def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught):
     judged = presses(25, seed=5)
     out = np.arange(judged.protocol.n_rows) < 9
     errors = []
@@ -148,13 +147,13 @@ def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught: Taught) -> No
     ],
     ids=["mirrored", "another unit", "one half", "one too many", "one missed"],
 )
-def test_odd_places_are_told_and_taught(change: Callable[[Presses], Presses], note: str) -> None:
+def test_odd_places_are_told_and_taught(change, note):
     taught = teach(change(presses(30)), SKIN)
     assert sum(note in one for one in taught.report["notes"]) == 1
     assert taught.report["error_mm"]["held_out_median"] < 0.05 * 2 * RADIUS_MM
 
 
-def test_a_press_that_does_not_fit_is_named(taught: Taught) -> None:
+def test_a_press_that_does_not_fit_is_named(taught):
     some = presses(30)
     pressed = some.pressed.copy()
     pressed[7] += pressed[(7 + 11) % 30] - some.untouched[(7 + 11) % 30]
@@ -164,13 +163,13 @@ def test_a_press_that_does_not_fit_is_named(taught: Taught) -> None:
     assert any("one finger at a time" in note for note in teach(every, SKIN).report["notes"])
 
 
-def test_without_a_description_a_stationary_kernel_says_what_is_lost() -> None:
+def test_without_a_description_a_stationary_kernel_says_what_is_lost():
     taught = teach(presses(30), None)
     assert any("give --skin" in note for note in taught.report["notes"])
     assert np.isfinite(leave_one_out(taught.learned, taught.model.grid).error_mm).all()
 
 
 @pytest.mark.parametrize("text", ["a = [", "x = " + 5000 * "[", "a." * 2000 + "b = 1"])
-def test_a_description_that_is_none_is_refused_in_one_line(text: str) -> None:
+def test_a_description_that_is_none_is_refused_in_one_line(text):
     with pytest.raises(ConfigError, match=r"own description: not .*; give --skin"):
         described_skin(replace(presses(10), skin=text), None)

@@ -2,7 +2,6 @@
 untouched skin alone it is told whether it fits."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +31,7 @@ def taught() -> Taught:
 
 
 @pytest.fixture(scope="module")
-def model(taught: Taught) -> Model:
+def model(taught) -> Model:
     return decode_model(encode_model(taught.model), "taught")
 
 
@@ -40,7 +39,7 @@ def median_error(model: Model, judged: Presses) -> float:
     return float(np.median(solve_presses(model, judged)[0]))
 
 
-def test_the_file_knows_what_was_learned(taught: Taught, model: Model) -> None:
+def test_the_file_knows_what_was_learned(taught, model):
     known, unit = known_of(model, "taught"), taught.learned.unit
     answer = taught.learned.process.mean(model.grid.centres_mm()) * unit
     assert np.abs(known.answer - answer).max() < 2e-3 * np.abs(answer).max()
@@ -50,7 +49,7 @@ def test_the_file_knows_what_was_learned(taught: Taught, model: Model) -> None:
 
 
 @pytest.mark.parametrize("count", [5, 12])
-def test_a_remounted_skin_is_found_again(model: Model, count: int) -> None:
+def test_a_remounted_skin_is_found_again(model, count):
     """Turned by 130 degrees, shifted by 3.6 mm, a fifth drier."""
     judged = presses(40, seed=9, **REMOUNTED)
     updated = update(model, presses(count, seed=4, **REMOUNTED))
@@ -70,12 +69,12 @@ def test_a_remounted_skin_is_found_again(model: Model, count: int) -> None:
     assert known_of(new, "updated").presses == 40 + count
 
 
-def test_a_skin_that_is_as_it_was_keeps_its_model(model: Model) -> None:
+def test_a_skin_that_is_as_it_was_keeps_its_model(model):
     updated = update(model, presses(5, seed=4))
     assert updated.chosen == KEPT and updated.model is model
 
 
-def test_what_is_better_by_chance_is_not_chosen() -> None:
+def test_what_is_better_by_chance_is_not_chosen():
     good, bad = np.full(8, 1.0), np.full(8, 9.0)
     luck = np.array([0.5, 3.0] * 4)
     assert choice({KEPT: bad, MOVED: good, FULL: luck}, 0.1) == MOVED
@@ -88,25 +87,21 @@ def test_what_is_better_by_chance_is_not_chosen() -> None:
     [({}, FITS), ({"dried": 0.02}, FITS), ({"dried": 0.2}, UPDATE), ({"dried": 2.0}, TEACH_AGAIN)],
     ids=["own", "a little drier", "drier", "dry"],
 )
-def test_the_untouched_skin_tells_whether_a_model_fits(
-    model: Model, change: dict[str, float], verdict: str
-) -> None:
+def test_the_untouched_skin_tells_whether_a_model_fits(model, change, verdict):
     judged = presses(9, seed=9, **change)
     untouched = judged.untouched.copy()
     untouched[3], untouched[5, 2] = judged.pressed[3], np.nan  # a touch and a hole do no harm
     assert still_fits(model, untouched, judged.protocol).verdict == verdict
 
 
-def test_one_electrode_that_came_off_is_seen(model: Model) -> None:
+def test_one_electrode_that_came_off_is_seen(model):
     judged = presses(9, seed=9)
     rows = (judged.protocol.drive_measure == 3).any(axis=1)
     found = still_fits(model, judged.untouched * np.where(rows, 1.1, 1.0), judged.protocol)
     assert found.verdict == UPDATE
 
 
-def test_check_and_update_at_the_command_line(
-    model: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_and_update_at_the_command_line(model, tmp_path, capsys):
     old, new, file = (tmp_path / name for name in ("old.eitm", "new.eitm", "presses.npz"))
     save_model(old, model)
     save_presses(file, presses(5, seed=4, **REMOUNTED))
@@ -119,7 +114,7 @@ def test_check_and_update_at_the_command_line(
     assert "fits" in capsys.readouterr().out
 
 
-def test_mirrored_and_strange_presses_are_told(model: Model) -> None:
+def test_mirrored_and_strange_presses_are_told(model):
     some = presses(12, seed=4)
     pressed = some.pressed.copy()
     pressed[7] += some.difference[2]

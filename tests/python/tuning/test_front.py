@@ -1,8 +1,5 @@
 """Which point is chosen for a budget or an accuracy, on made-up points."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from eitskin.errors import ConfigError, FileError, UsageError
@@ -31,7 +28,7 @@ from made_points import COLD, HERE, point, target
         ({"accuracy": 0.6, "budget": "10ms"}, "a"),
     ],
 )
-def test_the_right_point_is_chosen(asked: dict[str, Any], name: str) -> None:
+def test_the_right_point_is_chosen(asked, name):
     wanted = target(**asked)
     chosen = choose(COLD, wanted)
     assert chosen.name == name
@@ -53,22 +50,20 @@ def test_the_right_point_is_chosen(asked: dict[str, Any], name: str) -> None:
         ({"budget": "1Minstructions", "board": "host"}, "instructions are counted"),
     ],
 )
-def test_what_cannot_be_is_refused_with_how_near_one_comes(
-    asked: dict[str, Any], said: str
-) -> None:
+def test_what_cannot_be_is_refused_with_how_near_one_comes(asked, said):
     with pytest.raises(UsageError, match=said) as caught:
         choose(COLD, target(**asked))
     assert "\n" not in str(caught.value)
 
 
-def test_a_longer_scan_is_chosen_only_where_there_is_time() -> None:
+def test_a_longer_scan_is_chosen_only_where_there_is_time():
     slow = point("slow", 0.88, 2200e3, samples=320, acquisition_us=70_700)
     assert choose([*COLD, slow], target("12ms")).name == "c"
     assert choose([*COLD, slow], target("80ms")).name == "slow"
     assert choose([*COLD, slow], target("12ms", period_us=71_000.0)).name == "slow"
 
 
-def test_boards_get_only_what_they_can_be_told() -> None:
+def test_boards_get_only_what_they_can_be_told():
     half = point("half", 0.89, 300e3, touch_sweeps=2)
     assert choose([*COLD, half], target("10ms")).name == "c"
     assert (
@@ -93,19 +88,19 @@ def test_boards_get_only_what_they_can_be_told() -> None:
         ("70000instructions", Budget(70_000, "instructions")),
     ],
 )
-def test_budgets_are_read(text: str, budget: Budget) -> None:
+def test_budgets_are_read(text, budget):
     assert read_budget(text) == budget
 
 
 @pytest.mark.parametrize(
     "text", ["", "10", "ms", "-3ms", "0ms", "1e400ms", "nanms", "3 parsecs", "1ms2"]
 )
-def test_what_is_no_budget_is_refused(text: str) -> None:
+def test_what_is_no_budget_is_refused(text):
     with pytest.raises(UsageError, match="--budget"):
         read_budget(text)
 
 
-def test_files_that_are_no_results_are_refused(tmp_path: Path) -> None:
+def test_files_that_are_no_results_are_refused(tmp_path):
     for text in ("", "[]", "{}", '{"format": "eitskin-tradeoff", "version": 2}', "\x00"):
         path = tmp_path / "front.json"
         path.write_text(text)

@@ -81,7 +81,7 @@ def assert_whole(figure: Any) -> None:
 
 @pytest.mark.parametrize("name", SKINS)
 @pytest.mark.parametrize("count", (1, 2, 12))
-def test_every_text_is_whole(name: str, count: int) -> None:
+def test_every_text_is_whole(name, count):
     skin = SKINS[name]
     figure = panels_figure(
         skin, grid_for(skin.outline), panels(skin, count), title=LONG, note=NOTE, legend=True
@@ -97,7 +97,7 @@ def test_every_text_is_whole(name: str, count: int) -> None:
 
 
 @pytest.mark.parametrize("name", SKINS)
-def test_one_frame_at_large_is_whole(name: str) -> None:
+def test_one_frame_at_large_is_whole(name):
     skin = SKINS[name]
     panel = panels(skin, 1)[0]
     assert panel.values is not None
@@ -109,7 +109,7 @@ def test_one_frame_at_large_is_whole(name: str) -> None:
     )  # fmt: skip
 
 
-def test_words_that_are_too_long_are_cut() -> None:
+def test_words_that_are_too_long_are_cut():
     assert "".join(wrapped("W" * 300, 2.0, 8)) == "W" * 300
     assert len(wrapped("W" * 300, 2.0, 8)) > 8
     assert wrapped("one two\nthree", 5.0, 8) == ["one two", "three"]
@@ -118,7 +118,7 @@ def test_words_that_are_too_long_are_cut() -> None:
 @pytest.mark.parametrize(
     ("name", "begins"), [("a.png", b"\x89PNG"), ("a.svg", b"<?xml"), ("a.PDF", b"%PDF")]
 )
-def test_the_suffix_says_the_format(tmp_path: Path, name: str, begins: bytes) -> None:
+def test_the_suffix_says_the_format(tmp_path, name, begins):
     skin = SKINS["disk"]
     written = []
     for folder in ("one", "two"):
@@ -133,7 +133,7 @@ def test_the_suffix_says_the_format(tmp_path: Path, name: str, begins: bytes) ->
 
 
 @pytest.mark.parametrize("kind", ("webp", "gif"))
-def test_a_film_of_frames(tmp_path: Path, kind: str) -> None:
+def test_a_film_of_frames(tmp_path, kind):
     from PIL import Image
 
     from eitskin.view.film import MAX_FRAMES, draw_film, thinned

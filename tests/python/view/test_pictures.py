@@ -30,7 +30,7 @@ def blob(grid: Grid, x: float, y: float) -> np.ndarray:
     return np.exp(-((grid.centres_mm() - (x, y)) ** 2).sum(axis=1) / 150)
 
 
-def test_a_frame_is_drawn_and_repeats_byte_for_byte(tmp_path: Path) -> None:
+def test_a_frame_is_drawn_and_repeats_byte_for_byte(tmp_path):
     files = [tmp_path / "a.png", tmp_path / "b.png"]
     for file in files:
         truth, found = [Mark(30, 20, 9, 0.05)], [Mark(31, 20)]
@@ -44,7 +44,7 @@ def test_a_frame_is_drawn_and_repeats_byte_for_byte(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
 
 
-def test_red_is_where_the_change_is(tmp_path: Path) -> None:
+def test_red_is_where_the_change_is(tmp_path):
     """The image panel drawn alone: the reddest place has the blob's coordinates, the bluest those
     of its negative."""
     matplotlib = pictures.load_matplotlib()
@@ -62,7 +62,7 @@ def test_red_is_where_the_change_is(tmp_path: Path) -> None:
         assert (x0 + x * (x1 - x0), y0 + y * (y1 - y0)) == pytest.approx((-40, 55), abs=4)
 
 
-def test_electrodes_are_numbered_from_0_outside_the_rim() -> None:
+def test_electrodes_are_numbered_from_0_outside_the_rim():
     skin = Skin(
         "ell",
         polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)]),
@@ -77,7 +77,7 @@ def test_electrodes_are_numbered_from_0_outside_the_rim() -> None:
     assert np.hypot(*(places - skin.electrode_centres_mm()).T) == pytest.approx(0.055 * 120)
 
 
-def test_frame_without_truth_has_two_panels_and_units(tmp_path: Path) -> None:
+def test_frame_without_truth_has_two_panels_and_units(tmp_path):
     draw_frame(tmp_path / "two.png", SKIN, GRID, np.zeros(GRID.n_pixels), unit="mS/m")
     draw_frame(
         tmp_path / "three.png", SKIN, GRID, np.zeros(GRID.n_pixels), truth=[Mark(0, 0, 9, 1.0)]
@@ -85,7 +85,7 @@ def test_frame_without_truth_has_two_panels_and_units(tmp_path: Path) -> None:
     assert read(tmp_path / "three.png").shape[1] > 1.3 * read(tmp_path / "two.png").shape[1]
 
 
-def test_many_panels(tmp_path: Path) -> None:
+def test_many_panels(tmp_path):
     panels = [
         Panel(str(k), blob(GRID, 10 * k, 0), (Mark(10 * k, 0, 9),), (Mark(10 * k, 1, 8),))
         for k in range(5)
@@ -95,18 +95,18 @@ def test_many_panels(tmp_path: Path) -> None:
     assert 0.7 < height / width < 1.1  # two rows of three, a bar, a note
 
 
-def test_a_folder_that_is_not_there_is_a_file_error(tmp_path: Path) -> None:
+def test_a_folder_that_is_not_there_is_a_file_error(tmp_path):
     with pytest.raises(FileError, match="existing folder"):
         draw_frame(tmp_path / "none" / "a.png", SKIN, GRID, np.zeros(GRID.n_pixels))
 
 
-def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_matplotlib_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtraError, match=r"eitskin\[plot\]"):
         pictures.load_matplotlib()
 
 
-def test_a_known_place_is_an_ellipse_of_ninety_percent() -> None:
+def test_a_known_place_is_an_ellipse_of_ninety_percent():
     """Turned as the covariance is, and absent where it is not known."""
     from matplotlib.patches import Ellipse
 

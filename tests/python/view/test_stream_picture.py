@@ -1,7 +1,5 @@
 """Pictures of a stream: one frame, many, and more than are kept."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -35,13 +33,13 @@ def album(count: int) -> Album:
 
 
 @pytest.mark.parametrize("count", [1, 2, 50])
-def test_pictures(count: int, tmp_path: Path) -> None:
+def test_pictures(count, tmp_path):
     path = tmp_path / "picture.png"
     draw_stream(path, prebuilt()[0], album(count), title="a board")
     assert path.read_bytes()[:8] == PNG and path.stat().st_size > 5000
 
 
-def test_a_long_stream_is_thinned_and_its_last_frame_kept() -> None:
+def test_a_long_stream_is_thinned_and_its_last_frame_kept():
     long = album(5 * MAX_KEPT + 3)
     numbers = [one.frame.number for one in long.frames]
     assert len(numbers) == MAX_PANELS and numbers[0] == 0 and numbers[-1] == 5 * MAX_KEPT + 2

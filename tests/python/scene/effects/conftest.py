@@ -19,12 +19,12 @@ def small_mesh() -> Mesh:
 
 
 @pytest.fixture(scope="session")
-def v0(small_mesh: Mesh) -> FloatArray:
+def v0(small_mesh) -> FloatArray:
     return ForwardModel(small_mesh, paper_skin(), adjacent(16), 0.0).voltages(0.01)
 
 
 @pytest.fixture
-def make_session(small_mesh: Mesh, v0: FloatArray) -> MakeSession:
+def make_session(small_mesh, v0) -> MakeSession:
     """Sessions on the paper's skin; ``drawn`` records the streams that were asked for."""
 
     def make(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray, MakeSession
+from effect_types import FloatArray
 
 from eitskin.scene.compiler import MeshCache, compile_scene
 from eitskin.scene.description import scene_from_table
@@ -89,7 +89,7 @@ def _made(name: str, session: EffectSession) -> Any:
     return module, module.make(module.Parameters(**values), session)
 
 
-def test_every_effect_is_looked_at() -> None:
+def test_every_effect_is_looked_at():
     assert set(STRONG) == set(BUILT_IN)
     assert not (KEEP | RANDOM) - set(BUILT_IN)
 
@@ -100,7 +100,7 @@ def plain() -> FloatArray:
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_reciprocity(name: str, plain: FloatArray) -> None:
+def test_reciprocity(name, plain):
     v = _frames({name: STRONG[name]})
     assert np.abs(v - plain).max() > 1e-4 * np.abs(plain).max()  # it does something
     if name in KEEP:
@@ -110,14 +110,14 @@ def test_reciprocity(name: str, plain: FloatArray) -> None:
 
 
 def test_without_effects_the_sheet_is_reciprocal_and_all_kept_together_keep_it(
-    plain: FloatArray,
-) -> None:
+    plain,
+):
     assert _irreciprocity(plain[-1]) < 1e-10
     assert _irreciprocity(_frames({name: STRONG[name] for name in sorted(KEEP)})[-1]) < 1e-9
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_streams_are_the_effects_own(name: str, make_session: MakeSession) -> None:
+def test_streams_are_the_effects_own(name, make_session):
     """It draws from streams of its own name only; without randomness it asks for none."""
     drawn: list[str] = []
     _, step = _made(name, make_session(drawn=drawn))
@@ -130,14 +130,14 @@ def test_streams_are_the_effects_own(name: str, make_session: MakeSession) -> No
 
 
 @pytest.mark.parametrize("name", sorted(RANDOM))
-def test_a_seed_makes_the_same_frames_and_another_others(name: str) -> None:
+def test_a_seed_makes_the_same_frames_and_another_others(name):
     first = _frames({name: STRONG[name]})
     assert np.array_equal(first, _frames({name: STRONG[name]}))
     assert not np.array_equal(first, _frames({name: STRONG[name]}, seed=6))
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_a_step_is_a_pure_function(name: str, make_session: MakeSession) -> None:
+def test_a_step_is_a_pure_function(name, make_session):
     """Applied twice, out of order, it gives the same and leaves its arguments as they are."""
     module, step = _made(name, make_session())
     assert step.name == name and step.stage is module.STAGE and step.note
@@ -158,7 +158,7 @@ def test_a_step_is_a_pure_function(name: str, make_session: MakeSession) -> None
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_an_effect_declares_what_it_is(name: str) -> None:
+def test_an_effect_declares_what_it_is(name):
     module = importlib.import_module(BUILT_IN[name])
     assert name == module.NAME and isinstance(module.STAGE, Stage) and module.SUMMARY.endswith(".")
     assert summary_of(BUILT_IN[name]) == module.SUMMARY and Registry().load(name, "f") is module
@@ -174,7 +174,7 @@ def test_an_effect_declares_what_it_is(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_the_page_has_every_effect_and_parameter(name: str) -> None:
+def test_the_page_has_every_effect_and_parameter(name):
     folder = Path(__file__).resolve().parents[4] / "docs" / "reference" / "effects"
     page = (folder / "README.md").read_text(encoding="utf-8")
     section = " ".join(page.split(f"\n## {name}\n", 1)[1].split("\n## ", 1)[0].split())
@@ -188,7 +188,7 @@ def test_the_page_has_every_effect_and_parameter(name: str) -> None:
     assert 2_000 < (folder / f"{name}.png").stat().st_size < 60_000
 
 
-def test_misplacement_and_outline_are_the_only_geometry_steps() -> None:
+def test_misplacement_and_outline_are_the_only_geometry_steps():
     stages = {name: importlib.import_module(module).STAGE for name, module in BUILT_IN.items()}
     found = [name for name, stage in stages.items() if stage is Stage.GEOMETRY]
     assert found == ["out_of_round", "misplacement"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray, MakeSession
+from effect_types import FloatArray
 
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
@@ -31,7 +31,7 @@ def _impedance(session: EffectSession, mean: float, spread: float = 0.0) -> Floa
     return step.apply(_ideal(), 0.0, 0).impedance_ohm_m2
 
 
-def test_impedances_lie_within_their_spread(make_session: MakeSession) -> None:
+def test_impedances_lie_within_their_spread(make_session):
     z = _impedance(make_session(), 0.02, 0.25)
     assert 0.015 <= z.min() < 0.018 and 0.022 < z.max() <= 0.025
     assert np.array_equal(_impedance(make_session(), 0.02), np.full(16, 0.02))
@@ -65,9 +65,7 @@ def _bar(cells: int = 8) -> tuple[Mesh, Skin]:
 
 @pytest.mark.parametrize("hertz", [100.0, 5e3, 50e3, 1e6])
 @pytest.mark.parametrize("resistance", [0.0, 0.003, 0.1])
-def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(
-    make_session: MakeSession, hertz: float, resistance: float
-) -> None:
+def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(make_session, hertz, resistance):
     """A bar with whole ends as electrodes: Z = length / ((sigma + j w eps) area) + 2 (R || C) /
     area, exactly."""
     mesh, skin = _bar()
@@ -103,7 +101,7 @@ def _only_ends(step: PhaseStep) -> PhaseStep:
     return replace(step, contact=lambda z: np.where(np.arange(len(z)) < 2, z + 0j, inner(z)))
 
 
-def test_the_interface_is_a_resistance_parallel_to_a_capacitance() -> None:
+def test_the_interface_is_a_resistance_parallel_to_a_capacitance():
     z = np.array([0.0, 0.01, 0.5, 1e6])
     slow, corner = phase.interface(z, 1e-6, 0.1), phase.interface(z, 1 / (2 * pi * 0.01 * 0.1), 0.1)
     np.testing.assert_allclose(slow, z, rtol=1e-6)
@@ -124,7 +122,7 @@ def test_the_interface_is_a_resistance_parallel_to_a_capacitance() -> None:
     assert y[0].imag == pytest.approx(2.2253e-4, rel=1e-3)
 
 
-def test_detached_electrodes_are_marked_while_they_are_off(make_session: MakeSession) -> None:
+def test_detached_electrodes_are_marked_while_they_are_off(make_session):
     step = detached.make(detached.Parameters((2, 9), from_s=1.0, until_s=2.0), make_session())
     assert step.varies
     for time_s, off in ((-0.1, False), (0.99, False), (1.0, True), (1.99, True), (2.0, False)):
@@ -148,8 +146,6 @@ def test_detached_electrodes_are_marked_while_they_are_off(make_session: MakeSes
         (lambda s: contact_impedance.Parameters(spread=1.0), "must be below 1"),
     ],
 )  # fmt: skip
-def test_impossible_contacts_are_refused(
-    make_session: MakeSession, build: Any, message: str
-) -> None:
+def test_impossible_contacts_are_refused(make_session, build, message):
     with pytest.raises(ConfigError, match=message):
         build(make_session())

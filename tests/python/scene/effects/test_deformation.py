@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import MakeSession
 
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
@@ -39,9 +38,7 @@ STRIP = Skin(
     ("along", "across", "ratio"),
     [(1.5, 1.5**-0.5, 1.5**2), (1.2, 1.0, 1.2**2), (1 / 1.2, 1.0, 1.2**-2), (1.3, 1.3, 1.3**2)],
 )
-def test_a_strip_resists_by_the_square_of_its_length(
-    along: float, across: float, ratio: float
-) -> None:
+def test_a_strip_resists_by_the_square_of_its_length(along, across, ratio):
     """length / (width thickness) at constant volume."""
     model = ForwardModel(
         mesh_for_elements(STRIP, 2000), STRIP, table(4, [[0, 3, 1, 2], [0, 3, 2, 1]])
@@ -53,14 +50,14 @@ def test_a_strip_resists_by_the_square_of_its_length(
     assert abs(flat[0]) == pytest.approx(1e-3 * 0.1 / (0.01 * 0.01 * 0.012), rel=0.02)
 
 
-def test_deformations_follow_each_other() -> None:
+def test_deformations_follow_each_other():
     back = one_after_another([stretched(1.2, 0.9, 30), stretched(1 / 1.2, 1 / 0.9, 30)])
     assert np.allclose(back.matrix, np.eye(2)) and back.thickness == pytest.approx(1)
     turned = stretched(2, 1, 90)
     assert np.allclose(turned.matrix, [[1, 0], [0, 2]]) and turned.thickness == 0.5
 
 
-def test_a_bend_conducts_as_its_layers_do() -> None:
+def test_a_bend_conducts_as_its_layers_do():
     for radius_mm, neutral in ((100.0, 0.0), (100.0, 0.5), (-80.0, 0.2)):
         heights = (np.arange(10_000) + 0.5) / 10_000 - neutral
         layers = np.mean((1 + 12 * heights / radius_mm) ** -2.0)
@@ -70,12 +67,12 @@ def test_a_bend_conducts_as_its_layers_do() -> None:
         assert how.thickness * how.xx / how.yy == pytest.approx(1)
 
 
-def test_a_sheet_is_bent_over_more_than_its_thickness(make_session: MakeSession) -> None:
+def test_a_sheet_is_bent_over_more_than_its_thickness(make_session):
     with pytest.raises(ConfigError, match="radius_mm = -12"):
         bend.make(bend.Parameters(radius_mm=-12.0), make_session())
 
 
-def test_creep_comes_and_goes() -> None:
+def test_creep_comes_and_goes():
     law = creep.Parameters(strain=0.1, creep=0.5, time_constant_s=10, at_s=5, until_s=25)
     crept = 0.05 * (1 - exp(-2))
     expected = {4.9: 0.0, 5.0: 0.1, 25 - 1e-9: 0.1 + crept, 25.0: crept, 35.0: crept * exp(-1)}
@@ -91,7 +88,7 @@ def _voltages(**effects: dict[str, Any]) -> Any:
     return simulate_frames(compiled).voltage_v, compiled
 
 
-def test_the_tare_is_the_flat_skins_unless_it_begins_before() -> None:
+def test_the_tare_is_the_flat_skins_unless_it_begins_before():
     flat, _ = _voltages()
     late, compiled = _voltages(stretch={"strain": 0.1, "at_s": 1.0})
     assert len(compiled.states) == 3
@@ -101,7 +98,7 @@ def test_the_tare_is_the_flat_skins_unless_it_begins_before() -> None:
     assert np.array_equal(always[4], late[4]) and not np.array_equal(always[0], flat[0])
 
 
-def test_a_scene_is_solved_on_the_deformed_sheet_and_contacts() -> None:
+def test_a_scene_is_solved_on_the_deformed_sheet_and_contacts():
     content = {
         "scene": {"frames": 1, "quiet_frames": 1, "elements": 800},
         "effects": {
@@ -115,7 +112,7 @@ def test_a_scene_is_solved_on_the_deformed_sheet_and_contacts() -> None:
     assert np.allclose(simulate_frames(compiled).voltage_v, direct, rtol=1e-12, atol=0)
 
 
-def test_effects_meet() -> None:
+def test_effects_meet():
     """A bend is the stretch that it says, also beside another and with a phase; frames of a creep
     differ."""
     along = bend.lengthening(bend.Parameters(200.0), 12.0, 1.0)
@@ -126,7 +123,7 @@ def test_effects_meet() -> None:
     assert np.allclose(bent, pulled, rtol=1e-12) and len(np.unique(bent[2:, 0])) == 4
 
 
-def test_free_sides_come_in(make_session: MakeSession) -> None:
+def test_free_sides_come_in(make_session):
     free, held = (
         stretch.make(stretch.Parameters(strain=0.21, sides=sides), make_session()).apply(1.0, 9)
         for sides in ("free", "held")

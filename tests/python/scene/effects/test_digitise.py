@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray, MakeSession
+from effect_types import FloatArray
 
 from eitskin.errors import ConfigError
 from eitskin.scene.effects import adc, jitter, noise, saturation
@@ -16,9 +16,7 @@ def _frames(step: Any, v: FloatArray, count: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("snr_db", [20.0, 60.0, 90.0])
-def test_snr_is_the_ratio_of_rms_to_deviation(
-    make_session: MakeSession, v0: FloatArray, snr_db: float
-) -> None:
+def test_snr_is_the_ratio_of_rms_to_deviation(make_session, v0, snr_db):
     session = make_session()
     step = noise.make(noise.Parameters(snr_db=snr_db), session)
     error = _frames(step, v0, 500) - v0
@@ -32,7 +30,7 @@ def test_snr_is_the_ratio_of_rms_to_deviation(
     assert max(abs(neighbours), abs(in_time)) < 4 / sqrt(error.size)
 
 
-def test_noise_in_volts_and_its_default(make_session: MakeSession, v0: FloatArray) -> None:
+def test_noise_in_volts_and_its_default(make_session, v0):
     session = make_session()
     assert noise.deviation_v(noise.Parameters(noise_v=3e-4), session) == 3e-4
     assert noise.deviation_v(noise.Parameters(), session) == pytest.approx(
@@ -43,9 +41,7 @@ def test_noise_in_volts_and_its_default(make_session: MakeSession, v0: FloatArra
 
 
 @pytest.mark.parametrize("bits", [6, 12, 16])
-def test_quantisation_error_has_the_variance_of_a_uniform_step(
-    make_session: MakeSession, bits: int
-) -> None:
+def test_quantisation_error_has_the_variance_of_a_uniform_step(make_session, bits):
     session = make_session()
     step = adc.make(adc.Parameters(bits=bits, range_v=2.0), session)
     lsb = 4.0 / 2**bits
@@ -60,16 +56,14 @@ def test_quantisation_error_has_the_variance_of_a_uniform_step(
     assert snr == pytest.approx(6.02 * bits + 1.76, abs=0.4)
 
 
-def test_codes_are_whole_and_end_where_twos_complement_does(make_session: MakeSession) -> None:
+def test_codes_are_whole_and_end_where_twos_complement_does(make_session):
     step = adc.make(adc.Parameters(bits=8, range_v=1.0), make_session())
     lsb = 2 / 256
     out = step.apply(np.array([-9.0, -1.0, -0.4 * lsb, 0.0, 0.6 * lsb, 1.0, 9.0]), 0.0, 0)
     np.testing.assert_array_equal(out / lsb, [-128, -128, 0, 0, 1, 127, 127])
 
 
-def test_headroom_counts_from_the_largest_untouched_voltage(
-    make_session: MakeSession, v0: FloatArray
-) -> None:
+def test_headroom_counts_from_the_largest_untouched_voltage(make_session, v0):
     session = make_session()
     assert adc.range_v(adc.Parameters(headroom=2.0), session) == pytest.approx(2 * np.abs(v0).max())
     assert saturation.limit_v(saturation.Parameters(headroom=0.5), session) == pytest.approx(
@@ -83,7 +77,7 @@ def test_headroom_counts_from_the_largest_untouched_voltage(
             both()
 
 
-def test_saturation_clips_exactly(make_session: MakeSession) -> None:
+def test_saturation_clips_exactly(make_session):
     step = saturation.make(saturation.Parameters(limit_v=0.7), make_session())
     v = np.array([-5.0, -0.7000001, -0.7, -0.3, 0.0, 0.69, 0.7, 0.70001, 1e9])
     np.testing.assert_array_equal(
@@ -102,9 +96,7 @@ def _demodulated(s: float, samples: int, trials: int) -> FloatArray:
 @pytest.mark.parametrize(
     ("jitter_ns", "samples"), [(10.0, 64), (300.0, 64), (2000.0, 16), (6000.0, 32)]
 )
-def test_jitter_is_what_a_demodulator_of_jittered_samples_finds(
-    make_session: MakeSession, jitter_ns: float, samples: int
-) -> None:
+def test_jitter_is_what_a_demodulator_of_jittered_samples_finds(make_session, jitter_ns, samples):
     """At 50 kHz: s of 0.003 to 1.9 rad."""
     parameters = jitter.Parameters(jitter_ns=jitter_ns, samples=samples)
     mean, deviation = jitter.amplitude_error(parameters)

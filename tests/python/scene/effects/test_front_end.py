@@ -2,11 +2,9 @@
 
 from dataclasses import replace
 from math import exp, pi, sin
-from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray, MakeSession
 
 from eitskin.scene.effect import Loads
 from eitskin.scene.effects import channel_gain, charge_injection, common_mode, crosstalk, mains, mux
@@ -20,15 +18,13 @@ def _loads(m: int = 208, seed: int = 3) -> Loads:
     return Loads(source, sink, plus, minus, 1e-3)
 
 
-def test_channels_of_adjacent_measurement_are_the_sixteen_pairs() -> None:
+def test_channels_of_adjacent_measurement_are_the_sixteen_pairs():
     pairs, number = channels(adjacent(16))
     assert pairs.shape == (16, 2)
     assert np.array_equal(pairs[number], adjacent(16).drive_measure[:, 2:])
 
 
-def test_a_channel_has_one_gain_within_its_spread(
-    make_session: MakeSession, v0: FloatArray
-) -> None:
+def test_a_channel_has_one_gain_within_its_spread(make_session, v0):
     session = make_session()
     gain = channel_gain.make(channel_gain.Parameters(0.05), session).apply(np.ones(208), 0.0, 0)
     _, number = channels(session.protocol)
@@ -43,9 +39,7 @@ def test_a_channel_has_one_gain_within_its_spread(
 
 
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 3.0, 30.0])
-def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(
-    make_session: MakeSession, ratio: float
-) -> None:
+def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(make_session, ratio):
     """From a single step in the scan: the rows after it, each by itself, against exp(-t / tau)."""
     parameters = mux.Parameters(on_resistance_ohm=0.0, settling_us=10.0, dwell_us=10.0 * ratio)
     step = mux.make(parameters, make_session())
@@ -63,15 +57,13 @@ def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(
 
 
 @pytest.mark.parametrize("left", [0.0, 0.01, 0.6, 0.99, 0.999])
-def test_settling_is_the_periodic_recurrence(left: float) -> None:
+def test_settling_is_the_periodic_recurrence(left):
     target = np.random.default_rng(2).standard_normal(208)
     found = settled_from_the_row_before(target, left)
     np.testing.assert_allclose(found, target + left * (np.roll(found, 1) - target), atol=1e-11)
 
 
-def test_settling_depends_on_the_order_of_the_scan(
-    make_session: MakeSession, v0: FloatArray
-) -> None:
+def test_settling_depends_on_the_order_of_the_scan(make_session, v0):
     session = make_session()
     parameters = mux.Parameters(settling_us=50.0)
     order = np.random.default_rng(4).permutation(208)
@@ -84,7 +76,7 @@ def test_settling_depends_on_the_order_of_the_scan(
     assert np.array_equal(mux.make(settled, turned).apply(v0[order], 0.0, 0), straight)
 
 
-def test_on_resistance_divides(make_session: MakeSession) -> None:
+def test_on_resistance_divides(make_session):
     parameters = mux.Parameters(
         on_resistance_ohm=100.0, input_resistance_ohm=800.0, settling_us=0.0
     )
@@ -94,7 +86,7 @@ def test_on_resistance_divides(make_session: MakeSession) -> None:
     assert 800 / 1100 <= spread.min() < 0.79 and 0.81 < spread.max() <= 800 / 900
 
 
-def test_switched_lines() -> None:
+def test_switched_lines():
     rows = table(8, [[0, 1, 2, 3], [0, 1, 3, 4], [1, 2, 3, 4], [1, 2, 5, 4]])
     assert switched(rows).tolist() == [
         [True, True, True, True],
@@ -124,13 +116,13 @@ def _quadrature(p: charge_injection.Parameters) -> float:
         ),
     ],
 )
-def test_what_a_demodulator_keeps_of_injected_charge(parameters: Any) -> None:
+def test_what_a_demodulator_keeps_of_injected_charge(parameters):
     assert charge_injection.kept_by_demodulator(parameters) == pytest.approx(
         _quadrature(parameters), rel=1e-6
     )
 
 
-def test_injected_charge_is_q_over_c_on_lines_that_switch(make_session: MakeSession) -> None:
+def test_injected_charge_is_q_over_c_on_lines_that_switch(make_session):
     """One line switches, the other stays: exactly Q / C, with the line's sign, whatever the
     signal."""
     session = replace(
@@ -147,7 +139,7 @@ def test_injected_charge_is_q_over_c_on_lines_that_switch(make_session: MakeSess
     assert 0 < abs(uneven[0]) <= 0.8 * unit and uneven[2] == 0
 
 
-def test_crosstalk_comes_from_driven_wires_beside(make_session: MakeSession) -> None:
+def test_crosstalk_comes_from_driven_wires_beside(make_session):
     rows = [[0, 1, 2, 3], [3, 8, 2, 5], [8, 3, 4, 2], [0, 5, 15, 10], [0, 8, 4, 12], [7, 5, 6, 12]]
     session = replace(make_session(), protocol=table(16, rows))
     loads, part = _loads(6), 10 ** (-40 / 20)
@@ -163,9 +155,7 @@ def test_crosstalk_comes_from_driven_wires_beside(make_session: MakeSession) -> 
 @pytest.mark.parametrize(
     ("frequency_hz", "alias"), [(50.0, 10.0), (60.0, 0.0), (50.3, 9.7), (47.0, 7.0)]
 )
-def test_mains_aliases_at_its_frequency_and_amplitude(
-    make_session: MakeSession, frequency_hz: float, alias: float
-) -> None:
+def test_mains_aliases_at_its_frequency_and_amplitude(make_session, frequency_hz, alias):
     """400 frames at 20 Hz: the spectrum of any row has one line, at the alias, with the amplitude
     given."""
     session = make_session(n_frames=400, quiet_frames=0)
@@ -190,9 +180,7 @@ def test_mains_aliases_at_its_frequency_and_amplitude(
 
 
 @pytest.mark.parametrize("cmrr_db", [0.0, 40.0, 80.0])
-def test_common_mode_is_the_inputs_mean_over_the_rejection(
-    make_session: MakeSession, cmrr_db: float
-) -> None:
+def test_common_mode_is_the_inputs_mean_over_the_rejection(make_session, cmrr_db):
     loads, v = _loads(), np.linspace(-1, 1, 208)
     middle = (loads.plus_v + loads.minus_v) / 2
     for ground, common in (("sink", middle - loads.sink_v), ("mean", middle)):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray, MakeSession
+from effect_types import FloatArray
 
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
@@ -38,7 +38,7 @@ def _direct(impedance: Any = 0.0, protocol: Protocol | None = None) -> FloatArra
 
 @pytest.mark.parametrize("contact", [{}, {"contact_impedance": {"mean_ohm_m2": 0.02}}])
 @pytest.mark.parametrize("ohm", [0.0, 1.0, 300.0, 1e5, 1e9])
-def test_a_bridge_is_a_resistor_parallel_to_the_skin(ohm: float, contact: dict[str, Any]) -> None:
+def test_a_bridge_is_a_resistor_parallel_to_the_skin(ohm, contact):
     """Seen from electrodes 3 and 4 the skin is R_34: a bridge leaves R / (R + R_34) of their
     voltage."""
     rows = table(16, [[3, 4, 3, 4], [0, 8, 3, 4], [12, 5, 4, 3]])
@@ -50,7 +50,7 @@ def test_a_bridge_is_a_resistor_parallel_to_the_skin(ohm: float, contact: dict[s
     )
 
 
-def test_bridged_without_resistance_electrodes_are_at_one_potential() -> None:
+def test_bridged_without_resistance_electrodes_are_at_one_potential():
     """A chain of three: rows between its electrodes read 0 V, all others the same on each of
     them."""
     rows = table(
@@ -74,9 +74,7 @@ def test_bridged_without_resistance_electrodes_are_at_one_potential() -> None:
 
 @pytest.mark.parametrize("others", [{}, {"contact_impedance": {"mean_ohm_m2": 0.01}}])
 @pytest.mark.parametrize("electrodes", [[5], [0, 15], [2, 3, 11]])
-def test_detached_electrodes_carry_no_signal_and_leave_the_rest(
-    electrodes: list[int], others: dict[str, Any]
-) -> None:
+def test_detached_electrodes_carry_no_signal_and_leave_the_rest(electrodes, others):
     v = _last({**others, "detached": {"electrodes": electrodes}})
     impedance = np.full(16, others["contact_impedance"]["mean_ohm_m2"] if others else 0.0)
     impedance[electrodes] = 1e5
@@ -87,7 +85,7 @@ def test_detached_electrodes_carry_no_signal_and_leave_the_rest(
     assert np.abs(v - _direct())[~lost].max() > 1e-4  # an insulated rim is not a shunted one
 
 
-def test_a_wobbling_electrode_is_lost_for_a_while() -> None:
+def test_a_wobbling_electrode_is_lost_for_a_while():
     effects = {"detached": {"electrodes": [5], "from_s": 0.1, "until_s": 0.2}}
     compiled = _compiled(effects, frames=6, rate_hz=20.0)
     done = simulate_frames(compiled)
@@ -97,7 +95,7 @@ def test_a_wobbling_electrode_is_lost_for_a_while() -> None:
     assert np.array_equal(done.voltage_v[0], done.voltage_v[-1]) and len(compiled.states) == 2
 
 
-def test_phase_leaves_detached_electrodes_detached() -> None:
+def test_phase_leaves_detached_electrodes_detached():
     """The double layer would else shunt what does not touch."""
     off = {"detached": {"electrodes": [5]}, "contact_impedance": {"mean_ohm_m2": 0.01}}
     slow = {
@@ -112,7 +110,7 @@ def test_phase_leaves_detached_electrodes_detached() -> None:
     )
 
 
-def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor() -> None:
+def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor():
     effects = {"phase": {"frequency_hz": 50e3, "relative_permittivity": 80.0}}
     compiled = _compiled(effects)
     done = simulate_frames(compiled)
@@ -125,7 +123,7 @@ def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor() -> None:
 
 
 @pytest.mark.parametrize(("hertz", "with_phase"), [(0.0, False), (50e3, False), (50e3, True)])
-def test_source_impedance_divides_the_current(hertz: float, with_phase: bool) -> None:
+def test_source_impedance_divides_the_current(hertz, with_phase):
     """The load is what a row measures on the driven electrodes themselves."""
     rows = table(16, [[0, 8, 0, 8], [0, 8, 3, 4], [1, 2, 1, 2], [1, 2, 9, 11]])
     source = {
@@ -142,7 +140,7 @@ def test_source_impedance_divides_the_current(hertz: float, with_phase: bool) ->
     assert 0.3 < abs(share).min() < abs(share).max() < 0.9
 
 
-def test_a_sheets_factor_divides_the_voltages_of_shunts() -> None:
+def test_a_sheets_factor_divides_the_voltages_of_shunts():
     more: dict[str, Any] = {"frames": 5, "rate_hz": 0.01}
     warm = {"offset_k": 3.0, "drift_k_per_min": 0.1}
     dry = {"time_constant_h": 0.1}
@@ -154,14 +152,14 @@ def test_a_sheets_factor_divides_the_voltages_of_shunts() -> None:
         np.testing.assert_allclose(done[frame], _direct() / factor, rtol=1e-9)
 
 
-def test_contact_impedance_is_the_forward_models() -> None:
+def test_contact_impedance_is_the_forward_models():
     compiled = _compiled({"contact_impedance": {"mean_ohm_m2": 0.03, "spread": 0.5}})
     drawn = compiled.states[0].contacts.impedance_ohm_m2
     assert np.ptp(drawn) > 0.01
     assert np.array_equal(simulate_frames(compiled).voltage_v[-1], _direct(drawn))
 
 
-def test_misplacement_is_the_forward_models_on_the_moved_skin(make_session: MakeSession) -> None:
+def test_misplacement_is_the_forward_models_on_the_moved_skin(make_session):
     compiled = _compiled({"misplacement": {"spread_mm": 3.0}})
     skin = misplacement.make(misplacement.Parameters(3.0), make_session(seed=3)).apply(paper_skin())
     assert compiled.skin == skin
@@ -170,7 +168,7 @@ def test_misplacement_is_the_forward_models_on_the_moved_skin(make_session: Make
     assert np.abs(direct - _direct()).max() > 0.01
 
 
-def test_common_mode_with_a_grounded_sink() -> None:
+def test_common_mode_with_a_grounded_sink():
     """Row [0, 8, 3, 12]: the common voltage is the mean of what [0, 8, 3, 8] and [0, 8, 12, 8]
     read."""
     rows = table(16, [[0, 8, 3, 12], [0, 8, 3, 8], [0, 8, 12, 8]])
@@ -204,7 +202,7 @@ def test_common_mode_with_a_grounded_sink() -> None:
         ({"adc": {"bits": 0}}, r"\[effects.adc\].*bits.*at least 1"),
     ],
 )
-def test_impossible_parameters_name_table_and_key(effects: dict[str, Any], message: str) -> None:
+def test_impossible_parameters_name_table_and_key(effects, message):
     with pytest.raises(ConfigError, match=message) as caught:
         _compiled(effects)
     assert "\n" not in str(caught.value)

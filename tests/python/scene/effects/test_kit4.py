@@ -30,7 +30,7 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def measured(shared_data: Path) -> Frame:
+def measured(shared_data) -> Frame:
     path = shared_data / "kit4_dev.npz"
     if not path.is_file():
         pytest.skip(
@@ -61,7 +61,7 @@ def _irreciprocal(scene: Scene, v: FloatArray) -> FloatArray:
     return np.asarray(v[pairs.first] - pairs.sign * v[pairs.second])
 
 
-def test_the_scene_predicts_the_measured_difference(scene: Scene, measured: Frame) -> None:
+def test_the_scene_predicts_the_measured_difference(scene, measured):
     found = _predicted(scene, "common_mode", "misplacement")
     assert set(scene.effects) == {"common_mode", "misplacement"}
     assert (
@@ -70,9 +70,7 @@ def test_the_scene_predicts_the_measured_difference(scene: Scene, measured: Fram
     assert _correlation(found.saline, measured.saline) >= 0.999
 
 
-def test_the_rod_alone_is_enough_for_the_bound_and_its_place_is_needed(
-    scene: Scene, measured: Frame
-) -> None:
+def test_the_rod_alone_is_enough_for_the_bound_and_its_place_is_needed(scene, measured):
     assert _correlation(_predicted(scene).change, measured.change) >= 0.99
     track = scene.touches[0]
     for x_mm, y_mm, at_most in (
@@ -84,7 +82,7 @@ def test_the_rod_alone_is_enough_for_the_bound_and_its_place_is_needed(
         assert _correlation(_predicted(moved).change, measured.change) < at_most
 
 
-def test_each_effect_explains_a_part_of_the_saline_frame(scene: Scene, measured: Frame) -> None:
+def test_each_effect_explains_a_part_of_the_saline_frame(scene, measured):
     left = {
         effects: _unexplained(measured.saline, _predicted(scene, *effects).saline)
         for effects in ((), ("common_mode",), ("misplacement",), ("common_mode", "misplacement"))
@@ -95,7 +93,7 @@ def test_each_effect_explains_a_part_of_the_saline_frame(scene: Scene, measured:
     assert left["common_mode", "misplacement"] == pytest.approx(0.018, abs=0.002)
 
 
-def test_the_common_mode_predicts_what_breaks_reciprocity(scene: Scene, measured: Frame) -> None:
+def test_the_common_mode_predicts_what_breaks_reciprocity(scene, measured):
     """Its rejection was read off the saline frame; the rod's frame was not looked at for it."""
     found = _predicted(scene, "common_mode", "misplacement")
     for bound, seen, made in (

@@ -5,17 +5,16 @@ from math import exp
 
 import numpy as np
 import pytest
-from effect_types import MakeSession
 
 from eitskin.errors import ConfigError
-from eitskin.fem.mesh import Mesh, build_mesh
+from eitskin.fem.mesh import build_mesh
 from eitskin.scene.effects import background, gel_drying, misplacement, temperature
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.skin import Skin, paper_skin
 
 
-def test_gel_dries_exponentially_from_the_first_frame(make_session: MakeSession) -> None:
+def test_gel_dries_exponentially_from_the_first_frame(make_session):
     session = make_session(n_frames=100, quiet_frames=10, rate_hz=1 / 360)
     parameters = gel_drying.Parameters(time_constant_h=2.0, final_water=0.4, exponent=1.7)
     step = gel_drying.make(parameters, session)
@@ -33,7 +32,7 @@ def test_gel_dries_exponentially_from_the_first_frame(make_session: MakeSession)
     np.testing.assert_allclose(np.diff(np.log(free)), -0.5, rtol=1e-9)
 
 
-def test_temperature_is_linear_with_its_coefficient(make_session: MakeSession) -> None:
+def test_temperature_is_linear_with_its_coefficient(make_session):
     session = make_session(n_frames=121, quiet_frames=0, rate_hz=1.0)
     step = temperature.make(
         temperature.Parameters(offset_k=1.0, drift_k_per_min=2.0, coefficient_per_k=0.02), session
@@ -47,7 +46,7 @@ def test_temperature_is_linear_with_its_coefficient(make_session: MakeSession) -
     ).varies
 
 
-def test_a_temperature_that_would_empty_the_sheet_is_refused(make_session: MakeSession) -> None:
+def test_a_temperature_that_would_empty_the_sheet_is_refused(make_session):
     with pytest.raises(ConfigError, match="drift_k_per_min: over the session"):
         temperature.make(
             temperature.Parameters(drift_k_per_min=-100.0), make_session(n_frames=2000, rate_hz=1.0)
@@ -55,9 +54,7 @@ def test_a_temperature_that_would_empty_the_sheet_is_refused(make_session: MakeS
 
 
 @pytest.mark.parametrize("spread", [0.05, 0.5, 2.0])
-def test_the_backgrounds_mean_over_the_area_is_kept(
-    make_session: MakeSession, small_mesh: Mesh, spread: float
-) -> None:
+def test_the_backgrounds_mean_over_the_area_is_kept(make_session, small_mesh, spread):
     step = background.make(background.Parameters(spread, 25.0), make_session())
     sigma = step.apply(np.full(small_mesh.n_elements, 0.01), 0.0, 0)
     assert np.average(sigma, weights=small_mesh.areas_mm2) == pytest.approx(0.01, rel=1e-12)
@@ -65,7 +62,7 @@ def test_the_backgrounds_mean_over_the_area_is_kept(
     assert not step.varies
 
 
-def test_the_background_has_its_spread_and_its_length() -> None:
+def test_the_background_has_its_spread_and_its_length():
     """Over 300 draws: the deviation, and the correlation exp(-d^2 / 2 l^2) of the field under
     it."""
     places = np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 20.0], [200.0, 0.0]])
@@ -82,9 +79,7 @@ def test_the_background_has_its_spread_and_its_length() -> None:
     assert made.std() == pytest.approx(0.3, rel=0.1)
 
 
-def test_another_mesh_samples_the_same_background(
-    make_session: MakeSession, small_mesh: Mesh
-) -> None:
+def test_another_mesh_samples_the_same_background(make_session, small_mesh):
     finer = build_mesh(paper_skin(), max_size_mm=5.0, electrode_size_mm=1.0)
     session = make_session()
     other = replace(session, build_mesh=lambda: finer)
@@ -97,7 +92,7 @@ def test_another_mesh_samples_the_same_background(
     assert np.corrcoef(a[near], b)[0, 1] > 0.99
 
 
-def test_misplacement_moves_electrodes_along_the_rim(make_session: MakeSession) -> None:
+def test_misplacement_moves_electrodes_along_the_rim(make_session):
     session = make_session()
     step = misplacement.make(misplacement.Parameters(3.0), session)
     before, after = session.skin, step.apply(session.skin)
@@ -118,7 +113,7 @@ def test_misplacement_moves_electrodes_along_the_rim(make_session: MakeSession) 
     )
 
 
-def test_misplacement_keeps_given_places_and_refuses_overlap(make_session: MakeSession) -> None:
+def test_misplacement_keeps_given_places_and_refuses_overlap(make_session):
     skin = Skin("uneven", disk(100.0), Electrodes(4, 6.0, positions_mm=(0.0, 50.0, 150.0, 200.0)))
     moved = misplacement.shifted(skin, np.array([1.0, -1.0, 0.0, 2.0]))
     assert moved.electrodes.positions_mm == (1.0, 49.0, 150.0, 202.0)
@@ -126,7 +121,7 @@ def test_misplacement_keeps_given_places_and_refuses_overlap(make_session: MakeS
         misplacement.make(misplacement.Parameters(60.0), make_session())
 
 
-def test_known_shifts_are_taken_as_they_are(make_session: MakeSession) -> None:
+def test_known_shifts_are_taken_as_they_are(make_session):
     drawn: list[str] = []
     session = make_session(drawn=drawn)
     known = tuple(0.1 * k for k in range(16))
