@@ -174,31 +174,6 @@ def test_a_recording_without_raw_frames(refused, scene, tmp_path):
     assert "no raw frames" in refused(FRAME, "replay", path, "--frames", tmp_path / "x.npz")
 
 
-def test_images_that_are_none(refused, tmp_path, monkeypatch):
-    tool = tmp_path / "pyocd"
-    tool.write_text("#!/bin/sh\n", encoding="utf-8")
-    tool.chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    images = (
-        (b"\x7fELF" + bytes(600), "give the .bin"),
-        (bytes(1024), "no firmware image"),
-        (bytes(2**19), "room for"),
-    )
-    for content, text in images:
-        path = tmp_path / "image.bin"
-        path.write_bytes(content)
-        assert text in refused(DEVICE, "flash", "--image", path, "--dry-run")
-
-
-def test_no_tool_to_flash_with(refused, tmp_path, monkeypatch):
-    from test_cli_device import image_file
-
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert "apt install openocd" in refused(
-        DEVICE, "flash --image", image_file(tmp_path / "firmware.bin")
-    )
-
-
 # ---- ports ----
 
 

@@ -3,7 +3,6 @@
 import random
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from device_helpers import FRAMES, QUIET, Damaging, board_info, dropping, same, sim_board, stats_of
 
@@ -281,13 +280,3 @@ def test_an_excitation_that_the_generator_rounds_stays_what_was_asked():
     assert _asked_millihz(board_info(excitation_millihz=9_999_990, samples=100)) == 10_000_000
     found = _asked_millihz(board_info(excitation_millihz=1003, sample_rate_hz=1000, samples=1000))
     assert found == 1000
-
-
-def test_frames_of_a_stream_are_finite():
-    with Device(SimTransport("finite", sim_board())) as device:
-        device.start_scene()
-        assert all(
-            np.isfinite(item.voltage_v).all()
-            for item in device.stream(Stream.RAW)
-            if isinstance(item, RawFrame)
-        )

@@ -20,7 +20,6 @@ from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
-from eitskin.device.wire.explain import fault_text, found_name
 from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FaultCode, PacketType, Stream
 from eitskin.device.wire.packets import Fault, Solved, SolvedTouches
 from eitskin.errors import DeviceError
@@ -233,28 +232,6 @@ def test_a_bridged_pair_is_said_once():
         line for e in (6, 7) for line in events.lines(Fault(FaultCode.BRIDGED, False, 11, e, 0))
     ]
     assert over == ["electrode 6 bridged: over, frame 11", "electrode 7 bridged: over, frame 11"]
-
-
-def test_every_fault_says_its_name_its_frame_and_what_to_do():
-    for code in FaultCode:
-        text = fault_text(Fault(code, True, 17, 3, 2))
-        assert ", frame 17: " in text
-        assert fault_text(Fault(code, False, 18, 3, 0)).endswith(": over, frame 18")
-    assert fault_text(Fault(99, True, 17, 3, 2)) == "fault 99, frame 17: value 2"
-    assert fault_text(Fault(FaultCode.MODEL_MISMATCH, True, 1, 0, 123)).startswith(
-        "model mismatch 12.3 %, frame 1: "
-    )
-    named = {
-        (FaultCode.BRIDGED, True, -1): "electrode 4 bridged",
-        (FaultCode.BRIDGED, True, 0): "electrodes 4 and 0 bridged",
-        (FaultCode.BRIDGED, False, 0): "electrode 4 bridged",
-        (FaultCode.SATURATED, True, 2): "2 rows saturated from row 4 on",
-        (FaultCode.SATURATED, False, 2): "rows saturated",
-        (FaultCode.MODEL_MISMATCH, True, 0): "model mismatch",
-        (FaultCode.MODEL_MISMATCH, False, 5): "model mismatch",
-    }
-    for (code, raised, value), name in named.items():
-        assert found_name(Fault(code, raised, 1, 4, value)) == name
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts():

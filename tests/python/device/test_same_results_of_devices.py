@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from device_helpers import board_info
 
-from eitskin.device import bandwidth, check, known_model, timing
+from eitskin.device import bandwidth, check, known_model
 from eitskin.device.events import Events
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, LiveSummary
@@ -18,9 +18,7 @@ from eitskin.device.sample import Sample
 from eitskin.device.settings import ScanSettings, SolverSettings, check_tare_frames
 from eitskin.device.wire import explain, link_table
 from eitskin.device.wire import packets as pk
-from eitskin.device.wire.codec import Decoder, LinkCounters, encode
 from eitskin.device.wire.payloads import MalformedPacket, parse
-from eitskin.device.wire.sequence import SequenceCheck
 from eitskin.skin.protocol import adjacent, opposite, skip
 from same_results import check_same
 from small_models import prebuilt
@@ -96,55 +94,6 @@ def events() -> list[list[str]]:
     return [told.lines(item) for item in (*faults(), *link, *faults()[::-1])]
 
 
-def numbers(*sequences: Any) -> list[Any]:
-    """What a check of these (number, fingerprint, restart) says, and counts."""
-    counters = LinkCounters()
-    judge, found = SequenceCheck(counters), []
-    for sequence in sequences:
-        if sequence is None:
-            judge.link_lost()
-            continue
-        number, fingerprint, restart = sequence
-        found.append([judge.admit(number, fingerprint, restart=restart), judge.revived])
-        found[-1].append(judge.was_late)
-    rows = [[-1 if ahead is None else ahead, *rest] for ahead, *rest in found]
-    return [np.array(rows), counters]
-
-
-def walk(seed: int) -> list[Any]:
-    """Numbers as a line gives them: gaps, doubles, late ones, restarts, cuts."""
-    draw, at = random.Random(seed), 2**32 - 40
-    sent: list[Any] = []
-    for _ in range(400):
-        what = draw.randrange(24)
-        at = 0 if what == 0 else (at + (1 if what < 19 else draw.randrange(1, 9))) % 2**32
-        sent.append((at, at * 7 % 1001, what == 0))
-        if what == 20:
-            sent += [(at, at * 7 % 1001, False), ((at - 3) % 2**32, 5, False)]
-        if what == 21:
-            sent += [((at - k) % 2**32, k, False) for k in range(12, 0, -1)]
-        if what == 22:
-            sent.append(None)
-    return numbers(*sent)
-
-
-def wire(seed: int) -> list[Any]:
-    """What a decoder makes of packets, some of them damaged."""
-    draw, decoder, heard = random.Random(seed), Decoder(), []
-    for k in range(120):
-        size = draw.choice((0, 4, 253, 254, 700))
-        body = bytes(draw.choice((0, 1, 255, 17)) for _ in range(size))
-        line = bytearray(encode(0x10 + k % 7, k, body))
-        if draw.random() < 0.3:
-            line[draw.randrange(len(line))] ^= 1 << draw.randrange(8)
-        cut = draw.randrange(len(line))
-        heard += [*decoder.feed(bytes(line[:cut])), *decoder.feed(bytes(line[cut:]))]
-    told = np.array(
-        [[p.type, p.sequence, len(p.payload), p.lost, p.payload.count(1)] for p in heard]
-    )
-    return [told, decoder.other_version]
-
-
 def sampled() -> list[Any]:
     sample = Sample(50)
     for k in range(400):
@@ -163,41 +112,6 @@ def summed() -> list[Any]:
         found.append([summary.as_dict(), summary.lines()])
     summary.link["lines_skipped"] = 3
     return [*found, summary.lines()]
-
-
-class Steps:
-    """A clock that shows what it is told."""
-
-    def __init__(self) -> None:
-        self.s = 0.0
-
-    def now_s(self) -> float:
-        return self.s
-
-    def wait(self, changed: Any, timeout_s: float | None) -> None:
-        self.s += timeout_s or 0
-
-
-def slow() -> list[Any]:
-    clock, found = Steps(), []
-    slowness = timing.Slowness(clock)
-    for k in range(8):
-        found.append(slowness.lines(150_000 * k))
-        clock.s += 0.2 * k
-    return found
-
-
-def held() -> list[float]:
-    """When frames of 20 ms come, at speeds, after waiting too long, from the beginning again."""
-    clock = Steps()
-    pacer, found = timing.Pacer(2.0, clock), []
-    for k, time_us in enumerate((0, 20_000, 40_000, 60_000, 0, 20_000, 900_000, 920_000)):
-        pacer.hold(time_us)
-        found.append(clock.s)
-        clock.s += 0.5 if k == 2 else 0.001
-        if k == 5:
-            pacer.set_speed(0.5)
-    return found
 
 
 MODEL, BLOB = prebuilt()
@@ -246,20 +160,8 @@ CALLS: dict[str, Callable[[], Any]] = {
         [explain.field_at(command, at) for at in range(0, 48, 2)] for command in range(0x80, 0x91)
     ],
     "events": events,
-    **{f"numbers of a line {seed}": lambda seed=seed: walk(seed) for seed in range(12)},
-    **{f"wire {seed}": lambda seed=seed: wire(seed) for seed in range(6)},
     "sample": sampled,
     "summary": summed,
-    "slowness": slow,
-    "pacer": held,
-    **{
-        f"timing {url}": lambda url=url: timing.split_timing(url)
-        for url in (
-            "sim:a?speed=2&loop=1", "file:b?loop=0", "emu:?speed=max", "serial:x?speed=2", "sim:c",
-            "sim:a?speed=1001", "sim:a?speed=-1", "sim:a?speed=x", "sim:a?loop=2", "sim:a?loop",
-            "sim:a?loop=1&loop=1", "sim:a?b=1", "sim:a?speed=1000",
-        )
-    },
 }  # fmt: skip
 
 

@@ -1,25 +1,23 @@
 """A simulated board: the scene's frames through the host core, with the firmware's commands, checks
 and replies."""
 
-import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from device_helpers import FRAMES, QUIET, empty_bank, frames, sim_board, sim_device
+from device_helpers import FRAMES, QUIET, frames, sim_board, sim_device
 
-from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire import link_table as cmd
-from eitskin.device.wire.link_table import FaultCode, Quality, RawFlags, ReplyStatus, Stream
+from eitskin.device.wire.link_table import FaultCode, Quality, ReplyStatus, Stream
 from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches
 from eitskin.errors import DeviceError, UsageError
 from eitskin.model.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
-from small_models import prebuilt, tiny_blob
+from small_models import prebuilt
 
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
@@ -152,31 +150,6 @@ def test_a_faster_scan_sees_scene_frames_more_than_once():
     assert raws[0].scan_us == 207 * 100 + 80
 
 
-def test_every_nth_frame_and_so_many():
-    with sim_device() as device:
-        device.start_scene()
-        raws = by_kind(list(device.stream(Stream.RAW, every=3, frames=2)), RawFrame)
-        assert [raw.frame for raw in raws] == [0, 3]
-        assert device.info().streaming == 0
-
-
-def test_reciprocal_scans_copy_what_they_do_not_measure():
-    model = prebuilt()[0]
-    with sim_device() as device:
-        device.scan(check_every=3)
-        device.start_scene()
-        raws = by_kind(list(device.stream(Stream.RAW, frames=4)), RawFrame)
-    found = [raw.flags for raw in raws]
-    assert found == [RawFlags.CHECK, RawFlags.RECIPROCAL, RawFlags.RECIPROCAL, RawFlags.CHECK]
-    found = [raw.scan_us for raw in raws]
-    assert found == [207 * 100 + 80, 103 * 100 + 80, 103 * 100 + 80, 207 * 100 + 80]
-    for raw in raws:
-        first, second = raw.voltage_v[model.fold.first], raw.voltage_v[model.fold.second]
-        assert np.array_equal(second, model.fold.sign.astype(np.float32) * first)
-        assert set(raw.quality[model.fold.second]) == {int(Quality.COPIED)}
-        assert set(raw.quality[model.fold.first]) == {0}
-
-
 def test_masked_rows_are_left_out():
     with sim_device() as device:
         device.mask_row(5)
@@ -192,17 +165,6 @@ def test_masked_rows_are_left_out():
         device.mask_row(5, masked=False)
         device.tare(4)
         assert by_kind(list(device.stream(ALL, frames=1)), SolvedImage)[0].solved.masked == 0
-
-
-def test_quiet_frames_are_streamed_and_marked_where_raw_is():
-    with sim_device() as device:
-        device.send_command(cmd.StreamCommand(Stream.RAW, 1000), 1.0)
-        device.tare(QUIET)
-        kept = []
-        while (item := device.next_item(0.0)) is not None and len(kept) < QUIET:
-            kept.append(item)
-        assert all(isinstance(item, RawFrame) and item.quiet for item in kept)
-        assert len(kept) == QUIET
 
 
 def test_a_board_without_a_model():
@@ -223,27 +185,6 @@ def test_a_board_without_a_model():
                 match=r"the board has no model; upload one with  eitskin model upload MODEL\.eitm",
             ):
                 act()
-
-
-def test_the_newest_valid_bank_is_taken_up():
-    blob, tiny = prebuilt()[1], tiny_blob()
-    for banks, crc in [
-        ([bank_bytes(blob, 1), bank_bytes(tiny, 2)], zlib.crc32(tiny)),
-        ([bank_bytes(blob, 3), bank_bytes(tiny, 2)], zlib.crc32(blob)),
-        ([bank_bytes(b"not a model" * 9, 3), bank_bytes(tiny, 2)], zlib.crc32(tiny)),
-    ]:
-        with sim_device(SimBoard(frames(), banks)) as device:
-            assert device.board.model_crc == crc
-
-
-def test_the_scan_of_another_models_protocol():
-    with sim_device(SimBoard(frames(), [bank_bytes(tiny_blob(), 1), empty_bank()])) as device:
-        assert device.board.n_rows == 40
-        device.tare(4)
-        device.start_scene()
-        items = list(device.stream(ALL, frames=1))
-        assert by_kind(items, RawFrame)[0].voltage_v.shape == (40,)
-        assert by_kind(items, SolvedImage)[0].image.shape == (device.board.n_pixels,)
 
 
 @pytest.mark.parametrize(

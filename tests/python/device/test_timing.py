@@ -36,7 +36,20 @@ def test_what_follows_the_question_mark():
     assert split_timing("serial:/dev/x?baud=9600") == ("serial:/dev/x?baud=9600", Timing())
 
 
-@pytest.mark.parametrize("query", ["speed=fast", "speed=-1", "speed=nan", "loop=2", "pace=1", ""])
+@pytest.mark.parametrize(
+    "query",
+    [
+        "speed=fast",
+        "speed=-1",
+        "speed=nan",
+        "speed=1001",
+        "loop=2",
+        "loop",
+        "loop=1&loop=1",
+        "pace=1",
+        "",
+    ],
+)
 def test_what_cannot_follow(query):
     with pytest.raises(UsageError, match=r"device 'sim:swipe\?"):
         split_timing(f"sim:swipe?{query}")

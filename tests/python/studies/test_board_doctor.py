@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eitskin.device.bandwidth import least_every
 from eitskin.device.diagnose_board import MeasuredBoard, board_findings
 from eitskin.device.known_model import KnownModel, find_model, need_model, scanned_protocol
 from eitskin.device.recordings.raw_frames import RawRun, as_frames, finite_only, gather
-from eitskin.device.wire.link_table import FaultCode, Quality, Stream
+from eitskin.device.wire.link_table import FaultCode, Quality
 from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame
 from eitskin.errors import DeviceError, FrameError
 from eitskin.frames.doctor.examine import examine
@@ -126,22 +125,3 @@ def test_of_two_tares_the_last_counts():
     run = gather(live(raw, quiet) for raw, quiet in zip(frames, order, strict=False))
     assert [raw.frame for raw in run.quiet] == [4] and [raw.frame for raw in run.frames] == [5]
     assert run.left_out == 4
-
-
-def test_what_a_line_carries():
-    everything = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
-    assert (
-        least_every(info(), Stream.TOUCHES, 1_000_000)
-        == least_every(info(), Stream.RAW, 1_000_000)
-        == 1
-    )
-    for what, size in (
-        (everything, 16 + 5 * 208 + 68 + 4 * 812 + 68 + 24),
-        (Stream.IMAGE, 68 + 4 * 812),
-    ):
-        every = least_every(info(), what, 1_000_000)
-        seconds = every * 20_800e-6
-        assert size * 10 / 1e6 < seconds and (every - 1) * 20_800e-6 < 1.3 * size * 10 / 1e6
-        assert least_every(info(), what, 115_200) >= 8 * every - 8
-    assert least_every(info(check_every=0), everything, 1_000_000) == 6
-    assert least_every(info(model_bytes=0), everything, 9600) == 1
