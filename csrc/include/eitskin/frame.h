@@ -15,7 +15,7 @@
  *
  * Noise: a regularisation that suits 60 dB lets too much of it through at 40. What the tare learned
  * raises it (regularisation_noise_factor): with no row out F is a weight for each row of S then
- * (docs/reference/eitm-format.md, "Noise and the regularisation"). Else there is no F, and no cost.
+ * (docs/reference/eitm-format.md, "Regularisation by noise"). Else there is no F, and no cost.
  */
 #ifndef EITSKIN_FRAME_H
 #define EITSKIN_FRAME_H
