@@ -65,7 +65,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         },
         {
             "conditions": conditions(touch_data, workspace),
-            "closing": closing(counted, limited, ambiguous),
+            "closing": closing(counted, limited),
             "doubtful": doubtful(ambiguous),
         },
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from eitskin_studies.experiments.experiment import Workspace
-from eitskin_studies.experiments.multitouch.ambiguity import ScoredFrame, calibration
+from eitskin_studies.experiments.multitouch.ambiguity import calibration
 from eitskin_studies.experiments.multitouch.cells import (
     GEOMETRIES,
     MAX,
@@ -42,25 +42,16 @@ def conditions(touch_data: TouchData, workspace: Workspace) -> str:
     )
 
 
-def closing(counted: CountedScenes, limited: Sequence[Limit], ambiguous: Ambiguities) -> str:
-    """How far each variant counts, what limits it, and what its reports are worth."""
-    far = "; ".join(
-        f"{name}: {', '.join(f'{where} {_far(counted, where, name)}' for where in GEOMETRIES)}"
-        for name in NAMES
-    )
-    exact = "; ".join(
-        f"{name} {sum(one.core[name] for one in limited)}"
-        f" and {sum(one.told[name] for one in limited)}"
-        for name in NAMES
-    )
-    sure = "; ".join(f"{name} {_sure(ambiguous.mixed[name])}" for name in NAMES)
+def closing(counted: CountedScenes, limited: Sequence[Limit]) -> str:
+    """How far the core counts, and what limits it."""
+    default = NAMES[0]
+    far = ", ".join(f"{where} {_far(counted, where, default)}" for where in GEOMETRIES)
     return (
         f"- Most touches up to which at least {100 * GOOD:.0f} % of the scenes are exact at"
         f" {HEADLINE_DB:g} dB: {far}.\n"
-        f"- Exact of the {sum(one.scenes for one in limited)} frames below, as they are and with"
-        f" the true places given: {exact}.\n"
-        "- Mixed scenes at 60 and 80 dB not reported as `crowded`, and right counts among these:"
-        f" {sure}."
+        f"- Of {sum(one.scenes for one in limited)} frames with many touches"
+        f" {sum(one.core[default] for one in limited)} are exact; begun at the true places,"
+        f" {sum(one.told[default] for one in limited)}."
     )
 
 
@@ -75,11 +66,6 @@ def doubtful(ambiguous: Ambiguities) -> str:
             f" ones {_pc(one.right_said)}; {_pc(one.wrong_said)} of the wrong counts are reported."
         )
     return " ".join(told)
-
-
-def _sure(frames: Sequence[ScoredFrame]) -> str:
-    one = calibration([frame for frame in frames if frame.snr_db >= HEADLINE_DB])
-    return f"{_pc(one.not_said)}, {_pc(one.right_not_said)}"
 
 
 def _far(counted: CountedScenes, geometry: str, name: str) -> str:
