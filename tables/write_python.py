@@ -32,8 +32,8 @@ def python_modules(tables: Tables) -> Iterator[tuple[str, Lines]]:
     """Each module with its lines."""
     yield "python/eitskin/core/options_table.py", _options_module(tables)
     yield "python/eitskin/core/diagnostics_table.py", _diagnostics_module(tables)
-    for twin, path in (("eitskin", "core"), ("eitskin_studies", "twins")):
-        yield f"python/{twin}/{path}/constants_table.py", _constants_module(tables, twin)
+    for twin, path in (("eitskin", "eitskin/core"), ("eitskin_reference", "eitskin_reference")):
+        yield f"python/{path}/constants_table.py", _constants_module(tables, twin)
     yield "python/eitskin/core/gestures_table.py", _gestures_module(tables)
     if "link" in tables:
         yield "python/eitskin/device/wire/link_table.py", _link_module(tables)

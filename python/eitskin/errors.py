@@ -97,6 +97,13 @@ class SinkError(EitskinError):
     exit_code = 13
 
 
+def missing_checkout(what: str) -> MissingExtraError:
+    """The error for ``what`` is not in the wheel."""
+    return MissingExtraError(
+        f"{what} comes with eitskin's sources alone: run there  pip install ./python"
+    )
+
+
 def missing_extra(extra: str, package: str) -> MissingExtraError:
     """The error for an absent optional ``package`` that the extra named ``extra`` brings."""
     return MissingExtraError(

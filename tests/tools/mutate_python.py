@@ -31,9 +31,10 @@ from typing import Any
 from mutants import ROOT, Mutant
 
 PACKAGE = ROOT / "python"
-FOLDERS = ("solve", "device", "frames", "model", "reference")
+ROOMS = ("solve", "device", "frames", "model")
+FOLDERS = (*(f"eitskin/{room}" for room in ROOMS), "eitskin_reference")
 TESTS = ROOT / "tests" / "python"
-TEST_FOLDERS = (*FOLDERS, "bytes", "core", "calibration")
+TEST_FOLDERS = (*ROOMS, "reference", "bytes", "core", "calibration")
 LIBRARIES = (
     "numpy",
     "scipy.sparse.linalg",
@@ -66,7 +67,7 @@ class Test:
 
 def sources() -> list[str]:
     """The modules that are changed."""
-    folders = [PACKAGE / "eitskin" / folder for folder in FOLDERS]
+    folders = [PACKAGE / folder for folder in FOLDERS]
     files = (file for folder in folders for file in folder.rglob("*.py"))
     return sorted(file.relative_to(ROOT).as_posix() for file in files)
 

@@ -15,7 +15,7 @@ from eitskin.device.ports import BAUD, Port, SerialTransport, only_board, ports
 from eitskin.device.source import open_source, source_schemes
 from eitskin.device.timing import split_timing
 from eitskin.device.transport import Transport
-from eitskin.errors import MissingExtraError, UsageError
+from eitskin.errors import UsageError, missing_checkout
 
 AS_IN = {
     "serial": "serial:/dev/ttyACM0",
@@ -112,10 +112,7 @@ def _emulated(scene: str, model: bytes | None, image: Path | None, loop: bool) -
     try:
         from eitskin_emulator.transport import open_emulated
     except ImportError:
-        raise MissingExtraError(
-            f"emu:{scene}: the emulated board comes with eitskin's sources alone: run there  pip"
-            " install ./python"
-        ) from None
+        raise missing_checkout(f"emu:{scene}: the emulated board") from None
     transport: Transport = open_emulated(scene, model=model, image=image, loop=loop)
     return transport
 

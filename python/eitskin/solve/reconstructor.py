@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +14,14 @@ import numpy.typing as npt
 from eitskin.config import nearest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import LearnedReference, Options, Reconstruction, check_options
-from eitskin.errors import FrameError, ProtocolError, UsageError
+from eitskin.errors import FrameError, ProtocolError, UsageError, missing_checkout
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
-from eitskin.reference.engine import ReferenceEngine
 from eitskin.skin.protocol import Protocol
+
+if TYPE_CHECKING:
+    from eitskin_reference.engine import ReferenceEngine
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -31,13 +33,14 @@ class Reconstructor:
     """One skin's reconstruction: tare on quiet frames, then turn frames into images and touches.
 
     ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or
-    "numpy" (the reference). What is wrong with a frame is found, left out where that helps, and
-    named in ``info.found`` (docs/reference/diagnostics.md); the option ``diagnostics`` chooses what
-    is looked for.
+    "numpy" (the reference, of a checkout). What is wrong with a frame is found, left out
+    where that helps, and named in ``info.found`` (docs/reference/diagnostics.md); the option
+    ``diagnostics`` chooses what is looked for.
 
     Raises:
         ModelError: the C core refuses the model.
         UsageError: an unknown engine, an option out of range, or the core is not built.
+        MissingExtraError: the numpy reference is not installed.
     """
 
     def __init__(
@@ -53,7 +56,7 @@ class Reconstructor:
         self.model, self.engine = model, engine
         self._engine: CoreEngine | ReferenceEngine
         if engine == "numpy":
-            self._engine = ReferenceEngine(model)
+            self._engine = _reference_engine(model)
         else:
             self._engine = CoreEngine(
                 blob or encode_model(model), "float32" if engine == "c" else "float64"
@@ -163,6 +166,15 @@ class Reconstructor:
         """Forget the warm start and the touches that were followed: the next frame has nothing to
         do with the last."""
         self._engine.forget()
+
+
+def _reference_engine(model: Model) -> ReferenceEngine:
+    """Of a package that the wheel does not have."""
+    try:
+        from eitskin_reference.engine import ReferenceEngine
+    except ImportError:
+        raise missing_checkout("the engine numpy") from None
+    return ReferenceEngine(model)
 
 
 def _numbers(values: npt.ArrayLike, what: str) -> FloatArray:

@@ -13,10 +13,12 @@ import pytest
 
 import eitskin
 from eitm_bytes import sections_of
+from eitskin.errors import MissingExtraError
 from eitskin.model.eitm import load_model
 from eitskin.model.model import Defaults
 from eitskin.skin.skin import load_skin
-from fresh_python import run_command, run_python
+from eitskin.solve.reconstructor import Reconstructor
+from fresh_python import MAIN, run_command, run_python, without
 from small_models import prebuilt
 
 SKIN = """
@@ -147,6 +149,17 @@ def test_the_prebuilt_model_for_people(done):
     assert text.count("the same bits") == 2 and "numpy float64" in text
     facts = json.loads(done("model", "info", "--json"))
     assert facts["bytes"] == len(prebuilt()[1]) and facts["pixels"] == 812
+
+
+def test_without_the_numpy_reference():
+    bare = without("eitskin_reference") + MAIN
+    verified = run_python(bare, "model", "verify")
+    assert verified.returncode == 0 and verified.stdout.count("the same bits") == 2
+    assert "run there  pip install ./python" in verified.stderr
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "eitskin_reference.engine", None)
+        with pytest.raises(MissingExtraError, match="the engine numpy comes with"):
+            Reconstructor(prebuilt()[0], engine="numpy")
 
 
 def test_building_twice_gives_the_same_bytes(done, tmp_path):

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from everywhere import Outcome, as_float32
 
-from eitskin.reference.problem import greatest
+from eitskin_reference.problem import greatest
 from margins import Margins
 
 U = 2.0**-24

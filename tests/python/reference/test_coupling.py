@@ -5,11 +5,11 @@ import pytest
 
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
-from eitskin.reference.disc_fit import Disc
-from eitskin.reference.interaction import interplay
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.simulate import conductivity_with
 from eitskin.skin.skin import paper_skin
+from eitskin_reference.disc_fit import Disc
+from eitskin_reference.interaction import interplay
 from small_models import prebuilt
 
 

@@ -14,11 +14,11 @@ from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.reference.row_gains import row_gains
+from eitskin_reference.fast.path import FastPath
+from eitskin_reference.row_gains import row_gains
 from eitskin_studies.experiments import fast_path
 from eitskin_studies.experiments.fast_path.scans import Outcome, Player
 from eitskin_studies.experiments.fast_path.states import States, draw_states
-from eitskin_studies.twins.fast.path import FastPath
 
 SEED, ELEMENTS = 5, 3500
 

@@ -5,7 +5,7 @@ import pytest
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import Gestures, event_numbers
-from eitskin_studies.twins.gestures import ReferenceGestures
+from eitskin_reference.gestures import ReferenceGestures
 
 FRAMES = 700
 

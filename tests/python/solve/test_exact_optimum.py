@@ -10,10 +10,10 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.options_table import SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
-from eitskin.reference.fista import fista
-from eitskin.reference.frame_stage import orthonormal
-from eitskin.reference.problem import check_gap
 from eitskin.solve.reconstructor import Reconstructor
+from eitskin_reference.fista import fista
+from eitskin_reference.frame_stage import orthonormal
+from eitskin_reference.problem import check_gap
 from small_models import prebuilt, session, small, small_blob, small_model
 
 GAP_REL = 1e-6

@@ -12,13 +12,13 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin.model.options import default_options, tracking
-from eitskin.reference.tracker import Tracker, nearest_pairs
 from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scene.random_touches import TrueTouch as Put
 from eitskin.scene.simulate import Measurement, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
+from eitskin_reference.tracker import Tracker, nearest_pairs
 from small_models import prebuilt
 
 FRAMES = 24

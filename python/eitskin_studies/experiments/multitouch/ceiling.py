@@ -19,13 +19,13 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import element_fields
 from eitskin.model.model import Model
-from eitskin.reference.engine import ReferenceEngine
-from eitskin.reference.problem import Problem, SolveResult
 from eitskin.scene.cover import Cover
 from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.scoring.matching import GATE_MM, match
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
+from eitskin_reference.engine import ReferenceEngine
+from eitskin_reference.problem import Problem, SolveResult
 from eitskin_studies.harness.sessions import MeasuredFrames
 
 FloatArray = npt.NDArray[np.float64]

@@ -14,12 +14,12 @@ from eitskin.core.results import Options
 from eitskin.model.model import Model
 from eitskin.model.options import default_options, tracking
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.reference.tracker import Pairing, Tracker, nearest_pairs
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.solve.reconstructor import Reconstructor
+from eitskin_reference.tracker import Pairing, Tracker, nearest_pairs
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tracking.counted import TrackCount, count_stream
 from eitskin_studies.experiments.tracking.streams import ELEMENTS, TouchStream

@@ -28,16 +28,16 @@ from eitskin.core.results import (
 from eitskin.errors import FrameError
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
-from eitskin.reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
-from eitskin.reference.problem import (
+from eitskin_reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
+from eitskin_reference.problem import (
     FloatArray,
     greatest,
     orthonormal,
     project,
 )
-from eitskin.reference.reference_outliers import clean
-from eitskin.reference.row_gains import row_gains
-from eitskin.reference.whitening import Whitening, filled, form_of, whiten
+from eitskin_reference.reference_outliers import clean
+from eitskin_reference.row_gains import row_gains
+from eitskin_reference.whitening import Whitening, filled, form_of, whiten
 
 BoolArray = npt.NDArray[np.bool_]
 

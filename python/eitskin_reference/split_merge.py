@@ -25,7 +25,7 @@ from eitskin.core.constants_table import (
     SPLIT_TOTAL,
 )
 from eitskin.core.results import Options
-from eitskin.reference.disc_fit import Disc, Fit
+from eitskin_reference.disc_fit import Disc, Fit
 
 
 def edge_distance(a: Disc, b: Disc) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import GestureEvent
 from eitskin.core.gestures_table import EventKind, EventPhase
-from eitskin_studies.twins import constants_table as c
+from eitskin_reference import constants_table as c
 
 MAX_CONTACTS, TRAIL = 32, 8
 R = np.float32

@@ -12,7 +12,7 @@ from eitskin.core.constants_table import (
     SEEK_SWEEPS,
 )
 from eitskin.core.options_table import SIGNS
-from eitskin.reference.disc_fit import Disc, Fit
+from eitskin_reference.disc_fit import Disc, Fit
 
 
 def seek(fit: Fit) -> None:

@@ -13,7 +13,7 @@ from eitskin.core.constants_table import (
     ZERO_GAP,
 )
 from eitskin.core.results import Options
-from eitskin.reference.problem import (
+from eitskin_reference.problem import (
     Certificate,
     FloatArray,
     SolveResult,

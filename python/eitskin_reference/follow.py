@@ -14,7 +14,7 @@ from eitskin.core.constants_table import (
     FOLLOW_PARTS,
     FOLLOW_TOUCH,
 )
-from eitskin.reference.problem import orthonormal, project
+from eitskin_reference.problem import orthonormal, project
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

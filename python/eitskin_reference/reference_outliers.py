@@ -15,8 +15,8 @@ from eitskin.core.constants_table import (
     UNPAIRED,
     UNPAIRED_MIN,
 )
-from eitskin.reference.diagnostics import robust
 from eitskin.skin.protocol import Reciprocity
+from eitskin_reference.diagnostics import robust
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin_studies.twins.constants_table import (
+from eitskin_reference.constants_table import (
     FAST_ANSWERS,
     FAST_APART_MM,
     FAST_DAMPING,
@@ -25,8 +25,8 @@ from eitskin_studies.twins.constants_table import (
     FAST_STARTS,
     FAST_STEPS,
 )
-from eitskin_studies.twins.fast.rows import Drive, RowModel
-from eitskin_studies.twins.fast.tracks import (
+from eitskin_reference.fast.rows import Drive, RowModel
+from eitskin_reference.fast.tracks import (
     dot,
     lower_factor,
     lower_solve,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from eitskin.core.constants_table import NO_DIPOLE_MM2
 from eitskin.model.model import Model
-from eitskin.reference.disc_fit import Disc
+from eitskin_reference.disc_fit import Disc
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from eitskin.core.constants_table import (
     PLACE_FACTOR,
     PLACE_MIN,
 )
-from eitskin.reference.disc_fit import Fit
-from eitskin.reference.evidence import Tested
-from eitskin.reference.problem import orthonormal
+from eitskin_reference.disc_fit import Fit
+from eitskin_reference.evidence import Tested
+from eitskin_reference.problem import orthonormal
 
 FloatArray = npt.NDArray[np.float64]
 PLACE_PARAMETERS = 4  # of a disc: strength, place, radius

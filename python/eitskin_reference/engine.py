@@ -21,14 +21,14 @@ from eitskin.core.results import Info, LearnedReference, Options, Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.model.storage import stride_for
-from eitskin.reference.disc_fit import Disc, Reduced
-from eitskin.reference.evidence import DataErrors
-from eitskin.reference.exact import ActiveSet, coordinate
-from eitskin.reference.fista import fista
-from eitskin.reference.follow import Follower, gain_beside
-from eitskin.reference.frame_stage import FrameStage
-from eitskin.reference.interaction import interplay, turned_dipoles
-from eitskin.reference.problem import (
+from eitskin_reference.disc_fit import Disc, Reduced
+from eitskin_reference.evidence import DataErrors
+from eitskin_reference.exact import ActiveSet, coordinate
+from eitskin_reference.fista import fista
+from eitskin_reference.follow import Follower, gain_beside
+from eitskin_reference.frame_stage import FrameStage
+from eitskin_reference.interaction import interplay, turned_dipoles
+from eitskin_reference.problem import (
     Certificate,
     FloatArray,
     Problem,
@@ -36,8 +36,8 @@ from eitskin.reference.problem import (
     greatest,
     project,
 )
-from eitskin.reference.touches import brought_onto_skin, find_touches
-from eitskin.reference.tracker import Tracker
+from eitskin_reference.touches import brought_onto_skin, find_touches
+from eitskin_reference.tracker import Tracker
 
 SOLVED = ("iterations", "gap", "optimum")
 

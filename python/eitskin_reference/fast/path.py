@@ -17,7 +17,7 @@ import numpy.typing as npt
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.fast import AlignedFrame, FastTouch
 from eitskin.model.model import Model
-from eitskin_studies.twins.constants_table import (
+from eitskin_reference.constants_table import (
     FAST_AMBIGUOUS,
     FAST_BIRTH,
     FAST_BIRTH_ERROR,
@@ -59,9 +59,9 @@ from eitskin_studies.twins.constants_table import (
     FAST_UNEXPLAINED,
     FAST_WILD,
 )
-from eitskin_studies.twins.fast.births import Births, Fit, Held, apart, inverted
-from eitskin_studies.twins.fast.rows import Drive, RowModel, drives_of
-from eitskin_studies.twins.fast.tracks import (
+from eitskin_reference.fast.births import Births, Fit, Held, apart, inverted
+from eitskin_reference.fast.rows import Drive, RowModel, drives_of
+from eitskin_reference.fast.tracks import (
     SIZE,
     VX,
     VY,

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
-from eitskin_studies.twins.constants_table import FAST_SOFT_RADIUS
-from eitskin_studies.twins.fast.tracks import summed
+from eitskin_reference.constants_table import FAST_SOFT_RADIUS
+from eitskin_reference.fast.tracks import summed
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

@@ -26,7 +26,7 @@ from eitskin.core.constants_table import (
 )
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
-from eitskin.reference.problem import FloatArray, Problem, SolveResult, shrink
+from eitskin_reference.problem import FloatArray, Problem, SolveResult, shrink
 
 IntArray = npt.NDArray[np.int64]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin_studies.twins.constants_table import (
+from eitskin_reference.constants_table import (
     FAST_DRIVE_S,
     FAST_MODEL_ERROR,
     FAST_SPEED_NOISE,

@@ -21,11 +21,11 @@ from eitskin.core.options_table import SPLIT_MERGE
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin.model.model import Model
-from eitskin.reference.confidence import miscounted, places_by_fit, rated
-from eitskin.reference.disc_fit import Disc, Fit, Reduced
-from eitskin.reference.evidence import DataErrors, keep_likely
-from eitskin.reference.seek import seek
-from eitskin.reference.split_merge import join, part
+from eitskin_reference.confidence import miscounted, places_by_fit, rated
+from eitskin_reference.disc_fit import Disc, Fit, Reduced
+from eitskin_reference.evidence import DataErrors, keep_likely
+from eitskin_reference.seek import seek
+from eitskin_reference.split_merge import join, part
 
 FloatArray = npt.NDArray[np.float64]
 Interplay = Callable[[Sequence[Disc]], FloatArray]

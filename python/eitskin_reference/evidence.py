@@ -42,10 +42,10 @@ from eitskin.core.constants_table import (
     TOUCH_EVIDENCE,
     TRIAL_COLUMNS,
 )
-from eitskin.reference.disc_fit import Disc, Fit
-from eitskin.reference.ellipse import long_axis
-from eitskin.reference.pair import pair_lines, pair_scores
-from eitskin.reference.split_merge import merged
+from eitskin_reference.disc_fit import Disc, Fit
+from eitskin_reference.ellipse import long_axis
+from eitskin_reference.pair import pair_lines, pair_scores
+from eitskin_reference.split_merge import merged
 
 FloatArray = npt.NDArray[np.float64]
 
