@@ -12,9 +12,7 @@ from cross_build import shared_build
 from kept_meshes import mesher_that_keeps
 from margins import (  # noqa: F401
     margins,
-    pytest_addoption,
     pytest_configure,
-    pytest_runtest_logreport,
     pytest_sessionfinish,
     pytest_terminal_summary,
     pytest_unconfigure,

@@ -1,19 +1,12 @@
-"""docs/results/hard-cases.md: the catalogue. ``scripts/hard-cases`` runs it and makes the page; how
-near to its bound each case came, pytest says at the end.
-"""
+"""docs/results/hard-cases.md: the catalogue. ``scripts/hard-cases`` runs it and makes the page."""
 
-import argparse
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import pictures
-from catalogue import CASES, GROUPS, OF_THE_CATALOGUE, ROOT, TESTS, Case
-
-from margins import Margins, read_margins, worst_of_cases
+from catalogue import CASES, GROUPS, ROOT, Case
 
 PAGE = ROOT / "docs" / "results" / "hard-cases.md"
 PICTURES = ROOT / "docs" / "results" / "pictures"
@@ -47,62 +40,8 @@ def page_text() -> str:
     return "\n".join(lines) + "\n"
 
 
-def missing(found: Margins) -> list[str]:
-    """Cases that no test of theirs stands for in what ran."""
-    worst = worst_of_cases(found)
-    return [
-        f"{case.id}: {test} did not pass"
-        for case in CASES
-        for test in case.tests
-        if _runs_here(test) and test not in found.passed
-    ] + [
-        f"{case.id}: no margin was recorded"
-        for case in CASES
-        if case.id not in worst and measures(case)
-    ]
-
-
-def measures(case: Case) -> bool:
-    """Whether tests of this folder stand for it: they record margins."""
-    return any(_runs_here(test) for test in case.tests)
-
-
-def main() -> int:
-    """Run the hard cases, or read what a run left, then write page and pictures."""
-    parser = argparse.ArgumentParser(
-        description="run the hard cases, write their page and pictures"
-    )
-    parser.add_argument(
-        "--margins", type=Path, help="what  pytest --margins FOLDER  left there, in place of a run"
-    )
-    parser.add_argument("--only-page", action="store_true", help="leave the pictures as they are")
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        folder = given.margins or Path(name)
-        if given.margins is None:
-            files = {
-                test.split("::")[0] for case in CASES for test in case.tests if _runs_here(test)
-            }
-            chosen = sorted(f"{TESTS / file}" for file in files)
-            command = [sys.executable, "-m", "pytest", "-q", "--margins", name, *chosen]
-            if subprocess.run(command, cwd=ROOT, check=False).returncode != 0:
-                return 1
-        found = read_margins(folder)
-    absent = missing(found)
-    if absent:
-        print("\n".join(absent), file=sys.stderr)
-        return 1
-    PAGE.write_text(page_text(), encoding="utf-8")
-    if not given.only_page:
-        for case in CASES:
-            if case.picture is not None:
-                pictures.draw(case.picture, PICTURES / case.picture)
-    return 0
-
-
-def _runs_here(test: str) -> bool:
-    return test.startswith("hard_cases/") and not test.startswith(OF_THE_CATALOGUE)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    PAGE.write_text(page_text(), encoding="utf-8")
+    for case in CASES:
+        if case.picture is not None:
+            pictures.draw(case.picture, PICTURES / case.picture)

@@ -337,7 +337,3 @@ def test_missing_and_unreadable_files(tmp_path):
         load_model(tmp_path)
     with pytest.raises(FileError, match="cannot write there"):
         save_model(tmp_path / "none" / "x.eitm", small_model())
-
-
-def test_errors_are_of_the_project():
-    assert issubclass(ModelError, EitskinError) and ModelError.exit_code == 6

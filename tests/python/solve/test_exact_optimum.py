@@ -14,7 +14,7 @@ from eitskin.solve.reconstructor import Reconstructor
 from eitskin_reference.fista import fista
 from eitskin_reference.frame_stage import orthonormal
 from eitskin_reference.problem import check_gap
-from small_models import prebuilt, session, small, small_blob, small_model
+from small_models import prebuilt, session, small, small_model
 
 GAP_REL = 1e-6
 
@@ -163,25 +163,6 @@ def test_the_core_stops_at_the_gap(solver, width):
         assert result.info.gap == pytest.approx(
             result.info.gap_rel * 0.5 * result.info.data_norm**2, rel=1e-3
         )
-
-
-def test_a_fixed_number_of_iterations_is_exactly_that():
-    engine = CoreEngine(small_blob())
-    engine.set_reference(small().quiet(1, 8))
-    for iterations in (1, 7, 60, 333):
-        engine.set_options(replace(default_options(small_model()), iterations=iterations))
-        info = engine.reconstruct(small().frames(3, 1)[0]).info
-        assert (info.iterations, info.stop) == (iterations, "iterations")
-
-
-def test_a_step_too_long_is_halved_until_it_converges():
-    """With a Lipschitz constant a sixteenth of the true one the reference recovers by itself."""
-    s, y, basis, lam = problem(7, "increase", 0.05, True)
-    run = replace(options("increase"), gap_every=5, iterations=20_000)
-    result = fista(s, y, lam, small_model().lipschitz / 16, run, basis)
-    assert result.stop == "gap" and 3 <= result.step_halvings <= 5
-    hopeless = fista(s, y, lam, small_model().lipschitz / 1e9, run, basis)
-    assert hopeless.stop == "diverged" and hopeless.step_halvings == 8
 
 
 def test_orthonormal_basis():
