@@ -9,7 +9,6 @@ from board_cases import board_of, write_scene
 
 from board_on_a_port import behind_a_port
 from eitskin.cli.main import main
-from eitskin.device.ports import Port
 from eitskin.device.wire.codec import encode
 from fresh_python import MAIN, run_python, without
 from small_models import small_blob
@@ -175,31 +174,6 @@ def test_a_recording_without_raw_frames(refused, scene, tmp_path):
 
 
 # ---- ports ----
-
-
-def test_auto_without_a_board_and_with_two(refused, monkeypatch):
-    monkeypatch.setattr("eitskin.device.ports.ports", lambda: [Port("/dev/ttyS0")])
-    assert "no ST-LINK port is there" in refused(DEVICE, "info")
-    two = [Port(f"/dev/ttyACM{k}", "STLink", 0x0483, 0x374B) for k in range(2)]
-    monkeypatch.setattr("eitskin.device.ports.ports", lambda: two)
-    assert "several boards are there (/dev/ttyACM0 (STLink), /dev/ttyACM1 (STLink))" in refused(
-        DEVICE, "stream"
-    )
-
-
-def test_ports_that_cannot_be_used(refused, tmp_path):
-    assert "no such port" in refused(DEVICE, "info", "--device", f"serial:{tmp_path / 'gone'}")
-    assert "no serial port" in refused(DEVICE, "info", "--device", "serial:/dev/null")
-
-
-def test_a_port_where_nothing_answers(refused):
-    master, slave = os.openpty()
-    try:
-        line = refused(DEVICE, "info", "--device", f"serial:{os.ttyname(slave)}")
-        assert "no answer within 3 s" in line and "eitskin flash" in line
-    finally:
-        os.close(master)
-        os.close(slave)
 
 
 def test_a_board_without_a_model(scene, capsys):

@@ -157,14 +157,6 @@ def test_frames_that_cannot_be_used(
     assert [entry.name for entry in tmp_path.iterdir()] == ["changed.npz"]
 
 
-def test_saturated_frames(changed_frames, capsys):
-    """Every channel at the rail, told by --saturation-v."""
-    path = changed_frames(first=1, voltage_v=np.where(FIRST < 0, -3.3, 3.3))
-    assert main(["reconstruct", str(path), "--saturation-v", "3.3"]) == FRAME
-    err = capsys.readouterr().err
-    assert "too many channels" in err and err.count("\n") == 1
-
-
 @pytest.mark.parametrize(
     ("value", "text"),
     [

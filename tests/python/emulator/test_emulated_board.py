@@ -5,10 +5,11 @@ import zlib
 
 import numpy as np
 import pytest
+from firmware_checks import CHECKS, run_session
 
 from eitskin.device.client import Device
-from eitskin.device.wire.link_table import FaultCode, Quality, RawFlags, Stream
-from eitskin.device.wire.packets import Fault, RawFrame, SolvedTouches
+from eitskin.device.wire.link_table import Quality, Stream
+from eitskin.device.wire.packets import RawFrame, SolvedTouches
 from eitskin.errors import DeviceError, ProtocolError
 from eitskin.model.build import BuildSettings, linearise, make_model
 from eitskin.model.eitm import encode_model
@@ -18,7 +19,7 @@ from eitskin.skin.protocol import opposite
 from eitskin.skin.skin import paper_skin
 from eitskin_emulator.analog.converter import STEP_V
 from eitskin_emulator.board import EmulatedBoard
-from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin_emulator.clocktime import TICKS_PER_S
 from eitskin_emulator.scene_skin import skin_of
 from emulated import EVERYTHING, board_of, clean, connect, power_up, raw_frames, twin_check
 from small_models import small
@@ -55,15 +56,10 @@ def test_the_generator_runs_at_50_khz(quiet):
     assert abs(quiet.board.excitation_millihz / 1000 - generator.frequency_hz) < 0.001
 
 
-def test_rows_are_joined_in_the_order_of_the_table(quiet):
-    board = board_of(quiet)
-    raw_frames(quiet, 1)
-    table = [tuple(int(k) for k in row) for row in load_prebuilt()[0].protocol.drive_measure]
-    order = joined_order(board, 0)
-    start = order.index(table[0])
-    whole = order[start : start + 3 * len(table)]
-    assert len(whole) >= 2 * len(table)
-    assert whole == (table * 3)[: len(whole)]
+def test_the_image_passes_every_check(image):
+    """Of those that notice a mutant in test_mutations.py."""
+    session = run_session(image)
+    assert {check.__name__: told for check in CHECKS if (told := check(session))} == {}
 
 
 def amplitude_errors_lsb(device: Device) -> np.ndarray:
@@ -71,38 +67,6 @@ def amplitude_errors_lsb(device: Device) -> np.ndarray:
     frames = raw_frames(device, 2)
     assert all(frame.quality.max() & ~Quality.RECIPROCITY == 0 for frame in frames)
     return np.concatenate([frame.voltage_v - exact for frame in frames]) / STEP_V
-
-
-def test_amplitudes_are_within_half_a_step(quiet):
-    errors = amplitude_errors_lsb(quiet)
-    print(
-        f"adjacent: worst {np.abs(errors).max():.3f} LSB, rms {np.sqrt(np.mean(errors**2)):.3f} LSB"
-    )
-    assert np.abs(errors).max() < 0.5
-
-
-def test_times_of_samples_and_switches(quiet):
-    """Every sample is taken at least the settling time after the switch before it."""
-    board, info = board_of(quiet), quiet.board
-    at: list[int] = []
-    sample = board.front_end.sample
-
-    def watched(times: np.ndarray, channel: int) -> np.ndarray:
-        at.append(int(times[0]))
-        return sample(times, channel)
-
-    board.multiplexers.log.clear()
-    board.adc.sample = watched
-    board.run_until(board.clock.now + 30_000 * TICKS_PER_US)
-    board.adc.sample = sample
-    made = np.array([one.at for one in board.multiplexers.log if None not in one.joined])
-    starts = np.array(at)
-    starts = starts[starts > made[0]]
-    settled = (starts - made[np.searchsorted(made, starts) - 1]) / TICKS_PER_US
-    slots = np.diff(starts) / TICKS_PER_US
-    assert len(starts) > 250
-    assert settled.min() >= info.settle_us
-    assert set(np.round(slots, 6)) == {float(info.slot_us)}
 
 
 def test_the_same_session_gives_the_same_bytes(image):
@@ -202,20 +166,6 @@ def test_frame_rates(image, check_every, rows):
     clean(board)
 
 
-def test_reciprocal_scans_measure_half_and_check_now_and_then(image):
-    board = power_up(image, noisy=False)
-    device = connect(board)
-    device.scan(check_every=3)
-    frames = raw_frames(device, 4)
-    copied = [int(np.count_nonzero(frame.quality & Quality.COPIED)) for frame in frames]
-    checks = [bool(frame.flags & RawFlags.CHECK) for frame in frames]
-    assert sorted(set(copied)) == [0, 104] or set(copied) == {104}
-    assert any(checks)
-    exact = board.skin.quiet_v[0]
-    assert max(np.abs(frame.voltage_v - exact).max() for frame in frames) < 0.5 * STEP_V
-    clean(board)
-
-
 def test_another_frequency(image):
     device = connect(power_up(image, noisy=False))
     board = board_of(device)
@@ -227,31 +177,6 @@ def test_another_frequency(image):
     with pytest.raises(DeviceError):
         device.scan(excitation_hz=33_333)
     assert abs(board.generator.frequency_hz - 25_000) < 0.02
-    clean(board)
-
-
-def test_a_saturated_row_is_told(image):
-    board = power_up(image, noisy=False)
-    board.skin.quiet_v[:, 7] = 1.3  # the converter ends at 1.1 V
-    device = connect(board)
-    items = list(device.stream(Stream.RAW, frames=3))
-    raw = [item for item in items if isinstance(item, RawFrame)]
-    assert raw[-1].quality[7] & Quality.SATURATED
-    assert np.isnan(raw[-1].voltage_v[7])
-    faults = [item for item in items if isinstance(item, Fault)]
-    assert any(
-        fault.code == FaultCode.SATURATED and fault.raised and fault.index == 7 for fault in faults
-    ) or (FaultCode.SATURATED in device.info().fault_codes)
-
-
-def test_no_model_no_scan_but_answers(image):
-    board = EmulatedBoard(image, power_up(image, noisy=False).skin)
-    device = connect(board)
-    assert device.board.model_bytes == 0
-    assert FaultCode.NO_MODEL in device.board.fault_codes
-    assert board.front_end.samples == 0
-    with pytest.raises(DeviceError):
-        device.tare(4)
     clean(board)
 
 

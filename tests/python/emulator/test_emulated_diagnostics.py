@@ -76,26 +76,6 @@ def _faults(packet: Any) -> list[Fault]:
     return [content] if isinstance(content, Fault) else []
 
 
-def test_bridged_electrodes_are_named_with_each_other(image):
-    protocol = load_prebuilt()[0].protocol
-    whole, bridged = (
-        skin_of(scene({}), protocol),
-        skin_of(scene({"bridged": {"electrodes": [6, 7]}}), protocol),
-    )
-    device = device_before(image, AnalogSkin(protocol, whole.quiet_v, bridged.frames_v, 20.0))
-    device.tare(4)
-    device.start_scene()
-    frames, faults = taken(device, 4)
-    told = [fault for fault in faults if fault.code == FaultCode.BRIDGED]
-    found = [(fault.raised, fault.index, fault.value) for fault in told]
-    assert found == [(True, 6, 7), (True, 7, 6)]
-    assert {fault.words[:2] for fault in told} == {(0xC0, 0)}
-    first = next(f for f in frames if f.solved is not None and f.solved.bridged_electrodes)
-    assert first.solved is not None
-    assert (first.solved.bridged_electrodes, first.number) == ((6, 7), told[0].frame)
-    assert FaultCode.BRIDGED in device.info().fault_codes
-
-
 def test_a_reading_that_is_off_is_left_out_and_counted(image):
     """One burst of one row at half its amplitude."""
     device = device_before(image, skin_of(scene({}), load_prebuilt()[0].protocol))

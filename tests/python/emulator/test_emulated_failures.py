@@ -8,8 +8,7 @@ import numpy as np
 from eitskin.device.client import Device
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import FaultCode, Stream
-from eitskin.device.wire.packets import Fault, SolvedTouches
-from eitskin.model.prebuilt import load_prebuilt
+from eitskin.device.wire.packets import Fault
 from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin_emulator.memory import RAM
 from emulated import clean, connect, hang, power_up, restarted
@@ -33,18 +32,6 @@ def test_a_model_over_the_wire(image):
     again = restarted(device)
     assert (again.board.model_crc, again.board.bank) == (zlib.crc32(model), 1)
     clean(board)
-
-
-def test_a_wrong_checksum_is_refused_and_the_old_model_stays(image):
-    board = power_up(image)
-    device = connect(board)
-    model = small_blob()
-    assert device.send_command(commands.ModelBegin(len(model), zlib.crc32(model) ^ 1), 15.0).ok
-    for at in range(0, len(model), 4096):
-        assert device.send_command(commands.ModelData(at, model[at : at + 4096]), 2.0).ok
-    assert not device.send_command(commands.ModelCommit(), 20.0).ok
-    assert device.info().model_crc == zlib.crc32(load_prebuilt()[1])
-    device.tare(4)
 
 
 LOAD_NOWHERE = bytes.fromhex("4ff0c0400068fee7")  # mov.w r0, #0x60000000; ldr r0, [r0]; b .
@@ -124,19 +111,4 @@ def test_a_slow_line_drops_whole_packets_and_counts_them(image):
     assert stats.packets_dropped > 0
     assert gaps.missing <= stats.packets_dropped
     device.send_command(commands.StreamCommand(0), 1.0)
-    clean(board)
-
-
-def test_a_restart_on_request(image):
-    board = power_up(image)
-    device = connect(board)
-    device.tare(4)
-    info = device.reset()
-    assert board.record.resets == ["power", "software"]
-    assert (info.tared, info.faults) == (0, 0)
-    device.tare(4)
-    touches = [
-        item for item in device.stream(Stream.TOUCHES, frames=2) if isinstance(item, SolvedTouches)
-    ]
-    assert len(touches) == 2
     clean(board)

@@ -70,13 +70,6 @@ def workshop(tmp_path_factory) -> Workshop:
     return Workshop(tmp_path_factory.mktemp("mutants"))
 
 
-def test_the_sources_as_they_are_pass(workshop):
-    session = run_session(workshop.unmutated)
-    assert {check.__name__: check(session) for check in CHECKS} == {
-        check.__name__: None for check in CHECKS
-    }
-
-
 @pytest.mark.parametrize("name", MUTATIONS)
 def test_a_mutant_is_noticed(workshop, name):
     mutation = MUTATIONS[name]

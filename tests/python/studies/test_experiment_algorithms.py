@@ -112,22 +112,6 @@ def test_what_is_kept_is_not_computed_again(folder, outcome, monkeypatch):
     goes_on(lambda: algorithms.run(small(folder, monkeypatch)), outcome)
 
 
-def test_a_cut_run_goes_on_and_gives_the_same(folder, outcome, monkeypatch):
-    """The last third of the results gone, with a torn line: only what is missing is reconstructed
-    again."""
-    lines = (folder / "results.jsonl").read_bytes().splitlines(keepends=True)
-    cut = 2 * len(lines) // 3
-    (folder / "results.jsonl").write_bytes(b"".join(lines[:cut]) + lines[cut][:40])
-    made: list[float] = []
-    real = measure._reconstructed
-    monkeypatch.setattr(
-        measure, "_reconstructed", lambda *given: made.append(given[2]) or real(*given)
-    )
-    again = algorithms.run(small(folder, monkeypatch))
-    assert again.data == outcome.data
-    assert len(made) == len(lines) - cut
-
-
 def test_sets_are_apart_and_of_their_numbers():
     outline = paper_skin().outline
     for number, name in NUMBERS.items():

@@ -19,7 +19,7 @@ from eitskin_studies.experiments.experiment import (
     plain,
     workspace_in,
 )
-from eitskin_studies.experiments.homogeneous.cases import CASES, IDEAL, INSTRUMENT
+from eitskin_studies.experiments.homogeneous.cases import IDEAL, INSTRUMENT
 from eitskin_studies.experiments.homogeneous.measured import FILE, load_tank
 from eitskin_studies.experiments.homogeneous.uniformity import (
     deviations_percent,
@@ -150,18 +150,6 @@ def test_the_doctor_names_what_is_broken(outcome):
 
 def test_what_is_kept_is_not_computed_again(folder, outcome, monkeypatch):
     goes_on(lambda: homogeneous.run(small(folder, monkeypatch)), outcome)
-
-
-def test_only_what_is_missing_is_computed(folder, outcome, monkeypatch):
-    lines = (folder / "results.jsonl").read_bytes().splitlines(keepends=True)
-    (folder / "results.jsonl").write_bytes(b"".join(lines[:-2]) + lines[-2][:99])
-    made: list[str] = []
-    real = homogeneous.examined
-    monkeypatch.setattr(
-        homogeneous, "examined", lambda case, *more: made.append(case.name) or real(case, *more)
-    )
-    assert homogeneous.run(small(folder, monkeypatch)).data == outcome.data
-    assert made == [CASES[-1].name] * 2
 
 
 def test_without_a_tank_the_page_says_so(outcome):

@@ -2,11 +2,6 @@
 what they are said to be."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -143,70 +138,6 @@ def test_a_run_that_was_cut_goes_on_to_the_same_table(front, folder, tmp_path, c
         except ValueError:
             continue
     assert set(good) == kept and len(good) == len(kept) and len(lines) <= len(kept) + 1
-
-
-def test_a_killed_command_goes_on(tmp_path):
-    (tmp_path / "set.toml").write_text(
-        '[[configuration]]\nname = "a"\nrank = 24\npixels = 14\niterations = 8\n'
-        '[[configuration]]\nname = "b"\nrank = 32\npixels = 16\n'
-    )
-    command = [
-        sys.executable,
-        "-m",
-        "eitskin.cli.main",
-        "tradeoff",
-        "run",
-        "--set",
-        "set.toml",
-        "--scenes",
-        "8",
-        "--train",
-        "4",
-    ]
-    command += ["--set-scenes", "2", "--sets", "pairs", "--elements", str(ELEMENTS)]
-    command += [
-        "--random-skins",
-        "2",
-        "--no-peers",
-        "--counted",
-        "0",
-        "--rounds",
-        "1",
-        "--no-pictures",
-    ]
-
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(str(Path(entry).resolve()) for entry in sys.path),
-    }
-
-    def finished(output: str) -> Any:
-        call = [*command, "-o", output]
-        done = subprocess.run(
-            call,
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=240,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        return comparable(
-            front_from(json.loads((tmp_path / output / "front.json").read_text()), output)
-        )
-
-    call, quiet = [*command, "-o", "cut"], subprocess.DEVNULL
-    killed = subprocess.Popen(call, cwd=tmp_path, env=environment, stdout=quiet, stderr=quiet)
-    results, deadline = tmp_path / "cut" / RESULTS, time.monotonic() + 120
-    while killed.poll() is None and time.monotonic() < deadline:
-        if results.exists() and results.read_bytes().count(b"\n") >= 4:
-            os.kill(killed.pid, signal.SIGKILL)
-            break
-        time.sleep(0.005)
-    killed.wait()
-    assert results.read_bytes().count(b"\n") >= 4
-    assert finished("cut") == finished("whole")
 
 
 def session(name: str, count: int = 3) -> FrameSession:
