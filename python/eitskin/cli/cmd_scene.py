@@ -1,17 +1,15 @@
-"""``eitskin scene run | plan | picture | list | effects | dataset``: simulated sessions."""
+"""``eitskin scene run | plan | picture | list | effects``: simulated sessions."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.progress import bar, lines
-from eitskin.errors import FileError, UsageError
+from eitskin.cli.progress import bar
+from eitskin.errors import FileError
 
 SCENE_HELP = "a scene file, or a scene of the library (eitskin scene list)"
 
@@ -55,47 +53,16 @@ def add_parser(subparsers: Any) -> None:
     option(effects, "name NAME", "an effect", nargs="?")
     option(effects, "--json")
     effects.set_defaults(run=run_effects)
-    _add_dataset(what)
 
 
-def _add_dataset(what: Any) -> None:
-    dataset = what.add_parser(
-        "dataset",
-        help="many seeded scenes drawn from ranges, in chunks; an interrupted run resumes",
-        description=(
-            "Draw scenes from the table [dataset] of a scene and simulate them into a folder of"
-            " chunks. The result depends on the description and the seed only. Run the same command"
-            " again to resume."
-        ),
-    )
-    option(dataset, "scene SCENE", SCENE_HELP)
-    option(dataset, "--count N", "how many scenes", int, required=True)
-    option(dataset, "--seed S", default=1)
-    option(dataset, "--ranges TOML", "file with [dataset] in place of the scene's own", Path)
-    option(dataset, "-o --output FOLDER", None, Path, required=True)
-    option(dataset, "--jobs J", "processes", default=1)
-    option(dataset, "--chunk N", "scenes a file", default=100)
-    option(dataset, "--scheduler ADDRESS", "a Dask scheduler, as tcp://HOST:8786")
-    option(dataset, "--json")
-    dataset.set_defaults(run=run_dataset)
+def check_folder(path: Path) -> None:
+    """Refuse a file in a folder that is not there.
 
-
-def _check_folder(path: Path) -> None:
+    Raises:
+        FileError: it is not.
+    """
     if not path.parent.is_dir():
         raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
-
-
-def scene_progress(done: Iterable[int], total: int) -> Iterable[int]:
-    """A bar over ``total`` scenes that ``done`` numbers bring nearer."""
-    from tqdm import tqdm
-
-    if not sys.stderr.isatty():
-        yield from lines(done, "scenes", total, weight=int)
-        return
-    with tqdm(total=total, desc="scenes", unit="", leave=False) as shown:
-        for scenes in done:
-            shown.update(scenes)
-            yield scenes
 
 
 def run_scene(options: argparse.Namespace) -> int:
@@ -105,7 +72,7 @@ def run_scene(options: argparse.Namespace) -> int:
     from eitskin.scene.library_scenes import find_scene
     from eitskin.scene.runner import run
 
-    _check_folder(options.output)
+    check_folder(options.output)
     scene = find_scene(options.scene)
     frames = run(compile_scene(scene), truth_pixels=options.truth_pixels, progress=bar("solving"))
     save_frames(options.output, frames)
@@ -152,7 +119,7 @@ def run_picture(options: argparse.Namespace) -> int:
     from eitskin.view.panels import check_picture
     from eitskin.view.scene_pictures import draw_scene
 
-    _check_folder(options.output)
+    check_folder(options.output)
     check_picture(options.output)
     scene = find_scene(options.scene)
     draw_scene(
@@ -215,39 +182,4 @@ def run_effects(options: argparse.Namespace) -> int:
             f"  {one['name']:<24} {one['default']!s:<12} {unit:<8} {allowed:<18}"
             f" {one.get('doc', '')}".rstrip()
         )
-    return 0
-
-
-def run_dataset(options: argparse.Namespace) -> int:
-    """Draw and simulate many scenes."""
-    from time import perf_counter
-
-    from eitskin.scene.dataset import job_of, write_dataset
-    from eitskin.scene.library_scenes import find_scene
-
-    _check_folder(options.output)
-    if options.scheduler is not None and options.jobs != 1:
-        raise UsageError(
-            "dataset: --jobs goes with this computer, --scheduler with a cluster; give one of them"
-        )
-    job = job_of(
-        find_scene(options.scene),
-        options.count,
-        options.seed,
-        chunk=options.chunk,
-        ranges_file=options.ranges,
-    )
-    start = perf_counter()
-    done = write_dataset(
-        job, options.output, jobs=options.jobs, scheduler=options.scheduler, progress=scene_progress
-    )
-    seconds = perf_counter() - start
-    if options.json:
-        print(json.dumps({**done, "seconds": seconds, "output": str(options.output)}, indent=2))
-        return 0
-    kept = f", {done['chunks_kept']} chunks were there already" if done["chunks_kept"] else ""
-    print(
-        f"{done['scenes_made']} scenes in {done['chunks_made']} chunks{kept} -> {options.output}"
-        f" ({seconds:.1f} s)"
-    )
     return 0

@@ -3,7 +3,7 @@ static scenes.
 
 Runs are interleaved and medians reported; meshing is not timed but for the effect that needs a mesh
 of its own, once, before timing. The dataset's scenes are drawn, solved, measured and compressed as
-``eitskin scene dataset`` does it.
+``eitskin dataset`` does it.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ import numpy as np
 
 from eitskin.fem.cem import factorise
 from eitskin.scene.compiler import compile_scene
-from eitskin.scene.dataset import Job, job_of, make_chunk
-from eitskin.scene.dataset_ranges import drawn
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.registry import BUILT_IN
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.touch_path import Keyframe, TouchTrack
+from eitskin_studies.datasets.dataset import Job, job_of, make_chunk
+from eitskin_studies.datasets.ranges import drawn
 from eitskin_studies.harness.machine import machine
 
 Progress: TypeAlias = Callable[[Sequence[Any]], Iterable[Any]]

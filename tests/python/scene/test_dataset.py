@@ -1,17 +1,22 @@
 """Datasets: the same bytes however made, resumed where left, ranges kept."""
 
+import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_helpers import ELEMENTS, scene_command, still_scene
+from scene_helpers import ELEMENTS, still_scene
 
 from eitskin.errors import ConfigError, FileError, MissingExtraError, UsageError
-from eitskin.scene import dataset
 from eitskin.scene.compiler import compile_scene
-from eitskin.scene.dataset import (
+from eitskin.scene.library_scenes import find_scene
+from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import MeshCache
+from eitskin_studies.cli import cmd_dataset
+from eitskin_studies.datasets import dataset
+from eitskin_studies.datasets.dataset import (
     Job,
     chunk_path,
     frames_of,
@@ -20,10 +25,15 @@ from eitskin.scene.dataset import (
     make_chunk,
     write_dataset,
 )
-from eitskin.scene.dataset_ranges import drawn, ranges_of
-from eitskin.scene.library_scenes import find_scene
-from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import MeshCache
+from eitskin_studies.datasets.ranges import drawn, ranges_of
+
+
+def dataset_command(*arguments: str) -> int:
+    """``eitskin dataset ARGUMENTS``; errors are raised."""
+    parser = argparse.ArgumentParser()
+    cmd_dataset.add_parser(parser.add_subparsers())
+    options = parser.parse_args(["dataset", *arguments])
+    return int(options.run(options))
 
 
 def small_job(count: int = 7, seed: int = 3, chunk: int = 3) -> Job:
@@ -208,16 +218,16 @@ def test_the_command_takes_ranges_from_a_file_and_resumes(tmp_path, capsys):
     )
     ranges = tmp_path / "r.toml"
     ranges.write_text("[dataset.ranges.touch.0]\nx_mm = [-40.0, 40.0]\n", encoding="utf-8")
-    command = ["dataset", str(scene), "--ranges", str(ranges), "--count", "5", "--chunk", "2"]
+    command = [str(scene), "--ranges", str(ranges), "--count", "5", "--chunk", "2"]
     command += ["-o", str(tmp_path / "d")]
-    assert scene_command(*command, "--json") == 0
+    assert dataset_command(*command, "--json") == 0
     assert json.loads(capsys.readouterr().out)["scenes_made"] == 5
     chunk_path(tmp_path / "d", 1).unlink()
-    assert scene_command(*command, "--jobs", "2") == 0
+    assert dataset_command(*command, "--jobs", "2") == 0
     assert "2 scenes in 1 chunks, 2 chunks were there already" in capsys.readouterr().out
     x = np.concatenate(
         [load_chunk(chunk_path(tmp_path / "d", k))["touch_xy_mm"][:, 0] for k in range(3)]
     )
     assert len(set(x.tolist())) == 5 and np.abs(x).max() <= 40
     with pytest.raises(UsageError, match="give one of them"):
-        scene_command(*command, "--jobs", "2", "--scheduler", "tcp://h:1")
+        dataset_command(*command, "--jobs", "2", "--scheduler", "tcp://h:1")

@@ -30,13 +30,13 @@ from eitskin.fileio import parse_json, write_bytes
 from eitskin.frames.arrays import read_npz
 from eitskin.frames.frames import Frames
 from eitskin.scene.compiler import compile_scene
-from eitskin.scene.dataset_ranges import Ranges, drawn, ranges_of
 from eitskin.scene.description import Scene
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.truth import truth_of
 from eitskin.skin.protocol import table as protocol_of_rows
 from eitskin.skin.skin import skin_to_table
+from eitskin_studies.datasets.ranges import Ranges, drawn, ranges_of
 
 FORMAT = "eitskin-dataset"
 VERSION = 1
@@ -356,5 +356,5 @@ def frames_of(chunk: dict[str, npt.NDArray[Any]], number: int) -> Frames:
             name: chunk[name][own]
             for name in ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength")
         },
-        meta={"made_by": "eitskin scene dataset", "seed": int(chunk["seed"][number])},
+        meta={"made_by": "eitskin dataset", "seed": int(chunk["seed"][number])},
     )

@@ -1,0 +1,1 @@
+"""Many scenes drawn from one."""
