@@ -123,27 +123,6 @@ def test_both_widths_show_the_same(libraries):
     assert shown(libraries["f32"]) == shown(libraries["f64"])
 
 
-def test_an_offender_is_noticed(tmp_path):
-    """The judges above, on a library that does all that the core must not."""
-    source, member, library = tmp_path / "bad.c", tmp_path / "bad.o", tmp_path / "libbad.a"
-    source.write_text(
-        "#include <stdio.h>\n#include <stdlib.h>\n"
-        "static int calls;\nint table[3] = {1, 2, 3};\n_Thread_local int own = 4;\n"
-        'const char *const names[] = {"a", "b"};\n'
-        'void *helper(void) { printf("%d %d", ++calls, ++own); return'
-        " malloc((size_t)table[0]); }\n",
-        encoding="ascii",
-    )
-    run(tool("cc", "gcc", "clang"), "-O0", "-fPIC", "-c", source, "-o", member)
-    run(tool("ar"), "rcs", library, member)
-    assert {"printf", "malloc"} <= asked_of_others(library)
-    assert {"calls", "table", "section .data", "section .bss", "section .tdata"} <= writable(
-        library
-    )
-    assert "names" not in writable(library)
-    assert {"helper", "table", "names"} <= shown(library)
-
-
 @pytest.mark.parametrize("width", WIDTHS)
 def test_every_source_is_built(libraries, width):
     members = {

@@ -135,12 +135,3 @@ def test_rooms_are_small():
         counts[path.parent] = counts.get(path.parent, 0) + 1
     assert {path.name for path in counts} == {*ROOMS, *APART}
     assert max(counts.values()) <= MOST_FILES
-
-
-def test_offenders_are_noticed():
-    assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == ["a", "b", "c", "a"]
-    assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
-    assert "solve" not in allowed("frame")
-    assert strangers("ctx->solver.x[3] = 1; /* ctx->frame.y = 0; */", "touch") == ["solver"]
-    assert strangers("ctx->frame.y[i] += 1; ++ctx->tracker.count;", "solve") == ["frame", "tracker"]
-    assert strangers("if (ctx->solver.warm == 1) ctx->info.gap = 0;", "frame") == []

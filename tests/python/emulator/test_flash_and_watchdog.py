@@ -24,21 +24,6 @@ def flashed(body: str, s: float = 3.0, bank: bytes = b"") -> EmulatedBoard:
     return board
 
 
-def test_erase_and_program():
-    board = flashed(OPEN + ERASE + "OUT[2] = DWT_CYCCNT;" + WRITE + CLOSE, bank=b"\0" * BANK_BYTES)
-    word, status, cycles, done = out(board, 4)
-    assert (word, status, done) == (0x12345678, 0, 1)
-    assert (
-        16_000_000 <= cycles <= 16_000_200
-    )  # one second at 16 MHz, in which the processor stood still
-    assert board.bank(0)[:0x10] == b"\xff" * 16
-    assert board.bank(0)[0x10:0x14] == bytes.fromhex("78563412")
-    assert board.bank(0)[0x40000:] == b"\0" * 0x40000  # the next sector
-    found = board.flash.sectors_erased, board.flash.words_programmed, board.flash.not_erased
-    assert found == (1, 1, 0)
-    assert not board.record.hazards
-
-
 def test_a_word_takes_16_us():
     many = (
         "FLASH_CR = 2u << 8 | 1u; for (uint32_t k = 0; k < 100; ++k) { REG32(0x08040010u + 4 * k)"
@@ -121,16 +106,6 @@ def test_a_watchdog_that_is_not_fed_resets_the_board():
     assert board.record.resets == ["power", "watchdog"]
     flag, csr, again = out(board, 3)
     assert (flag, csr >> 29 & 1, again) == (0x5A5A, 1, 1)
-
-
-def test_feeding_keeps_it_away():
-    board = run_program(
-        WATCHDOG
-        % "for (;;) { for (volatile uint32_t k = 0; k < 100000; ++k) ; IWDG_KR = 0xAAAA; }",
-        300_000,
-    )
-    assert board.record.resets == ["power"]
-    assert board.iwdg.feeds > 3
 
 
 def test_its_registers_are_locked():

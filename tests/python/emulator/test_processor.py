@@ -1,14 +1,13 @@
 """The emulated processor alone: slices, exceptions, priorities, sleep, faults."""
 
 import pytest
-from thumb import CLOCK, OUT, STACK_TOP, compile_program, flat_skin, out, run_program, unexpected
+from thumb import CLOCK, compile_program, flat_skin, out, run_program
 
 from eitskin.errors import DeviceError
 from eitskin_emulator import board as board_module
 from eitskin_emulator import counter
 from eitskin_emulator.board import EmulatedBoard
 from eitskin_emulator.clocktime import TICKS_PER_US
-from eitskin_emulator.memory import RAM
 
 # arithmetic with IT blocks, floating point, division and memory: whatever slicing could spoil
 MIXED = """
@@ -339,9 +338,3 @@ def test_a_bug_in_a_peripheral_is_not_swallowed(monkeypatch):
     monkeypatch.setattr("eitskin_emulator.peripherals.rcc.Rcc.read", broken)
     with pytest.raises(ZeroDivisionError, match="a bug"):
         run_program("void program(void) { OUT[0] = RCC_CR; }", 100)
-
-
-def test_an_unexpected_interrupt_is_seen_by_these_tests():
-    board = run_program("void program(void) { SCB_ICSR = 1u << 28; }", 100)
-    assert unexpected(board) == 14
-    assert STACK_TOP > RAM < OUT

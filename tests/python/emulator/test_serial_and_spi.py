@@ -6,7 +6,6 @@ from thumb import CLOCK, compile_program, flat_skin, out, run_program
 
 from eitskin_emulator.board import EmulatedBoard
 from eitskin_emulator.clocktime import TICKS_PER_US
-from eitskin_emulator.memory import RAM
 from eitskin_emulator.serial_line import resampled
 
 SERIAL = """
@@ -36,21 +35,6 @@ SENT = bytes((k * 7 + 1) % 256 for k in range(100))
 
 def sending(setup: str = SERIAL, us: float = 2000) -> EmulatedBoard:
     return run_program(CLOCK + SEND % setup, us, (14,))
-
-
-def test_bytes_reach_the_host_at_a_megabaud():
-    board = EmulatedBoard(compile_program(CLOCK + SEND % SERIAL, (14,)), flat_skin())
-    ends = []
-    while len(ends) < 100:
-        board.run_until(board.clock.now + 2 * TICKS_PER_US)
-        ends += [board.clock.now] * len(board.receive())
-    assert 989 * TICKS_PER_US <= ends[-1] - ends[0] <= 991 * TICKS_PER_US
-    board = sending()
-    assert board.receive() == SENT
-    count, flags, status = out(board, 3)
-    assert (count, flags >> 22 & 0x3D) == (1, 0x30)
-    assert not status & 1 << 6  # two bytes are still on their way when DMA has moved the last
-    assert not board.record.hazards
 
 
 @pytest.mark.parametrize(
@@ -108,18 +92,6 @@ def receiving(chunks: list[bytes], setup: str = SERIAL, gap_us: int = 500) -> Em
         board.send(chunk)
         board.run_until(board.clock.now + (10 * len(chunk) + gap_us) * TICKS_PER_US)
     return board
-
-
-def test_bytes_from_the_host_go_round_the_ring_and_idle_is_told():
-    data = bytes(range(1, 151))
-    board = receiving([data[:10], data[10:150]])
-    laps, idles, first, second, *_ = out(board, 12)
-    assert (laps, idles) == (2, 2)
-    assert (first, second) == (1 << 4, 1 << 4)
-    assert out(board, 12)[10:] == [54, 64 * 3 - 150]
-    ring = board.memories.ram[0x11000 : 0x11000 + 64]
-    assert ring == data[128:150] + data[86:128]
-    assert board.usart.bytes_lost == 0
 
 
 def test_idle_comes_a_byte_time_after_the_last_byte():
@@ -193,14 +165,6 @@ def shifted(setup: str = SPI, mode: str = CPOL, shift: str = SHIFT) -> EmulatedB
     return run_program(CLOCK + shift % setup.replace("@", mode), 1000)
 
 
-def test_words_arrive_in_mode_2():
-    board = shifted()
-    assert board.generator.words == list(WORDS)
-    assert board.generator.frequency_hz == pytest.approx(0x10C7 / 2**28 * 8e6)
-    assert (board.generator.ignored_bits, board.generator.early_clocks) == (0, 0)
-    assert out(board, 1) == [1]
-
-
 @pytest.mark.parametrize("mode", ["0", "3"], ids=["mode 0", "mode 3"])
 def test_wrong_modes_garble_every_word(mode):
     words = shifted(mode=mode).generator.words
@@ -253,11 +217,3 @@ def test_a_word_takes_its_time():
     )
     cycles = out(shifted(SPI + "cycle_counter();", shift=source), 2)[1]
     assert 1024 <= cycles <= 1040
-
-
-def test_mclk_is_what_the_pin_gives():
-    assert shifted().generator.mclk_hz == 8_000_000
-    assert shifted(SPI.replace("0xA8020000u", "0xA8000000u")).generator.mclk_hz == 0
-    found = shifted(SPI + "RCC_CFGR = (RCC_CFGR & ~(7u << 24)) | 4u << 24;").generator.mclk_hz
-    assert found == 4_000_000
-    assert RAM == 0x20000000

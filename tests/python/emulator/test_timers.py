@@ -123,28 +123,6 @@ def watched(
     return board, times
 
 
-def test_bursts_are_timed_by_hardware_alone():
-    """The firmware's chain: a compare of TIM5 starts TIM3, TIM3's OC1REF gates TIM2, TIM2's updates
-    start conversions."""
-    board, times = watched(BURSTS % CHAIN, 1500)
-    start_us, count, *told = out(board, 14)
-    assert count == 6
-    assert [told[2 * k + 1] for k in range(6)] == [1, 0, 1, 0, 1, 0]
-    assert [told[2 * k] - start_us for k in range(6)] == [80, 180, 280, 380, 480, 580]
-    at = np.concatenate(times)
-    assert len(at) == 6 * 80 == board.adc.conversions
-    sampling = 3 * 16  # three cycles of 27 MHz
-    offsets = (at - sampling).reshape(6, 80)
-    assert (np.diff(offsets, axis=1) == TICKS_PER_US).all()
-    assert (np.diff(offsets[:, 0]) == 100 * TICKS_PER_US).all()
-    assert (offsets[0, 0] % TICKS_PER_US) == (offsets[3, 7] % TICKS_PER_US)
-    for memory, first in ((0x11000, 4 * 80), (0x12000, 5 * 80)):
-        found = np.frombuffer(board.memories.ram[memory : memory + 160], dtype="<u2")
-        assert found.tolist() == list(range(first, first + 80))
-    assert not board.record.hazards
-    assert not board.record.unmodelled
-
-
 def test_sample_instants_follow_the_microsecond_clock():
     """Sample k of a slot is taken k + 1/2 us after TIM5 reached the slot's start, and the sampling
     time later."""

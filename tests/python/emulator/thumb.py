@@ -19,7 +19,6 @@ from eitskin_emulator.memory import RAM
 ROOT = Path(__file__).resolve().parents[3]
 BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"
 OUT = 0x20010000  # where programs leave what they found
-STACK_TOP = 0x20008000
 FLAGS = [
     "-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard", "-O1", "-ffreestanding",
 ]  # fmt: skip

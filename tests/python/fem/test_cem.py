@@ -1,7 +1,5 @@
 """The complete electrode model against exact series, against scikit-fem, and against itself."""
 
-import subprocess
-import sys
 from math import pi
 
 import numpy as np
@@ -325,17 +323,3 @@ def test_polygons_end_to_end(rounded_skin, l_skin):
         coarse, fine = (_relative(v, voltages[-1]) for v in voltages[:2])
         assert fine < coarse < 0.02
         assert fine < 0.006  # the L's inner corner slows it down
-
-
-def test_without_scipy():
-    """Skins, grids and meshes do without scipy; the model says how to get it."""
-    code = (
-        "import sys; sys.modules['scipy'] = None\n"
-        "import eitskin.skin.skin, eitskin.fem.grid, eitskin.fem.mesh\n"
-        "from eitskin.errors import MissingExtraError\n"
-        "try:\n    import eitskin.fem.cem\n"
-        "except MissingExtraError as error:\n    print(error)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.count("\n") == 1
-    assert "pip install 'eitskin[model]'" in done.stdout

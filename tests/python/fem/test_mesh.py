@@ -1,6 +1,5 @@
 """Meshes: what they fill, where electrodes end, and a mesher that hangs or fails."""
 
-import importlib.util
 import os
 import subprocess
 import sys
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eitskin.errors import GeometryError, MissingExtraError, UsageError
+from eitskin.errors import GeometryError, UsageError
 from eitskin.fem import mesh as mesh_module
 from eitskin.fem.mesh import Mesh, build_mesh, mesh_for_elements, run_mesher
 from eitskin.skin.electrodes import Electrodes
@@ -213,12 +212,6 @@ def test_a_mesher_that_fails_gives_one_line():
     with pytest.raises(GeometryError, match=r"the mesher failed .*KeyError.*simplify") as caught:
         run_mesher({"pieces": []}, 30, "bad")
     assert "\n" not in str(caught.value)
-
-
-def test_without_netgen(monkeypatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(MissingExtraError, match=r"netgen-mesher.*eitskin\[model\]"):
-        build_mesh(paper_skin(), max_size_mm=9.0)
 
 
 def test_the_worker_starts_light():

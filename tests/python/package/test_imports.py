@@ -95,11 +95,6 @@ def entered(name: str, others: set[str]) -> set[str]:
     return {parent for parent in parents if not f"{name}.".startswith(f"{parent}.")}
 
 
-def test_circles_are_seen():
-    chain = {"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set[str]()}
-    assert circles(chain) == [["b", "c"]]
-
-
 @pytest.mark.parametrize("package", ["eitskin", *CHECKOUT])
 def test_no_module_imports_itself_by_way_of_others(package):
     assert circles(graph(package)) == []

@@ -108,15 +108,6 @@ def test_simulated(live):
     until(lambda: live.text("n-rate").endswith("Hz"))
 
 
-def test_emulated(scene, page):
-    with serving(f"emu:{scene}?loop=1", Stream.IMAGE | Stream.TOUCHES) as server:
-        page.open(server)
-        until(lambda: len(page.touches()) == 2, 60)
-        assert_shown(page)
-        until(lambda: page.text("n-solve").endswith("ms"))
-        until(lambda: "slower than real time" in page.text("log"))
-
-
 def test_recorded(scene, page, tmp_path):
     settings = SessionSettings(ALL, record=tmp_path / "run.eits")
     with Session(f"sim:{scene}", settings) as session:

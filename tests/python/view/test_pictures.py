@@ -1,13 +1,12 @@
 """Pictures: that they are drawn, repeat byte for byte, and show what they are given."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from eitskin.core.diagnostics_table import Touch
-from eitskin.errors import FileError, MissingExtraError
+from eitskin.errors import FileError
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import polygon
@@ -98,12 +97,6 @@ def test_many_panels(tmp_path):
 def test_a_folder_that_is_not_there_is_a_file_error(tmp_path):
     with pytest.raises(FileError, match="existing folder"):
         draw_frame(tmp_path / "none" / "a.png", SKIN, GRID, np.zeros(GRID.n_pixels))
-
-
-def test_without_matplotlib_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(MissingExtraError, match=r"eitskin\[plot\]"):
-        pictures.load_matplotlib()
 
 
 def test_a_known_place_is_an_ellipse_of_ninety_percent():
