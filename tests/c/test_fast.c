@@ -275,6 +275,30 @@ static void test_a_finger(eits_sign sign)
     bench_close(b);
 }
 
+/* Strengths of any size: where the model's volts are 2^-40 as many, a touch is 2^40 times as strong
+ * and in all else the same, to the last bit. */
+TEST(test_any_unit_of_strength)
+{
+    eits_fast_touch touch[2][EITS_FAST_TOUCHES];
+    for (uint32_t k = 0; k < 2; ++k) {
+        bench *b = bench_open(EITS_SIGN_INCREASE);
+        b->skin.model.fields.volts *= k == 0 ? 1.0f : 0x1p-40f;
+        CHECK_EQUAL(eits_fast_init(b->aligned, b->size, b->skin.ctx, &b->fast), EITS_OK);
+        CHECK_EQUAL(eits_fast_begin(b->fast), EITS_OK);
+        drives(b, 8);
+        put(b, 0, 22, 38, 2);
+        put(b, 1, -40, -24, 3);
+        drives(b, 24);
+        check_told(b, 1.0);
+        (void)told(b, touch[k]);
+        bench_close(b);
+    }
+    for (uint32_t n = 0; n < 2; ++n) {
+        CHECK(touch[0][n].x_mm == touch[1][n].x_mm && touch[0][n].y_mm == touch[1][n].y_mm);
+        CHECK(touch[0][n].strength_s_per_m_mm2 * R(0x1p40) == touch[1][n].strength_s_per_m_mm2);
+    }
+}
+
 TEST(test_two_at_once)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);

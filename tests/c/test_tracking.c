@@ -298,4 +298,20 @@ TEST(switched)
     CHECK_EQUAL(t[0].id, 2);
 }
 
+/* A faint touch that is not found is waited for: smoothed it goes on as it went, else it stays. */
+TEST(a_held_touch_goes_on_or_stays)
+{
+    eits_touch t[EITS_MAX_TOUCHES];
+    for (int smooth = 0; smooth < 2; ++smooth) {
+        eits_context *ctx = set_up(&b, 2, 2, 0.66);
+        for (int k = 0; k < 20; ++k)
+            (void)one(ctx, t, k, 0.009);
+        const eits_real x = t[0].x_mm;
+        CHECK_NEAR(x, 19, 0.5);
+        ctx->options.track_smooth = smooth ? R(0.66) : 0;
+        CHECK_EQUAL(none(ctx, t), 1);
+        CHECK_NEAR(t[0].x_mm, x + (smooth ? 1 : 0), smooth ? 0.1 : 0);
+    }
+}
+
 RUN_TESTS("track in time", dense_bench_close(&b))
