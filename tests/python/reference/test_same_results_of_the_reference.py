@@ -15,7 +15,7 @@ from eitskin.errors import FrameError
 from eitskin.model.build import BuildSettings, make_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options, tracking
-from eitskin.reference.engine import ReferenceEngine
+from eitskin_reference.engine import ReferenceEngine
 from same_results import check_same
 from small_models import prebuilt, sheet_without_mesh
 
