@@ -76,7 +76,7 @@ SPOILT: dict[str, Callable[[], Frames]] = {
         healthy_frames(14), np.random.default_rng(14).uniform(0.7, 1.3, 208)
     ),
     "noisy": lambda: healthy_frames(15, snr_db=18),
-    "noiseless": lambda: healthy_frames(16, gain=0, snr_db=300),
+    "all but noiseless": lambda: healthy_frames(16, gain=0, snr_db=200),
     "noisy channel": lambda: spoilt(
         17, lambda v, draw: put(v, (slice(None), 5), v[:, 5] * draw.normal(1, 0.2, len(v)))
     ),
