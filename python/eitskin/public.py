@@ -10,7 +10,8 @@ from typing import Any
 from eitskin.device.settings import SolverSettings
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame, Notice
-from eitskin.live.session import Session, SessionSettings, kinds_of
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings, kinds_of
 from eitskin.live.zones import load_zones
 from eitskin.model.model import Model
 from eitskin.model.options import default_options

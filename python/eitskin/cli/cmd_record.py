@@ -23,7 +23,7 @@ from eitskin.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from eitskin.device.live import Item, LiveSummary
+    from eitskin.device.live_frames import Item, LiveSummary
 
 
 def add_parser(subparsers: Any) -> None:
@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _until(items: Iterator[Item], seconds: float | None) -> Iterator[Item]:
-    from eitskin.device.live import LiveFrame
+    from eitskin.device.live_frames import LiveFrame
 
     for item in items:
         yield item
@@ -89,7 +89,7 @@ def _count(items: Iterable[Item], summary: LiveSummary, frames: int) -> None:
     from tqdm import tqdm
 
     from eitskin.device.events import Events
-    from eitskin.device.live import LiveDrive, LiveFrame
+    from eitskin.device.live_frames import LiveDrive, LiveFrame
     from eitskin.device.wire.packets import Fault
 
     events = Events()

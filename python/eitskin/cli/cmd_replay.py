@@ -64,7 +64,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _show(options: argparse.Namespace) -> None:
     from eitskin.cli.live_output import check_drawn, show
-    from eitskin.live.session import Session, SessionSettings
+    from eitskin.live.session import Session
+    from eitskin.live.settings import SessionSettings
 
     mode = read_mode(options.mode or "touches")
     check_drawn(options, mode)

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from eitskin.device.client import Device
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.link_table import Stream
-    from eitskin.live.session import Session, SessionSettings
+    from eitskin.live.session import Session
+    from eitskin.live.settings import SessionSettings
     from eitskin.sinks.outputs import Outputs
 
 DEVICE_HELP = (
@@ -211,7 +212,7 @@ def read_mode(text: str) -> Stream:
     Raises:
         UsageError: one is unknown.
     """
-    from eitskin.live.session import kinds_of
+    from eitskin.live.settings import kinds_of
 
     return kinds_of(text, "--mode")
 
@@ -358,7 +359,7 @@ def session_settings(
         FileError: the recording could not be written.
     """
     from eitskin.device.settings import check_tare_frames
-    from eitskin.live.session import SessionSettings
+    from eitskin.live.settings import SessionSettings
 
     every, frames = read_every(options)
     if options.report == "drive" and every > 1:

@@ -93,7 +93,7 @@ def _of_board(options: argparse.Namespace) -> tuple[np.ndarray, Protocol]:
 
     from eitskin.cli.teach_record import raw_session
     from eitskin.device.known_model import scanned_protocol
-    from eitskin.device.live import LiveFrame
+    from eitskin.device.live_frames import LiveFrame
     from eitskin.errors import DeviceError
 
     with raw_session(options, options.model, TARE_FRAMES) as session:

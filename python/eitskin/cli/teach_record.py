@@ -131,7 +131,8 @@ def raw_session(
     from dataclasses import replace
 
     from eitskin.device.wire.link_table import Stream
-    from eitskin.live.session import Session, SessionSettings
+    from eitskin.live.session import Session
+    from eitskin.live.settings import SessionSettings
     from eitskin.teaching.guide import scan_of_presses
 
     settings = SessionSettings(
@@ -144,7 +145,7 @@ def raw_session(
 
 
 def _live(session: Session) -> TimedFrames:
-    from eitskin.device.live import LiveFrame
+    from eitskin.device.live_frames import LiveFrame
 
     for item in session.items():
         if isinstance(item, LiveFrame) and item.raw is not None and not item.raw.quiet:

@@ -12,10 +12,11 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.device.bandwidth import carried_every
 from eitskin.device.known_model import need_model
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame, LiveSummary, begin_scene, follow, set_up, take_reference
+from eitskin.device.live_frames import LiveFrame, LiveSummary, follow
 from eitskin.device.open import open_device
 from eitskin.device.recordings.host_check import HostCheck, HostTwin
 from eitskin.device.recordings.packet_log import PacketLog
+from eitskin.device.set_up import begin_scene, set_up, take_reference
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo

@@ -9,8 +9,8 @@ from typing import Any
 
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, scanned_protocol
-from eitskin.device.live import begin_scene
 from eitskin.device.recordings.raw_frames import RawRun, as_frames, collect
+from eitskin.device.set_up import begin_scene
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.link_table import FaultCode
 from eitskin.device.wire.packets import ELECTRODE_FAULTS, BoardInfo, BoardStats, Fault

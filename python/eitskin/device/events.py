@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from eitskin.core.diagnostics import names, words
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import Item, LiveDrive
+from eitskin.device.live_frames import Item, LiveDrive
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FAULT_RAISE_FRAMES, FaultCode
 from eitskin.device.wire.packets import DOUBTFUL_FAULTS, FOUND_FAULTS, Fault, Solved

@@ -14,7 +14,7 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import GestureEvent
 from eitskin.core.notebook import places_text, touches_html
 from eitskin.device.known_model import KnownModel
-from eitskin.device.live import LiveDrive, LiveFrame
+from eitskin.device.live_frames import LiveDrive, LiveFrame
 from eitskin.device.wire.link_table import FollowedTouch
 from eitskin.device.wire.packets import Solved
 from eitskin.live.message import frame_table, head, report_table, true_table

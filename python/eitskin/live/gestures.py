@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from eitskin.core.gestures import GestureEvent, Gestures, Zone
-from eitskin.device.live import LiveFrame
+from eitskin.device.live_frames import LiveFrame
 
 
 class GestureTeller:

@@ -12,31 +12,26 @@ import time
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
 
-from eitskin.config import nearest
-from eitskin.core.gestures import Zone
 from eitskin.device.bandwidth import carried_every
 from eitskin.device.client import Device
 from eitskin.device.events import Events
 from eitskin.device.known_model import KnownModel, find_model, need_model
 from eitskin.device.link import LinkEvent, Reconnect
-from eitskin.device.live import (
+from eitskin.device.live_frames import (
     Clock,
     Item,
     LiveDrive,
     LiveFrame,
     LiveSummary,
-    begin_scene,
     finish,
     put_together,
     replayed,
-    set_up,
-    take_reference,
 )
 from eitskin.device.open import open_device
+from eitskin.device.set_up import begin_scene, set_up, take_reference
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.timing import Pacer, Slowness, WaitingClock, split_timing
 from eitskin.device.wire.link_table import Setting, Stream
@@ -44,72 +39,20 @@ from eitskin.device.wire.packets import Fault
 from eitskin.errors import EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.gestures import GestureTeller
+from eitskin.live.settings import KINDS, Say, SessionSettings
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore, truth_of
 from eitskin.scoring.stream_check import Watcher
 
 if TYPE_CHECKING:
     from eitskin.core.results import Options
     from eitskin.device.recordings.recording import Recorder
-    from eitskin.tuning.front import Target
 
 TARE_FRAMES = 16
 KEPT_ON = (
     "the board's owner has set keep-drive: current flows on when this program ends;  eitskin board"
     " --no-keep-drive  changes that"
 )
-KINDS = ("raw", "image", "touches", "events")
-REPORTS = ("frame", "drive")
-Say: TypeAlias = Callable[[str], None]
 T = TypeVar("T")
-
-
-def kinds_of(text: str, name: str) -> Stream:
-    """The kinds in "raw,touches"; ``name`` is the option that gave them.
-
-    Raises:
-        UsageError: one is unknown.
-    """
-    what = Stream(0)
-    for kind in text.split(","):
-        if kind not in KINDS:
-            raise UsageError(f"{name} {text}: {nearest(kind, KINDS)}")
-        what |= Stream[kind.upper()]
-    return what
-
-
-@dataclass(frozen=True)
-class SessionSettings:
-    """What a session is to be; what is not named stays as the board has it.
-
-    Attributes:
-        mode: what is streamed.
-        report: "frame", or also touches after each "drive", with their velocity.
-        every: every n-th frame; 0: as many as the line carries.
-        frames: stop after so many; 0: go on until the scene or the recording ends.
-        model: a file, where the board's model is not the prebuilt one.
-        firmware: of an emulated board.
-        model_for: what cannot do without the board's model, such as "a picture"; "": nothing.
-        tare: take the reference from so many frames; None: from 16 where that is needed.
-        zones: named places that fingers press (``eitskin.live.zones``).
-        target: a budget or an accuracy that chooses the solver's settings.
-        record: a new recording of every packet; an existing file is written over.
-        quiet_frames: those of the reference are sent too, for taps of the link.
-    """
-
-    mode: Stream = Stream.TOUCHES
-    report: str = "frame"
-    every: int = 0
-    frames: int = 0
-    model: Path | None = None
-    firmware: Path | None = None
-    model_for: str = ""
-    scan: ScanSettings = field(default_factory=ScanSettings)
-    solver: SolverSettings = field(default_factory=SolverSettings)
-    zones: tuple[Zone, ...] = ()
-    target: Target | None = None
-    tare: int | None = None
-    record: Path | None = None
-    quiet_frames: bool = False
 
 
 class Session:
@@ -336,7 +279,7 @@ class Session:
         else:
             self.known = find_model(board, how.model, self.name)
         if self.replays:
-            self._refuse_settings()
+            how.refuse_of_recording(self.name)
             self.truth = _recorded_truth(self.url) if self._solves else None
         else:
             self.truth = truth_of(self.url, how.solver.sign or "increase")
@@ -402,41 +345,7 @@ class Session:
         Raises:
             UsageError: no measured point of the board's model does what the target asks for.
         """
-        scan, named, target = self.settings.scan, self.settings.solver, self.settings.target
-        if target is None:
-            return scan, named
-        from eitskin.tuning.for_model import chosen_point, settings_text
-        from eitskin.tuning.front import REPORT_US, board_takes
-
-        known = self.known
-        if known is None:
-            known = need_model(self.device.board, self.settings.model, self.name, "a budget")
-        any_scan = target.unit == REPORT_US
-        now = named.applied(known.model, self.device.board)
-        point = chosen_point(target, known.model, now, board_takes(), any_scan)
-        self._say(settings_text(point, target.board))
-        one = point.configuration
-        kept = {k: value for k, value in one.solver_settings.items() if k in board_takes()}
-        own = {key: getattr(named, key) for key in ("sign", "warm_start", "diagnostics", "track")}
-        if any_scan:
-            check_every = 1 if one.scan == "full" else 0
-            scan = replace(scan, samples=one.samples, check_every=check_every)
-        return scan, replace(SolverSettings(**kept), **own)
-
-    def _refuse_settings(self) -> None:
-        """A recording takes no settings."""
-        how = self.settings
-        named: dict[str, Any] = {**how.scan.named, **how.solver.named}
-        if how.target is not None:
-            named["preset, budget or accuracy"] = True
-        if named or how.tare is not None:
-            what = next(iter(named), "tare").replace("_", "-")
-            raise UsageError(
-                f"{self.name} is a recording, {what} cannot be set any more; leave the options of"
-                " scan, solver and tare out"
-            )
-        if how.record is not None:
-            raise UsageError(f"{self.name} is a recording already; copy the file")
+        return self.settings.scan_and_solver(self.device.board, self.known, self.name, self._say)
 
     def _carried(self) -> int:
         """Every how manieth frame the line carries; with touches after each drive all are asked

@@ -32,7 +32,8 @@ from eitskin import __version__
 from eitskin.device.wire.link_table import Stream
 from eitskin.live.frame import Frame
 from eitskin.live.message import encoded
-from eitskin.live.session import KINDS, Session
+from eitskin.live.session import Session
+from eitskin.live.settings import KINDS
 
 MAGIC = b"EVF1"
 HEAD = struct.Struct("<4sIII")

@@ -16,8 +16,8 @@ import numpy as np
 
 from eitskin.device.client import Device
 from eitskin.device.link import Reconnect
-from eitskin.device.live import set_up, take_reference
 from eitskin.device.recordings.recording import Recorder
+from eitskin.device.set_up import set_up, take_reference
 from eitskin.device.settings import ScanSettings
 from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import PacketType, Stream
@@ -25,7 +25,8 @@ from eitskin.device.wire.packets import RawFrame
 from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.errors import DeviceError, EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice, Report
-from eitskin.live.session import KINDS, TARE_FRAMES, Session, SessionSettings
+from eitskin.live.session import TARE_FRAMES, Session
+from eitskin.live.settings import KINDS, SessionSettings
 from eitskin.tuning.front import preset
 
 if TYPE_CHECKING:

@@ -21,7 +21,8 @@ from urllib.parse import urlsplit
 from eitskin.device.timing import read_speed
 from eitskin.errors import EitskinError, UsageError, missing_extra
 from eitskin.live.frame import Frame
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 from eitskin.page.facts import frame_bytes, setup_text, text_of
 from eitskin.page.follower import Follower
 from eitskin.page.hub import Hub, Outgoing, PageClient

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from eitskin.core.diagnostics import words
 from eitskin.core.results import force_text, solve_text
 from eitskin.device.known_model import KnownModel
-from eitskin.device.live import LiveFrame
+from eitskin.device.live_frames import LiveFrame
 from eitskin.device.wire.explain import quality_text
 from eitskin.errors import MissingExtraError
 from eitskin.scene.random_touches import TrueTouch

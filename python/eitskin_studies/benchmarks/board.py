@@ -254,8 +254,9 @@ def measure_rate(
         MissingExtraError: the emulator is not installed.
         DeviceError: the board gives no frames.
     """
-    from eitskin.device.live import LiveFrame, begin_scene, follow, take_reference
+    from eitskin.device.live_frames import LiveFrame, follow
     from eitskin.device.open import open_device
+    from eitskin.device.set_up import begin_scene, take_reference
     from eitskin.device.settings import ScanSettings, apply_scan
     from eitskin.device.wire.link_table import Stream
 

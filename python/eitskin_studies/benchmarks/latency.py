@@ -22,7 +22,8 @@ from eitskin.device.ports import BAUD
 from eitskin.device.wire.codec import Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream
 from eitskin.live.frame import Frame, Report
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 from eitskin_studies.benchmarks.outputs import BITS_A_BYTE, host_times_ms
 from eitskin_studies.gestures.bench import wilson
 from eitskin_studies.harness.machine import machine

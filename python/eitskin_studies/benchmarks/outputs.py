@@ -30,7 +30,8 @@ from eitskin.device.ports import BAUD
 from eitskin.device.wire.codec import Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream
 from eitskin.live.frame import Frame
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import Source
 from eitskin_studies.harness.machine import machine

@@ -12,9 +12,10 @@ from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
-from eitskin.device.live import LiveFrame, follow, take_reference
+from eitskin.device.live_frames import LiveFrame, follow
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
+from eitskin.device.set_up import take_reference
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.link_table import Stream
 from eitskin.model.eitm import decode_model, load_model

@@ -14,10 +14,11 @@ from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.events import Events
 from eitskin.device.known_model import board_options
-from eitskin.device.live import LiveFrame, follow, take_reference
+from eitskin.device.live_frames import LiveFrame, follow
 from eitskin.device.open import open_device
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
+from eitskin.device.set_up import take_reference
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FaultCode, PacketType, Stream

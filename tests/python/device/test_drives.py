@@ -17,7 +17,8 @@ from eitskin.device.wire.payloads import MalformedPacket, pack, parse
 from eitskin.errors import DeviceError
 from eitskin.live.frame import Frame, Report
 from eitskin.live.message import schema
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 
 DRIVE_S, SCAN_S = 1.3e-3, 20.8e-3
 CONTACT_S, MOVES_S, STOPS_S = 0.0527, 0.1, 0.2

@@ -9,13 +9,14 @@ import pytest
 from eitskin.core.gestures import Gestures, Zone
 from eitskin.core.gestures_table import EventKind
 from eitskin.device.client import Device
-from eitskin.device.live import follow
+from eitskin.device.live_frames import follow
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import FileTransport
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "python"
 

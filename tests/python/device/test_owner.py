@@ -10,7 +10,8 @@ from eitskin.device.client import Device
 from eitskin.device.open import open_device
 from eitskin.device.wire.link_table import LIMIT_KEPT, Drive, Setting, Settings
 from eitskin.errors import DeviceError
-from eitskin.live.session import KEPT_ON, Session, SessionSettings
+from eitskin.live.session import KEPT_ON, Session
+from eitskin.live.settings import SessionSettings
 from eitskin.model.prebuilt import load_prebuilt
 
 

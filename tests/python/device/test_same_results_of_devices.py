@@ -13,7 +13,7 @@ from device_helpers import board_info
 from eitskin.device import bandwidth, check, known_model
 from eitskin.device.events import Events
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame, LiveSummary
+from eitskin.device.live_frames import LiveFrame, LiveSummary
 from eitskin.device.sample import Sample
 from eitskin.device.settings import ScanSettings, SolverSettings, check_tare_frames
 from eitskin.device.wire import explain, link_table

@@ -10,7 +10,8 @@ from eitskin.device.timing import Pacer, Slowness, Timing, split_timing
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 
 
 class CountedClock:

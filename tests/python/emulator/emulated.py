@@ -9,7 +9,7 @@ from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, board_options
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame, put_together
+from eitskin.device.live_frames import LiveFrame, put_together
 from eitskin.device.recordings.host_check import HostCheck, HostTwin
 from eitskin.device.transport import Transport
 from eitskin.device.wire.link_table import Stream

@@ -9,7 +9,7 @@ import numpy as np
 from eitskin.core.diagnostics import names
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
-from eitskin.device.live import LiveFrame, put_together
+from eitskin.device.live_frames import LiveFrame, put_together
 from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FaultCode
 from eitskin.device.wire.packets import Fault
 from eitskin.model.prebuilt import load_prebuilt

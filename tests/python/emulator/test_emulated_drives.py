@@ -6,7 +6,8 @@ import numpy as np
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.wire.link_table import Stream
 from eitskin.live.frame import Frame, Report
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 from eitskin_emulator.peripherals.nvic import PENDSV
 
 DRIVE_US, SCAN_US, FRAMES = 1300, 20_800, 9

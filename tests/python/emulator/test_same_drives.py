@@ -17,7 +17,8 @@ from eitskin.device.wire.codec import Decoder
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import FollowedTouches, RawFrame, SolvedTouches
 from eitskin.device.wire.payloads import parse
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 
 QUIET, FRAMES = 4, 6
 SCENE = f"""[scene]

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from eitskin.cli.main import main
-from eitskin.device.live import LiveFrame, LiveSummary
+from eitskin.device.live_frames import LiveFrame, LiveSummary
 from eitskin.device.sample import SIZE, Sample
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import DeviceError
 from eitskin.frames.frames import save_frames
 from eitskin.live.frame import Frame, Notice
 from eitskin.live.message import schema
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 from small_models import session as small_session
 
 VALID = jsonschema.Draft202012Validator(schema())

@@ -11,7 +11,7 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.session import SessionSettings
+from eitskin.live.settings import SessionSettings
 from eitskin.page.server import PageServer, listen
 from eitskin_studies.harness.live_page import FLAGS
 

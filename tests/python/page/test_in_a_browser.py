@@ -15,7 +15,8 @@ from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.ports import Port
 from eitskin.device.simulated import SimBoard
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.page.server import PageServer
 from eitskin.page.teacher import Teacher

@@ -8,7 +8,7 @@ import pytest
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.device.known_model import KnownModel
-from eitskin.device.live import LiveFrame
+from eitskin.device.live_frames import LiveFrame
 from eitskin.device.wire.link_table import Quality
 from eitskin.device.wire.packets import RawFrame, Solved, SolvedImage, SolvedTouches
 from eitskin.live.frame import Frame

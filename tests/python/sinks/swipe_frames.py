@@ -10,7 +10,8 @@ import pytest
 
 from eitskin.device.wire.link_table import Stream
 from eitskin.live.frame import Frame, Report
-from eitskin.live.session import Session, SessionSettings
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 from eitskin.sinks.sink import Source
 
 os.environ.setdefault("LSLAPICFG", str(Path(__file__).with_name("lsl_local.cfg")))

@@ -115,7 +115,7 @@ def test_only_frames_that_are_whole_become_a_frames_file():
 
 
 def test_of_two_tares_the_last_counts():
-    from eitskin.device.live import LiveFrame
+    from eitskin.device.live_frames import LiveFrame
 
     def live(raw: RawFrame, quiet: bool) -> LiveFrame:
         return LiveFrame(raw.frame, 0, 0, raw=replace(raw, flags=int(quiet)))

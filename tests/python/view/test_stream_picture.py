@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eitskin.device.live import LiveFrame
+from eitskin.device.live_frames import LiveFrame
 from eitskin.device.wire.packets import Solved, SolvedImage
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.stream_check import ComparedFrame

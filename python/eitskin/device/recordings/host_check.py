@@ -16,7 +16,7 @@ from eitskin.core.gestures import Gestures, event_numbers
 from eitskin.core.results import Info, Options, Reconstruction
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import Item, LiveDrive, LiveFrame, follow
+from eitskin.device.live_frames import Item, LiveDrive, LiveFrame, follow
 from eitskin.device.recordings.drives_twin import DrivesTwin
 from eitskin.device.wire.link_table import Quality
 from eitskin.device.wire.packets import BoardInfo, FollowedTouches, RawFrame, Solved

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from eitskin.device.client import Device
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import Item, put_together
+from eitskin.device.live_frames import Item, put_together
 from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import (

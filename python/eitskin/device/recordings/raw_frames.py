@@ -11,7 +11,7 @@ from eitskin import __version__
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import Item, LiveFrame, follow
+from eitskin.device.live_frames import Item, LiveFrame, follow
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame
 from eitskin.errors import DeviceError, FrameError

@@ -219,7 +219,7 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
     """
     from eitskin.device.client import Device
     from eitskin.device.known_model import find_model, scanned_protocol
-    from eitskin.device.live import follow
+    from eitskin.device.live_frames import follow
     from eitskin.device.recordings.raw_frames import as_frames, gather
     from eitskin.device.wire.link_table import Stream
     from eitskin.errors import FrameError

@@ -1,5 +1,4 @@
-"""A session with a board: set it up, take its reference, and follow its frames, each with
-everything that came of it."""
+"""A board's frames as they come, each with everything that came of it."""
 
 from __future__ import annotations
 
@@ -7,14 +6,11 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from eitskin.core.results import Options
 from eitskin.device.client import Device
-from eitskin.device.known_model import NAMES_IT, KnownModel
 from eitskin.device.link import LinkEvent
 from eitskin.device.sample import Sample
-from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
 from eitskin.device.wire.explain import status_text
-from eitskin.device.wire.link_table import Stream, StreamCommand
+from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import (
     BoardStats,
     Fault,
@@ -29,7 +25,6 @@ from eitskin.errors import DeviceError
 
 WRAP_US = 2**32
 LATE_US = 1_000_000
-CLOCK_TIMER, TIMER_COUNT = 5, 0x24  # of the emulated board: its microsecond clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,66 +147,6 @@ class LiveSummary:
         if self.refused:
             lines.append(f"{self.refused} frames refused by the board's core")
         return lines
-
-
-def set_up(
-    device: Device, scan: ScanSettings, solver: SolverSettings, known: KnownModel | None
-) -> Options | None:
-    """Set scan and solver; returns the solver's options as they now are, None where the model is
-    not known here and nothing of the solver was asked for: then they stay what they are, whatever
-    that is.
-
-    Raises:
-        UsageError: a number is out of its range.
-        DeviceError: the board refuses (it keeps what it had), or its model is not known here.
-    """
-    apply_scan(device, scan)
-    if known is None:
-        if solver.named:
-            raise DeviceError(
-                f"{device.transport.name}: changing the solver needs the defaults of the board's"
-                f" model, {device.board.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
-            )
-        return None
-    options = solver.applied(known.model, device.board)
-    device.solver(options)
-    return options
-
-
-def take_reference(device: Device, frames: int, *, streamed: bool = False) -> None:
-    """Tare; where ``streamed``, the quiet frames are sent as raw frames too, for whoever records.
-
-    Raises:
-        UsageError, DeviceError: as ``Device.tare``.
-    """
-    if not streamed:
-        device.tare(frames)
-        return
-    device.send_command(StreamCommand(int(Stream.RAW)), 1.0)
-    try:
-        device.tare(frames)
-    finally:
-        device.send_command(StreamCommand(0), 1.0)
-
-
-def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
-    """Let what is to be touched begin, on a simulated or emulated board, and an emulated one's scan
-    under way end, which still shows the untouched skin. Returns the emulated board's clock at the
-    scene's time 0 (None: it is when the next scan begins), and news that came meanwhile.
-    """
-    transport, events = device.transport, []
-    device.start_scene()
-    if not transport.url.startswith("emu:"):
-        return None, []
-    board = getattr(transport, "board", None)
-    began = int(board.timers[CLOCK_TIMER].read(TIMER_COUNT, 4)) if board is not None else None
-    info = device.board
-    while (
-        item := device.next_item(1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us))
-    ) is not None:
-        if isinstance(item, Fault | LinkEvent):
-            events.append(item)
-    return began, events
 
 
 Item = LiveFrame | LiveDrive | Fault | LinkEvent
