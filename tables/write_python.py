@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from textwrap import wrap
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from table import WIDTH, Lines, Table, Tables, enum_of, origin, plain, split_type, types_of, wrapped
@@ -182,19 +181,23 @@ def _limit(value: Any) -> str:
 # ---- structs ----
 
 
-def _python_type(kind: str, form: str) -> tuple[str, str]:
+def _python_type(kind: str, form: str = "") -> tuple[str, str]:
     """Type of a field and its value where none is given."""
     if form:
         return FORMS[form]
     return ("float", "0.0") if split_type(kind)[0] in REALS else ("int", "0")
 
 
-def _fields(struct: Table, rows: list[list[Any]]) -> Lines:
-    """The fields, those from ``optional_from`` on with a value where none is given."""
+def _fields(
+    struct: Table, rows: list[list[Any]], wire_type: Callable[..., str] | None = None
+) -> Lines:
+    """The fields, those from ``optional_from`` on with a value where none is given; of a type on
+    the wire where there is one."""
     optional = False
     for name, kind, doc, *form in rows:
         optional = optional or struct.get("optional_from") == name
-        of_type, value = _python_type(kind, form[0] if form else "")
+        of_type, value = _python_type(kind, *form)
+        of_type = wire_type(kind, *form) if wire_type else of_type
         yield from said(f"    {safe(name)}: {of_type}{f' = {value}' if optional else ''}", doc)
 
 
@@ -248,42 +251,36 @@ def _link_module(tables: Tables) -> Lines:
         "Packets of the link: their numbers, and their fields as they lie on the wire.",
         "link",
         "from dataclasses import dataclass\nfrom enum import IntEnum, IntFlag\n"
-        "from typing import ClassVar\n\n"
-        "from eitskin.device.wire.layout import Command, Layout, Payload",
+        "from typing import Annotated\n\n"
+        "from eitskin.device.wire.layout import Command, Payload",
     )
     yield from (f"{name} = {value}" for name, value in table["numbers"].items())
     yield from _names(types["eits_stage"], "STAGES")
+    yield from _wire_types(table["struct"])
     for enum in table["enum"]:
         if "python" in enum:
             yield from _class(enum)
     for struct in table["struct"]:
         if "python" in struct:
             yield from _payload(struct)
-    commands = [row for row in types["eits_packet_type"]["rows"] if len(row) > 4]
-    for name, _, doc, content, python in commands:
-        yield from _command(types[content], name, doc, python)
-    yield from ("", "", "COMMANDS: dict[int, type[Command]] = {")
-    yield from (f"    PacketType.{row[0]}: {row[4]}," for row in commands)
-    yield "}"
+    for name, _, doc, content, *python in types["eits_packet_type"]["rows"]:
+        if python:
+            yield from _command(types[content], name, doc, python[0])
 
 
-def _layout(struct: Table) -> Lines:
-    fields = " ".join(
-        ":".join((safe(name), _letters(kind), *form)) for name, kind, _, *form in struct["rows"]
-    )
-    short = f'    LAYOUT: ClassVar[Layout] = Layout("{struct["c"]}", "{fields}")'
-    if len(short) <= WIDTH:
-        yield short
-        return
-    yield "    LAYOUT: ClassVar[Layout] = Layout("
-    both = f'        "{struct["c"]}", "{fields}"'
-    if len(both) <= WIDTH:
-        yield both
-    else:
-        pieces = wrap(fields, WIDTH - 12)
-        lines = [f'        "{" " if at else ""}{piece}"' for at, piece in enumerate(pieces)]
-        yield from (f'        "{struct["c"]}",', *lines[:-1], f"{lines[-1]},")
-    yield "    )"
+def _wire_types(structs: Sequence[Table]) -> Lines:
+    """A name for each kind of field on the wire."""
+    rows = (row for struct in structs for row in struct["rows"])
+    made = {_wire_type(kind, *form): (kind, *form) for _, kind, _, *form in rows}
+    for name, (kind, *form) in sorted(made.items()):
+        python = _python_type(kind, *form)[0].replace("StageStats", '"StageStats"')
+        yield f'{name} = Annotated[{python}, "{_letters(kind)}", "{"".join(form)}"]'
+
+
+def _wire_type(kind: str, form: str = "") -> str:
+    """u32 is U32, 16 characters are Text16, an electrode mask is Electrodes."""
+    count = split_type(kind)[1] if form == "text" else ""
+    return f"{(form or kind).capitalize()}{count}"
 
 
 def _letters(kind: str) -> str:
@@ -297,16 +294,19 @@ def _letters(kind: str) -> str:
 
 
 def _payload(struct: Table) -> Lines:
-    yield from ("", "", "@dataclass(frozen=True)", f"class {struct['python']}(Payload):")
-    yield from docstring(f"{struct['c']}: {struct['doc']}", "    ")
-    yield from ("", *_layout(struct), *_fields(struct, struct["rows"]))
+    yield from ("", "", "@dataclass(frozen=True)")
+    yield f'class {struct["python"]}(Payload, c="{struct["c"]}"):'
+    yield from docstring(struct["doc"], "    ")
+    yield from ("", *_fields(struct, struct["rows"], _wire_type))
 
 
 def _command(struct: Table, packet: str, doc: str, python: str) -> Lines:
     """A command; its request number is not a field, since the link gives it."""
-    yield from ("", "", "@dataclass(frozen=True)", f"class {python}(Command):")
-    yield from docstring(f"{packet}: {doc}", "    ")
-    yield from ("", f"    TYPE: ClassVar[PacketType] = PacketType.{packet}")
-    yield from (*_layout(struct), *_fields(struct, struct["rows"][1:]))
+    yield from ("", "", "@dataclass(frozen=True)")
+    yield f'class {python}(Command, c="{struct["c"]}", kind=PacketType.{packet}):'
+    yield from docstring(doc, "    ")
+    fields = [*_fields(struct, struct["rows"][1:], _wire_type)]
     if struct.get("bytes_follow"):
-        yield '    data: bytes = b""'
+        fields.append('    data: bytes = b""')
+    if fields:
+        yield from ("", *fields)

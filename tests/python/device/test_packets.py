@@ -110,7 +110,7 @@ def test_stages_and_limits_are_the_headers():
 
 
 def test_a_command_is_known_by_its_type():
-    assert {kind.TYPE for kind in link.COMMANDS.values()} == {
+    assert {kind.TYPE for kind in Command.KNOWN.values()} == {
         kind for kind in link.PacketType if kind >= 0x80
     }
 

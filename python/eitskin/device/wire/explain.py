@@ -4,7 +4,8 @@ be done."""
 from __future__ import annotations
 
 from eitskin.core.engine import load_core
-from eitskin.device.wire.link_table import COMMANDS, FaultCode, PacketType, Quality, ReplyStatus
+from eitskin.device.wire.layout import Command
+from eitskin.device.wire.link_table import FaultCode, PacketType, Quality, ReplyStatus
 from eitskin.device.wire.packets import FOUND_FAULTS, Fault, Reply
 
 UPLOAD = "upload one with  eitskin model upload MODEL.eitm"
@@ -23,7 +24,7 @@ def command_name(command: int) -> str:
 
 def field_at(command: int, offset: int) -> str:
     """The name of the field at byte ``offset`` of a command's payload."""
-    kind = COMMANDS.get(command)
+    kind = Command.KNOWN.get(command)
     if kind is None:
         return f"byte {offset}"
     return kind.LAYOUT.field_at(offset) or f"byte {offset}"

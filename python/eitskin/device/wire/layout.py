@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import struct
 from dataclasses import fields
-from typing import ClassVar
+from typing import ClassVar, get_type_hints
 
 
 class Layout:
     """The struct of C that it is, and its fields in order, each as (name, letters of ``struct``,
-    form in Python). They are written as "name:letters" or "name:letters:form", with spaces
-    between."""
+    form in Python)."""
 
-    def __init__(self, name: str, fields: str) -> None:
-        self.name = name
-        parts = [f"{field}:".split(":") for field in fields.split()]
-        self.fields = [(field, letters, form) for field, letters, form, *_ in parts]
+    def __init__(self, name: str, fields: list[tuple[str, str, str]]) -> None:
+        self.name, self.fields = name, fields
         self.struct = struct.Struct("<" + "".join(letters for _, letters, _ in self.fields))
         places = [struct.Struct("<" + letters) for _, letters, _ in self.fields]
         # how many values each field has, a text being one
@@ -37,15 +34,31 @@ class Layout:
 
 
 class Payload:
-    """A payload whose fields lie as its ``LAYOUT`` says."""
+    """A payload whose fields lie on the wire as their types say, ``Annotated`` with letters of
+    ``struct`` and form; ``c``: the struct of C that it is."""
 
     LAYOUT: ClassVar[Layout]
+    BEFORE: ClassVar[list[tuple[str, str, str]]] = []
+
+    def __init_subclass__(cls, c: str = "") -> None:
+        if c:
+            hints = get_type_hints(cls, include_extras=True)
+            own = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
+            fields = [(name, at[0], at[1]) for name, at in own.items() if at]
+            cls.LAYOUT = Layout(c, [*cls.BEFORE, *fields])
 
 
 class Command(Payload):
-    """A command. The first word on the wire is its request number, which is no field here."""
+    """A command of the packet ``kind``. The first word on the wire is its request number, which is
+    no field here."""
 
     TYPE: ClassVar[int]
+    BEFORE = [("request", "I", "")]  # noqa: RUF012
+    KNOWN: ClassVar[dict[int, type[Command]]] = {}
+
+    def __init_subclass__(cls, c: str, kind: int) -> None:
+        super().__init_subclass__(c)
+        cls.TYPE, cls.KNOWN[kind] = kind, cls
 
     def payload(self, request: int) -> bytes:
         """The bytes of its payload.

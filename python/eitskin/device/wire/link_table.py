@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from typing import ClassVar
+from typing import Annotated
 
-from eitskin.device.wire.layout import Command, Layout, Payload
+from eitskin.device.wire.layout import Command, Payload
 
 LINK_VERSION = 6
 LINK_MAX_PAYLOAD = 16384
@@ -17,6 +17,23 @@ FAULT_RAISE_FRAMES = 3
 FAULT_CLEAR_FRAMES = 8
 # eits_stage: Stages that are timed.
 STAGES = ("scan", "demodulate", "solve", "touches", "send", "frame")
+Electrodes = Annotated[tuple[int, ...], "Q", "electrodes"]
+F32 = Annotated[float, "f", ""]
+Flag = Annotated[bool, "H", "flag"]
+Hash = Annotated[bytes, "32s", "hash"]
+I32 = Annotated[int, "i", ""]
+Negated = Annotated[int, "H", "negated"]
+One = Annotated[int, "H", "one"]
+Pair = Annotated[tuple[int, int], "2i", "pair"]
+Stages = Annotated[dict[str, "StageStats"], "24I", "stages"]
+Stop = Annotated[str, "H", "stop"]
+Text16 = Annotated[str, "16s", "text"]
+Text24 = Annotated[str, "24s", "text"]
+U16 = Annotated[int, "H", ""]
+U32 = Annotated[int, "I", ""]
+U64 = Annotated[int, "Q", ""]
+Version = Annotated[tuple[int, int, int], "4s", "version"]
+Words = Annotated[tuple[int, int, int, int, int], "5I", "words"]
 
 
 class PacketType(IntEnum):
@@ -156,477 +173,350 @@ class Stream(IntFlag):
 
 
 @dataclass(frozen=True)
-class InfoPacket(Payload):
-    """eits_packet_info: The board, its model and its settings."""
+class InfoPacket(Payload, c="eits_packet_info"):
+    """The board, its model and its settings."""
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_info",
-        "request:I firmware:4s:version board:16s:text serial:24s:text f_cpu_hz:I electrodes:I"
-        " bank_bytes:I data_bytes:I model_bytes:I model_crc:I protocol_hash:Q n_electrodes:I"
-        " n_rows:I n_folded:I rank:I n_pixels:I nx:I ny:I storage:I bank:I excitation_millihz:I"
-        " sample_rate_hz:I samples:H settle_us:H slot_us:I check_every:H streaming:H every:H"
-        " tared:H frame_period_us:I faults:I volts_per_code_nv:I drive:H settings:H"
-        " source_ua_rms:I current_ua_rms:I current_limit_ua_rms:I",
-    )
-    request: int  # of the GET_INFO that asked; 0 after a restart
-    firmware: tuple[int, int, int]  # major, minor, patch, 0
-    board: str  # such as nucleo_f767zi, zero-filled
-    serial: str  # the processor's serial number, hexadecimal, zero-filled
-    f_cpu_hz: int  # processor clock, Hz
-    electrodes: int  # of the multiplexers
-    bank_bytes: int  # most bytes of a model
-    data_bytes: int  # most bytes in one MODEL_DATA
-    model_bytes: int  # of the model in use; 0: none
-    model_crc: int  # CRC-32 of the whole model file, as zlib's crc32
-    protocol_hash: int  # of the protocol that is scanned
-    n_electrodes: int  # of the model, as all down to storage
-    n_rows: int  # of its protocol
-    n_folded: int  # its rows once reciprocal ones are averaged
-    rank: int  # numbers of the reduced data
-    n_pixels: int  # pixels of an IMAGE
-    nx: int  # columns of the grid that the pixels lie in
-    ny: int  # rows of that grid
-    storage: int  # eits_storage: 0 f32, 1 f16, 2 i16, 3 i8
-    bank: int  # that the model is in
-    excitation_millihz: int  # as the generator's tuning word gives it
-    sample_rate_hz: int  # of the converter
-    samples: int  # of a measurement
-    settle_us: int  # settling time
+    request: U32  # of the GET_INFO that asked; 0 after a restart
+    firmware: Version  # major, minor, patch, 0
+    board: Text16  # such as nucleo_f767zi, zero-filled
+    serial: Text24  # the processor's serial number, hexadecimal, zero-filled
+    f_cpu_hz: U32  # processor clock, Hz
+    electrodes: U32  # of the multiplexers
+    bank_bytes: U32  # most bytes of a model
+    data_bytes: U32  # most bytes in one MODEL_DATA
+    model_bytes: U32  # of the model in use; 0: none
+    model_crc: U32  # CRC-32 of the whole model file, as zlib's crc32
+    protocol_hash: U64  # of the protocol that is scanned
+    n_electrodes: U32  # of the model, as all down to storage
+    n_rows: U32  # of its protocol
+    n_folded: U32  # its rows once reciprocal ones are averaged
+    rank: U32  # numbers of the reduced data
+    n_pixels: U32  # pixels of an IMAGE
+    nx: U32  # columns of the grid that the pixels lie in
+    ny: U32  # rows of that grid
+    storage: U32  # eits_storage: 0 f32, 1 f16, 2 i16, 3 i8
+    bank: U32  # that the model is in
+    excitation_millihz: U32  # as the generator's tuning word gives it
+    sample_rate_hz: U32  # of the converter
+    samples: U16  # of a measurement
+    settle_us: U16  # settling time
     # from one measurement to the next; 0, as all of the scan: the frames are another instrument's
-    slot_us: int
-    check_every: int  # every n-th frame is scanned fully; 1: all; 0: none
-    streaming: int  # bits of eits_stream
-    every: int  # every n-th frame is streamed
-    tared: int  # 1: there is a reference
-    frame_period_us: int  # 0: as fast as the scan goes
-    faults: int  # bit k: fault number k is raised
-    volts_per_code_nv: int  # between the electrodes, for one step of the converter
-    drive: int  # eits_drive
-    settings: int  # bits of eits_setting
-    source_ua_rms: int  # what the current source gives as built; 0: not known
-    current_ua_rms: int  # as measured last; 0: there is no sense resistor, or no current
-    current_limit_ua_rms: int  # above which the drive goes off; 0: none
+    slot_us: U32
+    check_every: U16  # every n-th frame is scanned fully; 1: all; 0: none
+    streaming: U16  # bits of eits_stream
+    every: U16  # every n-th frame is streamed
+    tared: U16  # 1: there is a reference
+    frame_period_us: U32  # 0: as fast as the scan goes
+    faults: U32  # bit k: fault number k is raised
+    volts_per_code_nv: U32  # between the electrodes, for one step of the converter
+    drive: U16  # eits_drive
+    settings: U16  # bits of eits_setting
+    source_ua_rms: U32  # what the current source gives as built; 0: not known
+    current_ua_rms: U32  # as measured last; 0: there is no sense resistor, or no current
+    current_limit_ua_rms: U32  # above which the drive goes off; 0: none
 
 
 @dataclass(frozen=True)
-class ReplyPacket(Payload):
-    """eits_packet_reply: How the command with this request number ended."""
+class ReplyPacket(Payload, c="eits_packet_reply"):
+    """How the command with this request number ended."""
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_reply", "request:I command:H status:H detail:2i:pair"
-    )
-    request: int  # of the command that is answered
-    command: int  # its packet type
-    status: int  # eits_reply_status
-    detail: tuple[int, int] = (0, 0)  # by status
+    request: U32  # of the command that is answered
+    command: U16  # its packet type
+    status: U16  # eits_reply_status
+    detail: Pair = (0, 0)  # by status
 
 
 @dataclass(frozen=True)
-class RawHead(Payload):
-    """eits_packet_raw: A scanned frame. n_rows numbers in V follow in the protocol's order, the
-    very numbers that the board's core got, NaN for a row that could not be used; then as many
-    quality bytes.
+class RawHead(Payload, c="eits_packet_raw"):
+    """A scanned frame. n_rows numbers in V follow in the protocol's order, the very numbers that
+    the board's core got, NaN for a row that could not be used; then as many quality bytes.
     """
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_raw", "frame:I time_us:I scan_us:I n_rows:H flags:H"
-    )
-    frame: int  # counts scanned frames; wraps
-    time_us: int  # when its scan began, on the board's clock; wraps
-    scan_us: int  # how long the scan took
-    n_rows: int  # voltages, and quality bytes, that follow
-    flags: int  # bits of eits_raw_flags
+    frame: U32  # counts scanned frames; wraps
+    time_us: U32  # when its scan began, on the board's clock; wraps
+    scan_us: U32  # how long the scan took
+    n_rows: U16  # voltages, and quality bytes, that follow
+    flags: U16  # bits of eits_raw_flags
 
 
 @dataclass(frozen=True)
-class SolvedPacket(Payload):
-    """eits_packet_solved: Head of IMAGE and TOUCHES: what eits_info says, and the times."""
+class SolvedPacket(Payload, c="eits_packet_solved"):
+    """Head of IMAGE and TOUCHES: what eits_info says, and the times."""
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_solved",
-        "frame:I time_us:I solve_us:I touch_us:I age_us:I count:H status:H:negated stop:H:stop"
-        " masked:H iterations:I nonzeros:I macs:I touch_macs:I lambda_:f lambda_max:f"
-        " lambda_noise:f gap_rel:f residual:f data_norm:f diagnostics:I saturated:H outliers:H"
-        " model_mismatch:f open_electrodes:Q:electrodes bridged_electrodes:Q:electrodes"
-        " noisy_electrodes:Q:electrodes",
-    )
-    frame: int  # number of the scanned frame, as in its RAW
-    time_us: int  # when its scan began
-    solve_us: int  # time for the solve
-    touch_us: int  # time for the touches
-    age_us: int  # from the end of its scan until this packet was made
-    count: int  # pixels or touches that follow
-    status: int  # 0, or minus an eits_status: then the image is zero and there are no touches
-    stop: str  # eits_stop
-    masked: int  # rows left out
-    iterations: int  # that the solver took
-    nonzeros: int  # coefficients that are not zero
-    macs: int  # multiply-accumulates of the solve
-    touch_macs: int  # of the touches
-    lambda_: float  # as used for this frame
-    lambda_max: float  # the least lambda whose image is zero
-    lambda_noise: float  # max(S'y) of noise, by the reference; 0: unknown
-    gap_rel: float  # relative duality gap
-    residual: float  # its norm
-    data_norm: float  # norm of the reduced data
-    diagnostics: int = 0  # bits of eits_diagnostic
+    frame: U32  # number of the scanned frame, as in its RAW
+    time_us: U32  # when its scan began
+    solve_us: U32  # time for the solve
+    touch_us: U32  # time for the touches
+    age_us: U32  # from the end of its scan until this packet was made
+    count: U16  # pixels or touches that follow
+    status: Negated  # 0, or minus an eits_status: then the image is zero and there are no touches
+    stop: Stop  # eits_stop
+    masked: U16  # rows left out
+    iterations: U32  # that the solver took
+    nonzeros: U32  # coefficients that are not zero
+    macs: U32  # multiply-accumulates of the solve
+    touch_macs: U32  # of the touches
+    lambda_: F32  # as used for this frame
+    lambda_max: F32  # the least lambda whose image is zero
+    lambda_noise: F32  # max(S'y) of noise, by the reference; 0: unknown
+    gap_rel: F32  # relative duality gap
+    residual: F32  # its norm
+    data_norm: F32  # norm of the reduced data
+    diagnostics: U32 = 0  # bits of eits_diagnostic
     # saturated rows without masked ones: by the converter or beyond the core's limit
-    saturated: int = 0
-    outliers: int = 0  # rows left out as outliers
-    model_mismatch: float = 0.0  # fraction of the data outside the model's range
-    open_electrodes: tuple[int, ...] = ()  # bit e: electrode e
-    bridged_electrodes: tuple[int, ...] = ()  # likewise, of one or more pairs
-    noisy_electrodes: tuple[int, ...] = ()  # likewise
+    saturated: U16 = 0
+    outliers: U16 = 0  # rows left out as outliers
+    model_mismatch: F32 = 0.0  # fraction of the data outside the model's range
+    open_electrodes: Electrodes = ()  # bit e: electrode e
+    bridged_electrodes: Electrodes = ()  # likewise, of one or more pairs
+    noisy_electrodes: Electrodes = ()  # likewise
 
 
 @dataclass(frozen=True)
-class TouchPacket(Payload):
-    """eits_packet_touch: A touch, as eits_touch."""
+class TouchPacket(Payload, c="eits_packet_touch"):
+    """A touch, as eits_touch."""
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_touch",
-        "id:I x_mm:f y_mm:f radius_mm:f strength_s_per_m_mm2:f explained:f force_n:f confidence:f"
-        " x_variance_mm2:f xy_covariance_mm2:f y_variance_mm2:f long_x_mm:f long_y_mm:f",
-    )
-    id: int  # from 1; stays with a touch from frame to frame
-    x_mm: float  # of the centre, in the model's coordinates
-    y_mm: float  # of the centre
-    radius_mm: float  # of the disc that was fitted
-    strength_s_per_m_mm2: float  # S mm^2/m
-    explained: float  # fraction of the data that it alone explains, 0 to 1; 0: held, not found
-    force_n: float  # 0 where the model is not calibrated
-    confidence: float  # probability that it is one touch; 0: not known
-    x_variance_mm2: float  # covariance of the centre; 0: not known
-    xy_covariance_mm2: float
-    y_variance_mm2: float
-    long_x_mm: float  # half of the long axis as a vector; 0, 0: a disc, or not known
-    long_y_mm: float
+    id: U32  # from 1; stays with a touch from frame to frame
+    x_mm: F32  # of the centre, in the model's coordinates
+    y_mm: F32  # of the centre
+    radius_mm: F32  # of the disc that was fitted
+    strength_s_per_m_mm2: F32  # S mm^2/m
+    explained: F32  # fraction of the data that it alone explains, 0 to 1; 0: held, not found
+    force_n: F32  # 0 where the model is not calibrated
+    confidence: F32  # probability that it is one touch; 0: not known
+    x_variance_mm2: F32  # covariance of the centre; 0: not known
+    xy_covariance_mm2: F32
+    y_variance_mm2: F32
+    long_x_mm: F32  # half of the long axis as a vector; 0, 0: a disc, or not known
+    long_y_mm: F32
 
 
 @dataclass(frozen=True)
-class FollowedHead(Payload):
-    """eits_packet_followed: Touches as of an instant within a scan. Where nothing touches it is
-    sent once: when that begins, or the touches have gone.
+class FollowedHead(Payload, c="eits_packet_followed"):
+    """Touches as of an instant within a scan. Where nothing touches it is sent once: when that
+    begins, or the touches have gone.
     """
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_followed", "frame:I time_us:I begun:I age_us:H update_us:H drive:H count:H"
-    )
-    frame: int  # number of the frame that is scanned
-    time_us: int  # the instant they hold for: the middle of the drive, were no row repeated
-    begun: int  # the frame before which nothing was known
-    age_us: int  # from the end of the drive until this packet was made; at most 65,535
-    update_us: int  # of it for the update; likewise
-    drive: int  # of the protocol, in the order of first rows
-    count: int  # touches that follow
+    frame: U32  # number of the frame that is scanned
+    time_us: U32  # the instant they hold for: the middle of the drive, were no row repeated
+    begun: U32  # the frame before which nothing was known
+    age_us: U16  # from the end of the drive until this packet was made; at most 65,535
+    update_us: U16  # of it for the update; likewise
+    drive: U16  # of the protocol, in the order of first rows
+    count: U16  # touches that follow
 
 
 @dataclass(frozen=True)
-class FollowedTouch(Payload):
-    """eits_packet_followed_touch: A touch, as eits_fast_touch."""
+class FollowedTouch(Payload, c="eits_packet_followed_touch"):
+    """A touch, as eits_fast_touch."""
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_followed_touch",
-        "id:H confirmed:H:flag x_mm:f y_mm:f vx_mm_per_s:f vy_mm_per_s:f strength_s_per_m_mm2:f",
-    )
-    id: int  # from 1, apart from those of TOUCHES; stays with a touch
-    confirmed: bool  # 1: a whole frame has shown it
-    x_mm: float  # of the centre, in the model's coordinates
-    y_mm: float  # of the centre
-    vx_mm_per_s: float  # its velocity
-    vy_mm_per_s: float
-    strength_s_per_m_mm2: float  # S mm^2/m
+    id: U16  # from 1, apart from those of TOUCHES; stays with a touch
+    confirmed: Flag  # 1: a whole frame has shown it
+    x_mm: F32  # of the centre, in the model's coordinates
+    y_mm: F32  # of the centre
+    vx_mm_per_s: F32  # its velocity
+    vy_mm_per_s: F32
+    strength_s_per_m_mm2: F32  # S mm^2/m
 
 
 @dataclass(frozen=True)
-class EventsHead(Payload):
-    """eits_packet_events: What happened in a frame; none where the core rejected it."""
+class EventsHead(Payload, c="eits_packet_events"):
+    """What happened in a frame; none where the core rejected it."""
 
-    LAYOUT: ClassVar[Layout] = Layout("eits_packet_events", "frame:I time_us:I count:I")
-    frame: int  # number of the scanned frame, as in its RAW
-    time_us: int  # when its scan began
-    count: int  # events that follow
-
-
-@dataclass(frozen=True)
-class EventPacket(Payload):
-    """eits_packet_event: One event, as eits_event (gesture_events.h); its time is the frame's, its
-    zone the host's.
-    """
-
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_event",
-        "kind:H phase:H first_id:I second_id:I x_mm:f y_mm:f direction_deg:f value:f",
-    )
-    kind: int  # eits_event_kind
-    phase: int  # eits_event_phase
-    first_id: int  # of the touch, as it was when it landed
-    second_id: int  # of two fingers the second; else 0
-    x_mm: float  # where
-    y_mm: float
-    direction_deg: float  # of a swipe, 0 along x, 90 along y
-    value: float  # by kind
+    frame: U32  # number of the scanned frame, as in its RAW
+    time_us: U32  # when its scan began
+    count: U32  # events that follow
 
 
 @dataclass(frozen=True)
-class StageStats(Payload):
-    """eits_stage_stats: Times of one stage."""
+class EventPacket(Payload, c="eits_packet_event"):
+    """One event, as eits_event (gesture_events.h); its time is the frame's, its zone the host's."""
 
-    LAYOUT: ClassVar[Layout] = Layout("eits_stage_stats", "count:I last_us:I p99_us:I worst_us:I")
-    count: int  # frames that were timed
-    last_us: int  # of the last such frame
-    p99_us: int  # 99th percentile: the upper edge of its bin, an eighth of an octave wide
-    worst_us: int  # of all since the start, or since GET_STATS set the times to zero
-
-
-@dataclass(frozen=True)
-class StatsPacket(Payload):
-    """eits_packet_stats: The board's counters."""
-
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_stats",
-        "request:I uptime_ms:I frames_scanned:I frames_solved:I packets_sent:I packets_dropped:I"
-        " deadlines_missed:I slots_repeated:I outliers:I link_packets:I link_crc_errors:I"
-        " link_framing_errors:I link_overruns:I stack_bytes:I stack_used:I workspace_bytes:I"
-        " workspace_used:I stages:24I:stages",
-    )
-    request: int  # of the GET_STATS that asked
-    uptime_ms: int  # since the start
-    frames_scanned: int  # streamed or not
-    frames_solved: int  # where image or touches were streamed
-    packets_sent: int  # since the link came up
-    packets_dropped: int  # a dropped packet still takes a sequence number
-    deadlines_missed: int  # frame periods missed
-    slots_repeated: int  # measurements taken again because the switch came too late
-    outliers: int  # rows left out as outliers, of all frames since there is a reference
-    link_packets: int  # commands received
-    link_crc_errors: int  # whole packets whose checksum does not fit
-    link_framing_errors: int  # ended inside a COBS block, or shorter than head and checksum
-    link_overruns: int  # longer than the receive buffer
-    stack_bytes: int  # that are set aside
-    stack_used: int  # the most so far
-    workspace_bytes: int  # for the model's context and its frames
-    workspace_used: int  # of them by the model in use
-    stages: dict[str, StageStats]  # by eits_stage
+    kind: U16  # eits_event_kind
+    phase: U16  # eits_event_phase
+    first_id: U32  # of the touch, as it was when it landed
+    second_id: U32  # of two fingers the second; else 0
+    x_mm: F32  # where
+    y_mm: F32
+    direction_deg: F32  # of a swipe, 0 along x, 90 along y
+    value: F32  # by kind
 
 
 @dataclass(frozen=True)
-class FaultPacket(Payload):
-    """eits_packet_fault: A fault that rose or went."""
+class StageStats(Payload, c="eits_stage_stats"):
+    """Times of one stage."""
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_fault", "code:H raised:H:flag frame:I index:i value:i words:5I:words"
-    )
-    code: int  # eits_fault
-    raised: bool  # 1: it is there; 0: it has gone
-    frame: int  # in which it rose or went
-    index: int  # by code, as value and words
-    value: int  # by code
-    words: tuple[int, int, int, int, int] = (0, 0, 0, 0, 0)  # by code; 0 where it has none
+    count: U32  # frames that were timed
+    last_us: U32  # of the last such frame
+    p99_us: U32  # 99th percentile: the upper edge of its bin, an eighth of an octave wide
+    worst_us: U32  # of all since the start, or since GET_STATS set the times to zero
 
 
 @dataclass(frozen=True)
-class HashesPacket(Payload):
-    """eits_packet_hashes: SHA-256 of what the board's flash holds."""
+class StatsPacket(Payload, c="eits_packet_stats"):
+    """The board's counters."""
 
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_packet_hashes", "request:I model:32s:hash firmware:32s:hash"
-    )
-    request: int  # of the GET_HASHES that asked
-    model: bytes  # of the model in use; zero: none
-    firmware: bytes  # of the program; zero: not known
-
-
-@dataclass(frozen=True)
-class GetInfo(Command):
-    """GET_INFO: send an INFO"""
-
-    TYPE: ClassVar[PacketType] = PacketType.GET_INFO
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_plain", "request:I")
-
-
-@dataclass(frozen=True)
-class StreamCommand(Command):
-    """STREAM: what to send of each frame"""
-
-    TYPE: ClassVar[PacketType] = PacketType.STREAM
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_command_stream", "request:I what:H every:H:one frames:I"
-    )
-    what: int  # bits of eits_stream; 0 stops
-    every: int = 1  # every n-th frame, at least 1
-    frames: int = 0  # so many streamed frames, then stop; 0: until stopped
+    request: U32  # of the GET_STATS that asked
+    uptime_ms: U32  # since the start
+    frames_scanned: U32  # streamed or not
+    frames_solved: U32  # where image or touches were streamed
+    packets_sent: U32  # since the link came up
+    packets_dropped: U32  # a dropped packet still takes a sequence number
+    deadlines_missed: U32  # frame periods missed
+    slots_repeated: U32  # measurements taken again because the switch came too late
+    outliers: U32  # rows left out as outliers, of all frames since there is a reference
+    link_packets: U32  # commands received
+    link_crc_errors: U32  # whole packets whose checksum does not fit
+    link_framing_errors: U32  # ended inside a COBS block, or shorter than head and checksum
+    link_overruns: U32  # longer than the receive buffer
+    stack_bytes: U32  # that are set aside
+    stack_used: U32  # the most so far
+    workspace_bytes: U32  # for the model's context and its frames
+    workspace_used: U32  # of them by the model in use
+    stages: Stages  # by eits_stage
 
 
 @dataclass(frozen=True)
-class Tare(Command):
-    """TARE: take the reference"""
+class FaultPacket(Payload, c="eits_packet_fault"):
+    """A fault that rose or went."""
 
-    TYPE: ClassVar[PacketType] = PacketType.TARE
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_tare", "request:I frames:I")
-    frames: int  # 1, or 4 to 1024
+    code: U16  # eits_fault
+    raised: Flag  # 1: it is there; 0: it has gone
+    frame: U32  # in which it rose or went
+    index: I32  # by code, as value and words
+    value: I32  # by code
+    words: Words = (0, 0, 0, 0, 0)  # by code; 0 where it has none
 
 
 @dataclass(frozen=True)
-class Scan(Command):
-    """SCAN: how frames are scanned; forgets the reference"""
+class HashesPacket(Payload, c="eits_packet_hashes"):
+    """SHA-256 of what the board's flash holds."""
 
-    TYPE: ClassVar[PacketType] = PacketType.SCAN
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_command_scan",
-        "request:I excitation_millihz:I sample_rate_hz:I samples:H settle_us:H check_every:H"
-        " reserved:H frame_period_us:I",
-    )
-    excitation_millihz: int  # 1,000 to 250,000,000, below half the sample rate
-    sample_rate_hz: int  # 1,000 to 5,000,000
-    samples: int  # 4 to 1024
-    settle_us: int  # at most 50,000
+    request: U32  # of the GET_HASHES that asked
+    model: Hash  # of the model in use; zero: none
+    firmware: Hash  # of the program; zero: not known
+
+
+@dataclass(frozen=True)
+class GetInfo(Command, c="eits_command_plain", kind=PacketType.GET_INFO):
+    """send an INFO"""
+
+
+@dataclass(frozen=True)
+class StreamCommand(Command, c="eits_command_stream", kind=PacketType.STREAM):
+    """what to send of each frame"""
+
+    what: U16  # bits of eits_stream; 0 stops
+    every: One = 1  # every n-th frame, at least 1
+    frames: U32 = 0  # so many streamed frames, then stop; 0: until stopped
+
+
+@dataclass(frozen=True)
+class Tare(Command, c="eits_command_tare", kind=PacketType.TARE):
+    """take the reference"""
+
+    frames: U32  # 1, or 4 to 1024
+
+
+@dataclass(frozen=True)
+class Scan(Command, c="eits_command_scan", kind=PacketType.SCAN):
+    """how frames are scanned; forgets the reference"""
+
+    excitation_millihz: U32  # 1,000 to 250,000,000, below half the sample rate
+    sample_rate_hz: U32  # 1,000 to 5,000,000
+    samples: U16  # 4 to 1024
+    settle_us: U16  # at most 50,000
     # 1: every frame is full; n > 1: one row of each reciprocal pair, every n-th frame full; 0:
     # never full
-    check_every: int
-    reserved: int  # 0
-    frame_period_us: int  # at most 600,000,000; 0: as fast as the scan goes
+    check_every: U16
+    reserved: U16  # 0
+    frame_period_us: U32  # at most 600,000,000; 0: as fast as the scan goes
 
 
 @dataclass(frozen=True)
-class Solver(Command):
-    """SOLVER: the solver's options"""
+class Solver(Command, c="eits_command_solver", kind=PacketType.SOLVER):
+    """the solver's options"""
 
-    TYPE: ClassVar[PacketType] = PacketType.SOLVER
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_command_solver",
-        "request:I iterations:I max_touches:I warm_start:I sign:I lambda_rel:f gap_rel:f solver:I"
-        " mac_limit:I diagnostics:I track:I",
-    )
-    iterations: int  # 1 to 1000
-    max_touches: int  # at most EITS_MAX_TOUCHES
-    warm_start: int  # 0 or 1
-    sign: int  # eits_sign: 0 increase, 1 decrease, 2 both
-    lambda_rel: float  # 0 to 1
-    gap_rel: float  # 0 to 1
-    solver: int  # eits_solver: 0 FISTA, 1 working set, 2 coordinate descent, 3 active set
-    mac_limit: int  # multiply-accumulates a frame; 0: no limit
-    diagnostics: int  # bits of eits_diagnostic that are looked for
+    iterations: U32  # 1 to 1000
+    max_touches: U32  # at most EITS_MAX_TOUCHES
+    warm_start: U32  # 0 or 1
+    sign: U32  # eits_sign: 0 increase, 1 decrease, 2 both
+    lambda_rel: F32  # 0 to 1
+    gap_rel: F32  # 0 to 1
+    solver: U32  # eits_solver: 0 FISTA, 1 working set, 2 coordinate descent, 3 active set
+    mac_limit: U32  # multiply-accumulates a frame; 0: no limit
+    diagnostics: U32  # bits of eits_diagnostic that are looked for
     # 1: touches are followed in time (eits_options_track), as after a start; 0: they are not
-    track: int
+    track: U32
 
 
 @dataclass(frozen=True)
-class ModelBegin(Command):
-    """MODEL_BEGIN: stop the scan and erase the bank that is not in use"""
+class ModelBegin(Command, c="eits_command_model_begin", kind=PacketType.MODEL_BEGIN):
+    """stop the scan and erase the bank that is not in use"""
 
-    TYPE: ClassVar[PacketType] = PacketType.MODEL_BEGIN
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_model_begin", "request:I bytes:I crc:I")
-    bytes: int  # of the model, at least 64
-    crc: int  # CRC-32 of the whole model
+    bytes: U32  # of the model, at least 64
+    crc: U32  # CRC-32 of the whole model
 
 
 @dataclass(frozen=True)
-class ModelData(Command):
-    """MODEL_DATA: bytes of the model"""
+class ModelData(Command, c="eits_command_model_data", kind=PacketType.MODEL_DATA):
+    """bytes of the model"""
 
-    TYPE: ClassVar[PacketType] = PacketType.MODEL_DATA
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_model_data", "request:I offset:I")
-    offset: int  # of the first byte
+    offset: U32  # of the first byte
     data: bytes = b""
 
 
 @dataclass(frozen=True)
-class ModelCommit(Command):
-    """MODEL_COMMIT: use the model that was sent"""
-
-    TYPE: ClassVar[PacketType] = PacketType.MODEL_COMMIT
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_plain", "request:I")
+class ModelCommit(Command, c="eits_command_plain", kind=PacketType.MODEL_COMMIT):
+    """use the model that was sent"""
 
 
 @dataclass(frozen=True)
-class GetStats(Command):
-    """GET_STATS: send a STATS"""
+class GetStats(Command, c="eits_command_get_stats", kind=PacketType.GET_STATS):
+    """send a STATS"""
 
-    TYPE: ClassVar[PacketType] = PacketType.GET_STATS
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_get_stats", "request:I reset:I")
-    reset: int = 0  # 1: set the times to zero after sending them
+    reset: U32 = 0  # 1: set the times to zero after sending them
 
 
 @dataclass(frozen=True)
-class MaskRow(Command):
-    """MASK_ROW: leave a row out, or use it again"""
+class MaskRow(Command, c="eits_command_mask_row", kind=PacketType.MASK_ROW):
+    """leave a row out, or use it again"""
 
-    TYPE: ClassVar[PacketType] = PacketType.MASK_ROW
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_mask_row", "request:I row:H masked:H:one")
-    row: int  # of the protocol
-    masked: int = 1  # 1: leave it out; 0: use it again
+    row: U16  # of the protocol
+    masked: One = 1  # 1: leave it out; 0: use it again
 
 
 @dataclass(frozen=True)
-class Reset(Command):
-    """RESET: restart the board"""
-
-    TYPE: ClassVar[PacketType] = PacketType.RESET
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_plain", "request:I")
+class Reset(Command, c="eits_command_plain", kind=PacketType.RESET):
+    """restart the board"""
 
 
 @dataclass(frozen=True)
-class SelfTest(Command):
-    """SELF_TEST: run the model's golden frame"""
-
-    TYPE: ClassVar[PacketType] = PacketType.SELF_TEST
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_plain", "request:I")
+class SelfTest(Command, c="eits_command_plain", kind=PacketType.SELF_TEST):
+    """run the model's golden frame"""
 
 
 @dataclass(frozen=True)
-class ClearFaults(Command):
-    """CLEAR_FAULTS: forget the faults"""
-
-    TYPE: ClassVar[PacketType] = PacketType.CLEAR_FAULTS
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_plain", "request:I")
+class ClearFaults(Command, c="eits_command_plain", kind=PacketType.CLEAR_FAULTS):
+    """forget the faults"""
 
 
 @dataclass(frozen=True)
-class Keepalive(Command):
-    """KEEPALIVE: the host is there, or goes and the current stops; not answered"""
+class Keepalive(Command, c="eits_command_keepalive", kind=PacketType.KEEPALIVE):
+    """the host is there, or goes and the current stops; not answered"""
 
-    TYPE: ClassVar[PacketType] = PacketType.KEEPALIVE
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_keepalive", "request:I present:I")
-    present: int  # 1: it is; 0: it goes, and the current stops now
+    present: U32  # 1: it is; 0: it goes, and the current stops now
 
 
 @dataclass(frozen=True)
-class Settings(Command):
-    """SETTINGS: the owner's settings, kept in flash"""
+class Settings(Command, c="eits_command_settings", kind=PacketType.SETTINGS):
+    """the owner's settings, kept in flash"""
 
-    TYPE: ClassVar[PacketType] = PacketType.SETTINGS
-    LAYOUT: ClassVar[Layout] = Layout(
-        "eits_command_settings", "request:I settings:I current_limit_ua_rms:I"
-    )
-    settings: int  # bits of eits_setting
+    settings: U32  # bits of eits_setting
     # at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: as it is
-    current_limit_ua_rms: int
+    current_limit_ua_rms: U32
 
 
 @dataclass(frozen=True)
-class GetHashes(Command):
-    """GET_HASHES: send HASHES"""
-
-    TYPE: ClassVar[PacketType] = PacketType.GET_HASHES
-    LAYOUT: ClassVar[Layout] = Layout("eits_command_plain", "request:I")
-
-
-COMMANDS: dict[int, type[Command]] = {
-    PacketType.GET_INFO: GetInfo,
-    PacketType.STREAM: StreamCommand,
-    PacketType.TARE: Tare,
-    PacketType.SCAN: Scan,
-    PacketType.SOLVER: Solver,
-    PacketType.MODEL_BEGIN: ModelBegin,
-    PacketType.MODEL_DATA: ModelData,
-    PacketType.MODEL_COMMIT: ModelCommit,
-    PacketType.GET_STATS: GetStats,
-    PacketType.MASK_ROW: MaskRow,
-    PacketType.RESET: Reset,
-    PacketType.SELF_TEST: SelfTest,
-    PacketType.CLEAR_FAULTS: ClearFaults,
-    PacketType.KEEPALIVE: Keepalive,
-    PacketType.SETTINGS: Settings,
-    PacketType.GET_HASHES: GetHashes,
-}
+class GetHashes(Command, c="eits_command_plain", kind=PacketType.GET_HASHES):
+    """send HASHES"""
