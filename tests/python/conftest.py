@@ -65,3 +65,12 @@ def cortex_m7() -> Path:
     """A build of everything for the Cortex-M7: ``firmware/eitskin_BOARD.elf``, ``.bin`` and
     ``.map``, ``tests/emulated``."""
     return shared_build()
+
+
+@pytest.fixture(scope="session")
+def same_everywhere(cortex_m7, tmp_path_factory):
+    """Runs steps on host kernels, plain C and the emulated Cortex-M7, and asserts the same bits."""
+    from eitskin_studies.harness.emulated import PROGRAM
+    from everywhere import SameEverywhere
+
+    return SameEverywhere(cortex_m7 / PROGRAM, lambda: tmp_path_factory.mktemp("board"))

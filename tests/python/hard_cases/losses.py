@@ -5,10 +5,10 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from everywhere import Outcome
 
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Mask, Play, Step, TareStep
+from everywhere import Outcome
 from small_models import small, small_blob, small_model
 
 COUNT = 12

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import touch_scenes
-from everywhere import on_host
 from losses import LEVELS, UNITS, all_steps, errors_of
 from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_steps
 from touch_scenes import frames_of, groups
@@ -16,6 +15,7 @@ from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
 from eitskin_studies.pictures.comparison_pictures import truth_marks
+from everywhere import on_host
 from small_models import prebuilt
 
 SHOWN = (  # group, which of it, sign looked for, title

@@ -4,13 +4,13 @@ beside the voltages that it is a difference of."""
 from dataclasses import dataclass, replace
 
 import numpy as np
-from everywhere import Host, Outcome, as_float32, on_host
 from made_models import made_model, plain_options
 from soundness import U, judged
 
 from eitskin.model.eitm import encode_model
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step, TareStep
+from everywhere import Host, Outcome, as_float32, on_host
 from small_models import prebuilt
 
 CONDITIONS = tuple(10.0**k for k in range(9))

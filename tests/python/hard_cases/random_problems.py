@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from everywhere import on_host
 from made_models import made_blob, plain_options
 from soundness import Judged, judged
 
 from eitskin.core.results import Options
 from eitskin_reference.problem import greatest
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
+from everywhere import on_host
 
 RANK, COLUMNS = 20, 64
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from everywhere import Outcome, as_float32
 
 from eitskin_reference.problem import greatest
+from everywhere import Outcome, as_float32
 from margins import Margins
 
 U = 2.0**-24

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from everywhere import Outcome, SameEverywhere
 from fault_scenes import ELECTRODES, ROWS, miou, noisy, played, simulated, touched
 from test_rows import options, run
 
+from everywhere import Outcome, SameEverywhere
 from margins import Margins
 
 

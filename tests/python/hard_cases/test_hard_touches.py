@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import touch_scenes
-from everywhere import Outcome, SameEverywhere
 from touch_scenes import (
     CONTRASTS,
     PRESS_PLACES,
@@ -28,6 +27,7 @@ from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.matching import match
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
+from everywhere import Outcome, SameEverywhere
 from margins import Margins
 from small_models import prebuilt
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from everywhere import Host, Outcome, as_float32, on_host
 from hard_skins import SKINS, HardSkin, hard_skin
 from soundness import U, check_sound, judged
 
@@ -12,6 +11,7 @@ from eitskin.core.options_table import SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
+from everywhere import Host, Outcome, as_float32, on_host
 from margins import Margins
 
 CASE = "problem/ill-conditioned-skins"

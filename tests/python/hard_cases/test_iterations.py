@@ -4,13 +4,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from everywhere import on_host
 from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import RandomProblem, asked, gaussian, optimum_of, smooth, whitened
 from soundness import Judged, U, check_sound, judged
 
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
+from everywhere import on_host
 from margins import Margins
 
 CASE, WIDTHS_CASE = "problem/iterations", "problem/float32-against-float64"

@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from everywhere import on_host
 from made_models import made_blob, plain_options
 from random_problems import gaussian
 from soundness import check_sound, judged
@@ -13,6 +12,7 @@ from soundness import check_sound, judged
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
+from everywhere import on_host
 from small_models import small, small_blob, small_model
 
 ITERATIONS_CASE, WARM_CASE = "time/iterations", "time/warm-frames"

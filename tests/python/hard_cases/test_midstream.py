@@ -4,12 +4,12 @@ so."""
 from dataclasses import replace
 
 import numpy as np
-from everywhere import Outcome, as_printed
 
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
+from everywhere import Outcome, as_printed
 from small_models import small, small_blob, small_model
 
 NO_REFERENCE = -13

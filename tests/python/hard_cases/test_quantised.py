@@ -3,7 +3,6 @@ quantiser."""
 
 import numpy as np
 import pytest
-from everywhere import on_host
 from made_models import made_model, plain_options
 from random_problems import RandomProblem, asked, gaussian, rounded, smooth, with_data
 from soundness import check_sound, judged, objective_of
@@ -12,6 +11,7 @@ from eitskin.core.options_table import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.model.storage import STORAGES, store
 from eitskin_studies.harness.emulated_steps import Step
+from everywhere import on_host
 
 CASE = "problem/quantised"
 HALF_STEP = {"i8": 0.5 / 127, "i16": 0.5 / 32767}  # of a column's greatest number

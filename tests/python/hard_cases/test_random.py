@@ -4,7 +4,6 @@ same bits everywhere."""
 from typing import Any
 
 import numpy as np
-from everywhere import on_host
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from made_models import made_model, plain_options
@@ -15,6 +14,7 @@ from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.model.eitm import encode_model
 from eitskin.model.storage import STORAGES
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
+from everywhere import on_host
 
 CASE = "problem/any"
 EXAMPLES = 150

@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from everywhere import Outcome, SameEverywhere
 from fault_scenes import COUNT, half, miou, played, quiet_frames, rms_v, simulated, touched
 
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
+from everywhere import Outcome, SameEverywhere
 from small_models import prebuilt
 
 OUTLIERS = (0.05, 0.3, 1.0, 5.0)  # of rms(V0)

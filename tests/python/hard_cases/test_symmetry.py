@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from everywhere import Host, SameEverywhere, as_float32
 from made_models import made_blob, plain_options
 from random_problems import gaussian
 from soundness import U, judged
@@ -21,6 +20,7 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import Skin
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
+from everywhere import Host, SameEverywhere, as_float32
 from margins import Margins
 from small_models import DATA_KINDS, ELEMENTS, PIXELS, small, small_blob, small_model
 

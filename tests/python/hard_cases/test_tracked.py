@@ -4,11 +4,11 @@ that are missing."""
 from dataclasses import replace
 
 import numpy as np
-from everywhere import Outcome
 
 from eitskin.core.results import Options
 from eitskin.model.options import default_options, tracking
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
+from everywhere import Outcome
 from small_models import small, small_blob, small_model
 
 NOISE = 1e-3

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from everywhere import as_float32
 from made_models import made_blob, made_model, plain_options
 from random_problems import gaussian, rounded
 from soundness import Judged, U, check_sound, judged
@@ -18,6 +17,7 @@ from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
+from everywhere import as_float32
 from margins import Margins
 from small_models import DATA_KINDS, small, small_blob, small_model
 
