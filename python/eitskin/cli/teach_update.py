@@ -78,8 +78,9 @@ def report_lines(report: dict[str, Any]) -> list[str]:
     ]
     if found["chosen"] != "kept":
         x, y = found["shift_mm"]
+        turned = f"turned by {found['turn_deg']:.1f} degrees" if found["turn_deg"] else "not turned"
         lines.append(
-            f"skin             places turned by {found['turn_deg']:.1f} degrees and shifted by"
+            f"skin             places {turned} and shifted by"
             f" ({x:.1f}, {y:.1f}) mm are the old ones"
         )
     return lines + [f"note             {note}" for note in report["notes"]]

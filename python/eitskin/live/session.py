@@ -40,6 +40,7 @@ from eitskin.errors import EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.gestures import GestureTeller
 from eitskin.live.settings import KINDS, Say, SessionSettings
+from eitskin.live.zones import refuse_off_skin
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore, truth_of
 from eitskin.scoring.stream_check import Watcher
 
@@ -150,6 +151,8 @@ class Session:
         """
         if not self._started:
             self._started = True
+            if self.known is not None:
+                refuse_off_skin(self.settings.zones, self.known.model.grid)
             self._set_up()
 
     # ---- from any thread ----

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -14,6 +14,7 @@ import numpy.typing as npt
 from eitskin.config import check_keys, load_toml, number
 from eitskin.core.gestures import Zone
 from eitskin.errors import ConfigError, GeometryError
+from eitskin.fem.grid import Grid
 from eitskin.skin.outline import Outline, polygon
 
 FloatArray = npt.NDArray[np.float64]
@@ -53,6 +54,22 @@ def load_zones(path: str | Path) -> tuple[Zone, ...]:
             raise ConfigError(f"{path}: zone {name!r} comes twice; give each its own name")
     _refuse_crossings([_Area(zone) for zone in zones], path)
     return tuple(zones)
+
+
+def refuse_off_skin(zones: Sequence[Zone], grid: Grid) -> None:
+    """Refuse a zone of which nothing lies on the skin: no finger could press it.
+
+    Raises:
+        ConfigError: naming it.
+    """
+    for area in map(_Area, zones):
+        on_skin = grid.locate(area.inner_points()) >= 0
+        if not on_skin.any() and not area.contains(grid.centres_mm()).any():
+            low, high = grid.centres_mm().min(axis=0), grid.centres_mm().max(axis=0)
+            raise ConfigError(
+                f"zone {area.zone.name!r}: lies off the skin, which goes from"
+                f" x = {low[0]:.0f} to {high[0]:.0f} mm and y = {low[1]:.0f} to {high[1]:.0f} mm"
+            )
 
 
 def _zone(shape: str, row: Mapping[str, Any], where: str) -> Zone:

@@ -39,9 +39,15 @@ def open_sink(url: str, source: Source) -> Sink:
     scheme, colon, _ = url.partition(":")
     known = sinks()
     if not colon or scheme not in known:
+        if scheme in ("http", "https"):
+            raise UsageError(
+                f"--to {url}: nothing is posted to a web server; programs and pages connect to"
+                "  ws://127.0.0.1:9000"
+            )
+        remedy = nearest(scheme, sorted(known))
         raise UsageError(
-            f"--to {url}: {nearest(scheme, sorted(known))}, as in udp://127.0.0.1:9000,"
-            " tuio://127.0.0.1 or csv:touches.csv"
+            f"--to {url}: {remedy}{' As' if remedy.endswith('?') else ', as'} in"
+            " udp://127.0.0.1:9000, tuio://127.0.0.1 or csv:touches.csv"
         )
     opened: Sink = known[scheme].load()(url, source)
     return opened

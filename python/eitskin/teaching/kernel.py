@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import cos, degrees, radians, sin
+from math import cos, radians, sin
 
 import numpy as np
 import numpy.typing as npt
@@ -140,9 +140,16 @@ class Kernel:
         return np.asarray(jp @ jq.T / jp.shape[1])
 
 
+def least_turn_deg(turn_deg: float, digits: int = 1) -> float:
+    """The same direction as -180 to 180 degrees, rounded; never -0."""
+    return round((turn_deg + 180) % 360 - 180, digits) + 0.0
+
+
 def placement_text(placement: Placement) -> str:
     """For a report."""
+    turn = least_turn_deg(placement.turn_deg)
     return (
-        f"turned by {degrees(radians(placement.turn_deg)):.1f} degrees, scaled by"
-        f" {placement.scale:.3f}" + (", mirrored" if placement.mirrored else "")
+        (f"turned by {turn:.1f} degrees" if turn else "not turned")
+        + f", scaled by {placement.scale:.3f}"
+        + (", mirrored" if placement.mirrored else "")
     )

@@ -25,7 +25,7 @@ from eitskin.teaching.explained import (
     shifted_or_refused,
 )
 from eitskin.teaching.fit import Learned, learn
-from eitskin.teaching.kernel import placement_text
+from eitskin.teaching.kernel import least_turn_deg, placement_text
 from eitskin.teaching.left_out import (
     MISFIT,
     LeftOut,
@@ -302,7 +302,7 @@ def _report(
             "shrinkage": round(learned.noise.shrinkage, 3),
         },
         "placement": {
-            "turn_deg": round(placement.turn_deg % 360, 2),
+            "turn_deg": least_turn_deg(placement.turn_deg, 2),
             "scale": round(placement.scale, 4),
             "mirrored": placement.mirrored,
             "text": "none: stationary kernel"

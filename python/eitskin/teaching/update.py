@@ -43,7 +43,7 @@ from eitskin.teaching.fit import (
     suiting_amplitudes,
     whitening_of,
 )
-from eitskin.teaching.kernel import Kernel, Sensitivity
+from eitskin.teaching.kernel import Kernel, Sensitivity, least_turn_deg
 from eitskin.teaching.known import Known, known_of
 from eitskin.teaching.left_out import stranger_note
 from eitskin.teaching.make import taught_model
@@ -153,7 +153,7 @@ def update(
             "presses": len(presses),
             "chosen": chosen,
             "held_out_mm": {how: round(one, 2) for how, one in medians.items()},
-            "turn_deg": round((move.turn_deg + 180) % 360 - 180, 1),
+            "turn_deg": least_turn_deg(move.turn_deg),
             "shift_mm": [round(one, 1) for one in move.shift_mm],
         },
         "notes": notes,

@@ -22,6 +22,8 @@ from test_bytes_models import WHOLE, resealed
 
 from eitskin.core.engine import CoreEngine
 from eitskin.frames.frames import load_frames
+from eitskin.frames.layout import load_layout
+from eitskin.live.zones import load_zones
 from eitskin.model.eitm import load_model
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import load_scene
@@ -40,6 +42,50 @@ PRESSES = {
     "place_mm": np.ones((3, 2)), "drive_measure": ROWS, "depth_mm": np.ones(3),
     "version": np.array(1), "n_electrodes": np.array(8), "skin": np.array("[skin]"),
 }  # fmt: skip
+
+LAYOUT = b"""
+[lines]
+delimiter = "tab"
+label = "frame"
+cells = 58
+columns = "2:58"
+time = "1"
+time_scale = 0.001
+scale = 1e-3
+skip_bad_lines = true
+[channels]
+order = "table"
+table = [[0, 1, 2, 3], [1, 2, 3, 4], [4, 5, 6, 7]]
+sign = "reversed"
+rotate = 3
+swaps = [[0, 5], [2, 3]]
+drop_channels = [4, 9]
+[protocol]
+electrodes = 8
+kind = "skip"
+skip = 2
+current_a = 1e-3
+[port]
+baud = 115200
+send = "start"
+rate_hz = 50
+"""
+ZONES = b"""
+[[key]]
+name = "a"
+corners_mm = [[0, 0], [20, 0], [20, 20], [0, 20]]
+[[pad]]
+name = "b"
+x_mm = -30
+y_mm = 5.5
+radius_mm = 12
+[[ring]]
+name = "c"
+x_mm = 0
+y_mm = 0
+inner_mm = 60
+outer_mm = 80
+"""
 
 
 class TooMuch(BaseException):
@@ -137,6 +183,17 @@ def read_model(path: Path) -> None:
     CoreEngine(blob, prepared=False)
 
 
+def read_layout(path: Path) -> None:
+    layout = load_layout(path)
+    source = layout.options.source
+    finite(*(one or 0.0 for one in (layout.rate_hz, source.time_scale, source.scale)))
+
+
+def read_zones(path: Path) -> None:
+    for zone in load_zones(path):
+        finite(zone.x_mm, zone.y_mm, zone.inner_mm, zone.outer_mm, *zone.corners_mm)
+
+
 def read_presses(path: Path) -> None:
     presses = load_presses(path)
     finite(presses.untouched, presses.pressed, presses.place_mm)
@@ -150,6 +207,8 @@ FORMATS: dict[str, tuple[str, Make, Callable[[Path], None]]] = {
     "dxf": ("a.dxf", lambda draw: damaged(draw, [FOREARM]), read_shapes),
     "frames": ("a.npz", lambda draw: archive(draw, FIELDS), read_frames),
     "eitm": ("a.eitm", lambda draw: resealed(damaged(draw, WHOLE)), read_model),
+    "layout": ("c.toml", lambda draw: damaged(draw, [LAYOUT]), read_layout),
+    "zones": ("d.toml", lambda draw: damaged(draw, [ZONES]), read_zones),
     "presses": ("b.npz", lambda draw: archive(draw, PRESSES), read_presses),
 }
 

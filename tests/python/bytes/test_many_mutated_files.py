@@ -23,6 +23,6 @@ def test_each_is_read_or_refused_soon(count):
     told = json.loads(done.stdout)
     print(told)
     peak_mb = told.pop("peak_mb")
-    assert len(told) == 7 and peak_mb > 0
+    assert len(told) == 9 and peak_mb > 0
     for name, one in told.items():
         assert one["files"] == count and one["opened"] > 0, name  # damage that is not seen, too

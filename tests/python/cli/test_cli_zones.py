@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 from eitskin.errors import EitskinError
-from eitskin.live.zones import load_zones
+from eitskin.live.zones import load_zones, refuse_off_skin
+from eitskin.public import stream
+from small_models import prebuilt
 
 PAD = '[[pad]]\nname = "{}"\nx_mm = {}\ny_mm = 0\nradius_mm = {}\n'
 KEY = '[[key]]\nname = "{}"\ncorners_mm = {}\n'
@@ -57,3 +59,31 @@ def test_a_zones_file_that_cannot_be_is_refused_in_a_line(tmp_path, text, says):
         load_zones(written(tmp_path, text))
     assert says in str(error.value) and "\n" not in str(error.value)
     assert "zones.toml" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "off"),
+    [
+        (PAD.format("a", 120, 5), True),
+        (PAD.format("a", 120, 40), False),  # a part of it is on the skin
+        (PAD.format("a", 0, 0.5), False),  # smaller than a pixel
+        (RING.format("r", 150, 160), True),
+        (RING.format("r", 80, 160), False),
+        (RING.format("r", 95, 160), False),  # no pixel's centre is in it
+        (KEY.format("k", "[[-900, 0], [-800, 0], [-800, 9]]"), True),
+        (KEY.format("k", "[[-900, -900], [900, -900], [0, 900]]"), False),  # around the skin
+    ],
+)
+def test_a_zone_that_no_finger_can_press_is_refused(tmp_path, text, off):
+    zones = load_zones(written(tmp_path, text))
+    if not off:
+        refuse_off_skin(zones, prebuilt()[0].grid)
+        return
+    with pytest.raises(EitskinError, match="lies off the skin, which goes from x = -9"):
+        refuse_off_skin(zones, prebuilt()[0].grid)
+
+
+def test_no_stream_begins_with_such_a_zone(tmp_path):
+    path = written(tmp_path, PAD.format("far", 300, 20))
+    with pytest.raises(EitskinError, match="'far': lies off the skin"):
+        next(stream("sim:two_touch", zones=path, frames=2))

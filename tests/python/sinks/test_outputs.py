@@ -114,7 +114,8 @@ def test_a_message_is_made_once_for_all(swipe):
 
 REFUSED = [
     ("nonsense", 2, "known are: csv"),
-    ("tui://x", 2, "did you mean 'tuio'?"),
+    ("tui://x", 2, "did you mean 'tuio'? As in udp://"),
+    ("http://127.0.0.1:9000", 2, "programs and pages connect to  ws://127.0.0.1:9000"),
     ("udp://localhost", 2, "udp://HOST:PORT"),
     ("udp://127.0.0.1:9/path", 2, "nothing may follow the port"),
     ("udp://127.0.0.1:0", 2, "udp://HOST:PORT"),

@@ -10,6 +10,7 @@ from eitskin.cli.teach_fit import described_skin
 from eitskin.errors import ConfigError, FrameError
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.solve.reconstructor import Reconstructor
+from eitskin.teaching.kernel import Placement, placement_text
 from eitskin.teaching.left_out import (
     CHI2_90,
     ellipse_factor,
@@ -38,6 +39,12 @@ def test_presses_never_seen_are_found(taught):
     assert turn == pytest.approx(TRUE.turn_deg, abs=3)
     assert not taught.report["placement"]["mirrored"]
     assert taught.report["notes"][0].startswith("touches have a force: depth")
+
+
+def test_a_turn_is_said_the_short_way_round():
+    said = [placement_text(Placement(turn)) for turn in (0.04, 359.97, -0.02, 350.0, 180.0, -181.0)]
+    assert said[:3] == ["not turned, scaled by 1.000"] * 3
+    assert [text.split()[2] for text in said[3:]] == ["-10.0", "-180.0", "179.0"]
 
 
 def test_ellipses_cover_about_what_they_say(taught):
