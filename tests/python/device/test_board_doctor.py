@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from device_helpers import board_info
 
 from eitskin.device.diagnose_board import MeasuredBoard, board_findings
 from eitskin.device.known_model import KnownModel, find_model, need_model, scanned_protocol
@@ -20,22 +21,10 @@ from small_models import prebuilt, session
 
 
 def info(**changes: object) -> BoardInfo:
+    """Of a board with the prebuilt model."""
     model, blob = prebuilt()
-    values: dict[str, object] = {
-        "request": 1, "firmware": (0, 1, 0), "board": "nucleo_f767zi", "serial": "01",
-        "f_cpu_hz": 216_000_000, "electrodes": 16,
-        "bank_bytes": 524256, "data_bytes": 4096, "model_bytes": len(blob),
-        "model_crc": zlib.crc32(blob),
-        "protocol_hash": model.protocol.hash, "n_electrodes": 16, "n_rows": 208, "n_folded": 104,
-        "rank": 64, "n_pixels": 812,
-        "nx": 32, "ny": 32, "storage": 0, "bank": 0, "excitation_millihz": 50_000_000,
-        "sample_rate_hz": 1_000_000, "samples": 80,
-        "settle_us": 16, "slot_us": 100, "check_every": 1, "streaming": 0, "every": 1, "tared": 0,
-        "frame_period_us": 0,
-        "faults": 0, "volts_per_code_nv": 805664, "drive": 1, "settings": 0,
-        "source_ua_rms": 350, "current_ua_rms": 0, "current_limit_ua_rms": 437,
-    }  # fmt: skip
-    return BoardInfo(**(values | changes))
+    own = {"model_bytes": len(blob), "model_crc": zlib.crc32(blob)}
+    return board_info(**own | {"protocol_hash": model.protocol.hash, "drive": 1} | changes)
 
 
 def raw_frames(open_electrode: int | None = None) -> list[RawFrame]:
