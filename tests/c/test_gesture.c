@@ -437,6 +437,14 @@ TEST(a_landing_that_is_renamed_holds_where_it_rests)
     CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 1);
     CHECK_EQUAL(once(&b, EITS_EVENT_HOLD), 1);
     CHECK_NEAR(last(&b, EITS_EVENT_HOLD)->x_mm, 11, 1e-6);
+    for (int moved = 0; moved < 2; ++moved) { /* how still it is counts from there on */
+        begin(&b);
+        b.g.options.still_mm = (eits_real)0.5;
+        finger(&b, 1, 20, 57, 0, 0, 1);
+        frame(&b, both, 2);
+        finger(&b, 2, 11, 51, moved ? 0.1 : 0, 0, 30);
+        CHECK_EQUAL(once(&b, EITS_EVENT_HOLD), !moved);
+    }
     begin(&b); /* of two fingers one: they begin where it is then */
     for (int k = 0; k < 12; ++k) {
         const eits_touch two[] = {touch(k < 4 ? 2 : 3, 60, 0), touch(1, k < 4 ? 15 : 0, 0)};
