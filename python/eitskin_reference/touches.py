@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.constants_table import (
+    CENTRE_SURE,
     EARLY_RADIUS,
     FINAL_RADIUS,
     INTERACTION_MAX,
@@ -24,7 +25,7 @@ from eitskin.model.model import Model
 from eitskin_reference.confidence import miscounted, places_by_fit, rated
 from eitskin_reference.disc_fit import Disc, Fit, Reduced
 from eitskin_reference.evidence import DataErrors, keep_likely
-from eitskin_reference.seek import seek
+from eitskin_reference.seek import centre, seek
 from eitskin_reference.split_merge import join, part
 
 FloatArray = npt.NDArray[np.float64]
@@ -109,10 +110,17 @@ def find_touches(
     the last says whether their count may be wrong."""
     fit = Fit(model, frame, options)
     explained, tested = np.zeros(0), None
+    sure, places = np.zeros(0), np.zeros((0, 3))
     if np.abs(image).max() > 0:
         explained = search(fit, frame, image, interplay)
         if errors is not None:
             tested = keep_likely(fit, errors)
+        if tested is not None and errors is not None:
+            sure, places = rated(tested, errors.distance, model.grid.pixel_mm)
+            if errors.kept and len(sure) == 1 and sure[0] < CENTRE_SURE:
+                moved = centre(fit, frame.y)
+                if moved is not None:
+                    places, tested = moved[None], replace(tested, long_mm=np.zeros((1, 2)))
             explained = fit.explained()
     found = [
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
@@ -124,8 +132,7 @@ def find_touches(
                     y_variance_mm2=float(yy)) if xx > 0 else touch
             for touch, (xx, xy, yy) in zip(found, places_by_fit(fit), strict=True)
         ]  # fmt: skip
-    if tested is not None and errors is not None:
-        sure, places = rated(tested, errors.distance, model.grid.pixel_mm)
+    if tested is not None:
         found = [
             replace(
                 touch,

@@ -1,4 +1,5 @@
-/* Touches that are sought in the data, whatever the image shows. */
+/* Touches that are sought in the data, whatever the sparse image shows; and the one touch of an
+ * instrument that is far from the model. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
@@ -7,10 +8,14 @@
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
 #include "evidence/evidence.h"
+#include "frame/constants.h"
+#include "frame/whitening.h"
 #include "kernels/kernels.h"
+#include "touch/constants.h"
 #include "touch/disc_fit.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { SIDE = 20, RANK = 64 };
@@ -222,6 +227,153 @@ TEST(without_a_residual_a_place_is_not_rated)
     f.tested = 0;
     eits_place_touches(ctx, &ctx->scratch, &f);
     CHECK(f.place_mm2[0][0] == 0);
+    dense_bench_close(&b);
+}
+
+/* ---- an instrument that is far from the model ---- */
+
+static float errors[RANK * (RANK + 1) / 2];
+
+/* A reference whose folds are the model's times exp(by), up and down in turn, and whose second
+ * sides are `apart` of the reference's rms off. */
+static eits_reference tared(eits_context *ctx, double by, double apart)
+{
+    eits_real frame[SMALL_ROWS];
+    double square = 0;
+    small_reference(ctx->model, 0.5, frame);
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
+        square += pow((double)frame[ctx->model->fold[k].first], 2) / SMALL_FOLDED;
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        const eits_fold fold = ctx->model->fold[k];
+        const double factor = exp(k % 2 ? by : -by), off = 0.5 * apart * sqrt(square);
+        frame[fold.first] *= (eits_real)factor;
+        if (fold.second == EITS_FOLD_NONE)
+            continue;
+        frame[fold.second] *= (eits_real)factor;
+        frame[fold.first] += (eits_real)off;
+        frame[fold.second] -= (eits_real)(fold.sign * off);
+    }
+    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    return ctx->reference;
+}
+
+/* By the tare alone: a reference that differs row by row, or from its own reciprocals, by more than
+ * a skin does; only where the model says what it may be wrong by, and never of ratios. */
+TEST(the_tare_says_that_the_instrument_is_far)
+{
+    dense_bench b = {0};
+    eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+    const double limit = (double)EITS_MAX_DISTANCE;
+    b.c.model.uncertainty = (eits_uncertainty){.errors = errors, .drift = errors, .row_gains = 1};
+    for (int far = 0; far < 2; ++far) {
+        eits_reference r = tared(ctx, limit * (far ? 1.1 : 0.9), 0);
+        CHECK_NEAR((double)r.distance / limit, far ? 1.1 : 0.9, 0.06); /* the gain takes some */
+        CHECK(r.far == (uint32_t)far && r.row_gains == !far);
+        CHECK_EQUAL(eits_regularisation_of_all(ctx) == 1, far);
+        r = tared(ctx, 0, (double)EITS_MAX_RECIPROCITY * (far ? 1.1 : 0.7));
+        CHECK(r.far == (uint32_t)far && r.row_gains == !far);
+    }
+    CHECK_EQUAL(tared(ctx, 0, 0).far, 0);
+    b.c.model.data_kind = EITS_DATA_NORMALISED;
+    CHECK_EQUAL(tared(ctx, 2 * limit, 0).far, 0);
+    b.c.model.data_kind = EITS_DATA_DIFFERENCE;
+    b.c.model.uncertainty.errors = NULL;
+    CHECK_EQUAL(tared(ctx, 2 * limit, 0).far, 0);
+    dense_bench_close(&b);
+}
+
+/* What the test may have left of a frame: one disc, far from what the data say. */
+static eits_fit one_left(eits_context *ctx, double confidence)
+{
+    eits_fit f = eits_fit_none(ctx, &ctx->scratch);
+    ctx->reference.far = f.count = f.tested = 1;
+    f.confidence[0] = (eits_real)confidence;
+    f.disc[0] = (eits_disc){40, 40, 3, R(0.01), 1};
+    f.place_mm2[0][0] = f.place_mm2[0][2] = f.long_mm[0][1] = 9;
+    eits_fit_restart(ctx, &ctx->scratch, &f);
+    return f;
+}
+
+/* sum over the blob of share a b, a and b mm from `middle`, along the axes given. */
+static double moment(const eits_context *ctx, const double *image, double peak,
+                     const double middle[2], int axis, int other)
+{
+    double sum = 0, total = 0;
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
+        const double pixel = (double)ctx->model->pixel_mm, share = image[j] / peak,
+                     at[3] = {(double)ctx->model->origin_x_mm +
+                                  pixel * (ctx->model->pixel[j].ix + 0.5) - middle[0],
+                              (double)ctx->model->origin_y_mm +
+                                  pixel * (ctx->model->pixel[j].iy + 0.5) - middle[1],
+                              1};
+        if (share < (double)EITS_CENTRE_SHARE)
+            continue;
+        total += share;
+        sum += share * at[axis] * at[other];
+    }
+    return sum / total;
+}
+
+/* Its one touch lies at the middle of the blob that one regularised step gives, as wide as that; by
+ * the image written out, of the sign that is looked for. */
+TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
+{
+    const eits_sign signs[] = {EITS_SIGN_INCREASE, EITS_SIGN_DECREASE, EITS_SIGN_BOTH};
+    dense_bench b = {0};
+    for (int k = 0; k < 6; ++k) {
+        const int down = k % 3 == 1 || k == 5;
+        const eits_disc at[2] = {{-21, 9, 11, down ? R(-0.05) : R(0.05), 1},
+                                 {18, -14, 8, down ? R(0.01) : R(-0.01), 1}};
+        eits_context *ctx = pressed(&b, at, k < 3 ? 1 : 2, signs[k % 3]);
+        double *y = dense_copy(ctx->frame.y, RANK), *image = dense_numbers(b.d.n), peak = 0;
+        const double origin[2] = {0, 0};
+        dense_correlate(&b.d, y, image);
+        for (uint32_t j = 0; j < b.d.n; ++j) {
+            image[j] *= (double)ctx->model->column_weight[j];
+            peak = (down ? -image[j] : image[j]) > fabs(peak) ? image[j] : peak;
+        }
+        const double middle[2] = {moment(ctx, image, peak, origin, 0, 2),
+                                  moment(ctx, image, peak, origin, 1, 2)},
+                     own = pow((double)ctx->model->pixel_mm, 2) / 12;
+        eits_fit f = one_left(ctx, 0.5);
+        eits_fit_centre(ctx, &ctx->scratch, &f);
+        CHECK_NEAR(f.disc[0].x_mm, middle[0], 1e-3);
+        CHECK_NEAR(f.disc[0].y_mm, middle[1], 1e-3);
+        CHECK(hypot(middle[0] + 21, middle[1] - 9) < 3);
+        CHECK(f.disc[0].radius_mm == ctx->options.touch_seed_radius_mm);
+        CHECK(f.disc[0].change * (down ? -1 : 1) > 0 && f.explained[0] > R(0.5));
+        for (int i = 0; i < 3; ++i)
+            CHECK_NEAR(
+                f.place_mm2[0][i],
+                (double)EITS_CENTRE_SPREAD *
+                    (moment(ctx, image, peak, middle, i / 2, (i + 1) / 2) + (i == 1 ? 0 : own)),
+                1e-2);
+        CHECK(f.long_mm[0][1] == 0 && f.count == 1);
+        free(y);
+        free(image);
+    }
+    dense_bench_close(&b);
+}
+
+/* Where the touch is sure, not tested, one of two, on an instrument that fits, or where the image
+ * says nothing of that sign: as the test left it. */
+TEST(other_touches_stay)
+{
+    static const eits_disc at = {-21, 9, 11, R(0.05), 1};
+    dense_bench b = {0};
+    for (int k = 0; k < 6; ++k) {
+        eits_context *ctx = pressed(&b, &at, 1, EITS_SIGN_INCREASE);
+        eits_fit f = one_left(ctx, k == 0 ? (double)EITS_CENTRE_SURE : 0.5);
+        f.tested = k != 1;
+        f.count = k == 2 ? 2 : k == 3 ? 0 : 1;
+        ctx->reference.far = k != 4;
+        if (k == 5)
+            eits_zero(ctx->frame.y, RANK);
+        const eits_fit before = f;
+        eits_fit_centre(ctx, &ctx->scratch, &f);
+        CHECK(memcmp(&f.disc, &before.disc, sizeof f.disc) == 0 && f.count == before.count);
+        CHECK(f.place_mm2[0][0] == 9 && f.long_mm[0][1] == 9);
+    }
     dense_bench_close(&b);
 }
 

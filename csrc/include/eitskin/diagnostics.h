@@ -36,8 +36,9 @@ typedef enum eits_diagnostic {
     EITS_DIAGNOSTIC_STALE_REFERENCE = 64,
     /* eits_find_touches reports more touches than can be separated */
     EITS_DIAGNOSTIC_CROWDED = 128,
-    /* images the frame with the strongest regularisation: its reference is further from the
-     * model's, or from its own reciprocals, than an uneven skin's is */
+    /* images the frame with the strongest regularisation, whose middle places a touch that is alone
+     * and unsure: its reference is further from the model's, or from its own reciprocals, than an
+     * uneven skin's is */
     EITS_DIAGNOSTIC_UNLIKE_MODEL = 256
 } eits_diagnostic;
 #define EITS_DIAGNOSTICS_ALL 511u

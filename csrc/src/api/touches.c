@@ -38,6 +38,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         eits_fit_touches(ctx, scratch, &f);
         eits_test_touches(ctx, scratch, &f);
         eits_rate_touches(ctx, &f);
+        eits_fit_centre(ctx, scratch, &f);
         eits_place_touches(ctx, scratch, &f);
         ctx->info.unexplained = f.total > 0 ? eits_fit_left(ctx, &f) / f.total : 0;
         if (eits_check_drift(ctx))

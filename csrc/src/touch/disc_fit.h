@@ -113,6 +113,10 @@ int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 /* Discs of the data without the image, each where what the others leave answers most. */
 void eits_fit_seek(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
+/* Where the instrument is far from the model and the only disc is not sure (f->confidence): a disc
+ * of the seed's radius at the middle of the image's blob, f->place_mm2 as wide as that. */
+void eits_fit_centre(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
+
 /* touch.c */
 
 /* Peaks of the image start discs, which are fitted to the frame's data; f->count of them are

@@ -121,12 +121,13 @@ def teach(
 
 
 def solve_presses(
-    model: Model, presses: Presses
+    model: Model, presses: Presses, **options: object
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """By the C core, each against its own untouched frame: error (n,) mm of the strongest touch
-    (the skin's width for none), number of touches, its strength, and the error's square in the
-    touch's own covariance (inf where that is not known)."""
+    """By the C core with ``options``, each against its own untouched frame: error (n,) mm of the
+    strongest touch (the skin's width for none), number of touches, its strength, and the error's
+    square in the touch's own covariance (inf where that is not known)."""
     core = Reconstructor(model)
+    core.with_options(**options)
     width = model.grid.pixel_mm * max(model.grid.nx, model.grid.ny)
     out = np.zeros((4, len(presses)))
     for i in range(len(presses)):

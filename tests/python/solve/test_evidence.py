@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from eitskin.core.constants_table import CENTRE_SURE
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Reconstruction
 from eitskin.model.eitm import decode_model, encode_model
@@ -196,9 +197,9 @@ def test_row_gains_can_be_switched_after_the_tare(engine):
     assert np.abs(expected[0] - expected[1]).max() > 0.01 * np.abs(expected[1]).max()
 
 
-def row_factors(log_sd: float) -> np.ndarray:
+def row_factors(log_sd: float, seed: int = 8) -> np.ndarray:
     """A factor for each row (m,), the same for a row and its reciprocal."""
-    fold, generator = prebuilt()[0].fold, np.random.default_rng(8)
+    fold, generator = prebuilt()[0].fold, np.random.default_rng(seed)
     of_fold = np.exp(log_sd * generator.normal(size=len(fold.first)))
     factors = np.ones(prebuilt()[0].protocol.n_rows)
     factors[fold.first] = factors[fold.second] = of_fold
@@ -243,6 +244,23 @@ def test_row_gains_undo_what_multiplies_rows(engine):
         assert "unlike the model" in with_.info.diagnostics_by_name
         tested = one(engine, factors * quiet_v, factors * frame_v)
         assert 1 <= len(tested.touches) <= max(1, len(with_.touches))
+
+
+def test_all_engines_place_the_unsure_touch_of_a_far_instrument_alike():
+    """At the middle of the image's blob, with the seed's radius."""
+    quiet_v, frame_v = exact()
+    placed = 0
+    for seed in range(3):
+        factors, others = (row_factors(0.8, 2 * seed + k) for k in range(2))
+        touched_v = factors * quiet_v[0] + others * (frame_v - quiet_v[0])
+        results = {engine: one(engine, factors * quiet_v, touched_v) for engine in ENGINES}
+        assert agree(results, 1e-3) >= 1
+        touch, *more = results["numpy"].touches
+        if not more and touch.confidence < CENTRE_SURE:
+            placed += 1
+            assert touch.radius_mm == made("c").options.touch_seed_radius_mm
+            assert touch.long_x_mm is None and touch.x_variance_mm2 > 10
+    assert placed >= 2
 
 
 def test_all_engines_agree_with_rows_masked_and_lost():

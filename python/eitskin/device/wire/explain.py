@@ -148,8 +148,8 @@ _FOUND = {
         "the skin has changed since it was taken; leave it untouched and run  eitskin tare"
     ),
     FaultCode.UNLIKE_MODEL: (
-        "the reference is not this model's; check order, signs and skin (eitskin doctor), or build"
-        " the model with  --data normalised"
+        "the reference is not this model's; check order, signs and skin (eitskin doctor), build the"
+        " model with  --data normalised  or teach it from 20 presses (eitskin teach record)"
     ),
 }
 

@@ -72,7 +72,8 @@ def check_resemblance(case: Case) -> CheckOutcome:
         FAULT,
         "the reference does not look like a homogeneous skin in any order known here: another"
         " protocol, outline or wiring, or the frame was not quiet; if the source has a table of its"
-        " rows, import it with that",
+        " rows, import it with that; if it stays so, teach the skin from 20 presses (eitskin teach"
+        " record)",
         {"correlation": round(reached, 4), "least": FOREIGN_BELOW},
     )
     return CheckOutcome((finding,), measured=summary)

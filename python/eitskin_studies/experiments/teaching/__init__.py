@@ -32,6 +32,7 @@ from eitskin_studies.experiments.teaching.remounted import (
     update_table,
     updates,
 )
+from eitskin_studies.experiments.teaching.untaught import untaught
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -39,7 +40,8 @@ TITLE = "A skin taught from presses at known places"
 FILE = "hydrogel_presses.npz"
 COUNTS = (10, 20, 50, 100, 400)
 SPLITS, JUDGED = 5, 100
-SKIN = Skin("hydrogel", disk(171.0), Electrodes(count=16, width_mm=4.0, start_angle_deg=0.0))
+SIZE_MM = 171.0
+SKIN = Skin("hydrogel", disk(SIZE_MM), Electrodes(count=16, width_mm=4.0, start_angle_deg=0.0))
 PAIR_MM = 15.0  # a touch of two counts within so far
 PAIR_RANGES = ((15, 30), (30, 45), (45, 70), (70, 200))
 PAIRS = 150
@@ -180,6 +182,7 @@ def _more(presses: Presses, splits: int) -> dict[str, Any]:
     draw = np.random.default_rng(11)
     shuffled = replace(known, place_mm=known.place_mm[draw.permutation(100)])
     out["shuffled"] = _middle(teach(shuffled, SKIN, refuse=False), judged)
+    out["untaught"] = untaught(presses, SKIN)
     out["no description"] = _middle(teach(known, None), judged)
     hand, electrode = [], []
     for seed in range(splits):
@@ -279,6 +282,10 @@ def _targets(taught: dict[str, Any], more: dict[str, Any], splits: int) -> Table
          f"{more['stays']:.0f} / {more['follows']:.1f}", TARGETS["100, first to last in time"]),
         ("100, shuffled places, mm", f"{more['shuffled']:.0f}", "chance, about 50"),
         ("100, no description, mm", f"{more['no description']:.1f}", "-"),
+        ("untaught, presses 0 to 249 and 250 to 499, % of the diameter; touches a press",
+         f"{' and '.join(f'{100 * mm / SIZE_MM:.1f}' for mm in more['untaught']['medians'])};"
+         f" {more['untaught']['touches']:.2f}", "10; 1.5"),
+        ("the same, 90 % ellipses cover", f"{more['untaught']['covered']:.2f}", "-"),
         ("singles counted as one, 20 / 50 / 100 / 400",
          " / ".join(over(n, "single") for n in (20, 50, 100, 400)), TARGETS["singles"]),
         *((f"two presses {kind} mm apart, exact, 20 / 50 / 100 / 400",
