@@ -28,6 +28,12 @@ def add_parser(actions: Any) -> None:
         "how far places given by hand may be off, an axis; they are refined",
         default=0.0,
     )
+    option(
+        parser,
+        "--reference-age PRESSES",
+        "how many presses old a reference will be: so much drift counts as noise",
+        default=0,
+    )
     option(parser, "--picture OUT.png", "presses, where the others put them, and the rows", Output)
     option(parser, "--json")
     parser.set_defaults(run=run)
@@ -54,7 +60,13 @@ def run(options: argparse.Namespace) -> int:
         return bar(what)(items)
 
     try:
-        taught = teach(presses, skin, place_sd_mm=options.place_sd, progress=progress)
+        taught = teach(
+            presses,
+            skin,
+            place_sd_mm=options.place_sd,
+            reference_age=options.reference_age,
+            progress=progress,
+        )
     except FrameError as error:
         raise FrameError(f"{options.presses}: {error}") from None
     if options.picture is not None:
@@ -89,13 +101,13 @@ def described_skin(presses: Presses, path: Path | None) -> Skin | None:
 def report_lines(report: dict[str, Any]) -> list[str]:
     """The report as a person reads it."""
     error, place = report["error_mm"], report["placement"]
-    curve = report["held_out_by_presses"]
+    curve, age = report["held_out_by_presses"], report["reference_age"]
     lines = [
         f"presses          {report['presses']}, {report['fit_s']:g} s",
         f"error            left out {error['left_out_median']:.1f} mm median,"
         f" {error['left_out_p95']:.1f} mm p95;"
         f" as the core solves presses held out {error['held_out_median']:.1f},"
-        f" {error['held_out_p95']:.1f}",
+        f" {error['held_out_p95']:.1f}" + (f", by a reference {age} presses old" if age else ""),
         f"counted as one   {100 * report['counted_as_one']:.0f} % of presses held out,"
         f" each touch explains {100 * report['least_share']:g} % of the data's energy",
         f"noise            {100 * report['noise']['of_a_press']:.0f} % of a press",

@@ -1,5 +1,5 @@
-"""What presses teach by the likelihood, whether their places are mirrored or shifted by one press,
-and whether they explain the voltages at all."""
+"""What presses teach by the likelihood, whether their places are mirrored or shifted by some
+presses, and whether they explain the voltages at all."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ PIXELS_ACROSS = 32
 MIRROR_GAIN = 10.0  # of log likelihood
 UNEXPLAINED = 0.8  # mean of chance_share and noise; presses of a real skin, 12 or more, have < .6
 POOR = 0.3  # chance_share above which a report says so
-EXPLAINED = 0.5  # chance_share below which places shifted by one press are the right ones
+EXPLAINED = 0.5  # chance_share below which shifted places are the right ones
+MAX_SHIFT, ENOUGH_FOR_SHIFT = 3, 60  # presses
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,27 +111,47 @@ def explained(
 def shifted_or_refused(
     found: Explained, skin: Skin | None, place_sd_mm: float, progress: Progress
 ) -> Explained:
-    """``found`` explains nothing: the same with each press at the next place, or the one before,
-    where that does.
+    """``found`` explains nothing: the same with each press at a place some later or earlier, where
+    that does.
 
     Raises:
         FrameError: it does not either.
     """
-    presses, how = found.presses, {1: "the first was missed", -1: "one more came first"}
-    for by in how if len(presses) > MIN_PRESSES else ():
-        other = explained(shifted(presses, by), skin, place_sd_mm, progress)
+    presses = found.presses
+    few = presses.take(np.arange(min(len(presses), ENOUGH_FOR_SHIFT)))
+    for by in shifts(presses):
+        other = explained(shifted(few, by), skin, place_sd_mm, progress)
         if other.chance < EXPLAINED:
-            other.notes.append(
-                f"the places are shifted by one press, as if {how[by]}; the model is of each press"
-                f" at the {'next' if by > 0 else 'previous'} place, without the odd one"
-            )
+            if len(few) < len(presses):
+                other = explained(shifted(presses, by), skin, place_sd_mm, progress)
+            other.notes.append(shift_note(by))
             return other
     raise FrameError(
-        "teach: the places do not explain the voltages, not mirrored or shifted by one press"
-        f" either: presses left out are {np.median(found.left_out.error_mm):.0f} mm off,"
-        f" {100 * found.chance:.0f} % of chance, noise is {100 * found.noise:.0f} % of a press;"
+        "teach: the places do not explain the voltages, not mirrored or shifted by"
+        f" {MAX_SHIFT} presses either: presses left out are"
+        f" {np.median(found.left_out.error_mm):.0f} mm off, {100 * found.chance:.0f} % of chance,"
+        f" noise is {100 * found.noise:.0f} % of a press;"
         " record them again, each where the plan says, and look at the electrodes with  eitskin"
         " doctor"
+    )
+
+
+def shifts(presses: Presses) -> list[int]:
+    """By how many places presses may be off, likely ones first."""
+    few = min(MAX_SHIFT, len(presses) - MIN_PRESSES)
+    return [sign * by for by in range(1, few + 1) for sign in (1, -1)]
+
+
+def shift_note(by: int) -> str:
+    """For a report."""
+    count = abs(by)
+    how = f"the first {count} were missed" if by > 0 else f"{count} more came first"
+    if count == 1:
+        how = "the first was missed" if by > 0 else "one more came first"
+    return (
+        f"the places are shifted by {'one press' if count == 1 else f'{count} presses'}, as if"
+        f" {how}; the model is of each press at a place {'later' if by > 0 else 'earlier'} in the"
+        " list, without the odd ones"
     )
 
 

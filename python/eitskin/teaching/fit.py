@@ -25,6 +25,8 @@ NEAR = 0.18  # of the skin's width: presses that near are compared to begin with
 SCALE_SD = 0.05  # of log scale: a skin is about as large as it is described
 LOG_BOUND = 12.0
 LEAST_SHRINKAGE = 0.5  # residuals are not normal: the formula alone trusts too much
+UNKNOWN = 1.5  # times what independent residuals leave unknown of a row's variance; theirs are not
+DRIFT = 0.3  # of the drift's covariance: one of few, long in its tails
 PLACE_ROUNDS, PLACE_KEPT = 5, 0.3
 
 
@@ -131,18 +133,12 @@ def first_amplitudes(
     return np.asarray(np.clip(amplitude, 0.05, 20) / np.mean(np.clip(amplitude, 0.05, 20)))
 
 
-def noise_of(residual: FloatArray) -> Noise:
-    """The covariance of residuals (n, m): correlations shrunk after Schaefer and Strimmer (Stat.
-    Appl. Genet. Mol. Biol. 4, 2005, article 32), variances to their median likewise."""
+def noise_of(residual: FloatArray, unit: FloatArray) -> Noise:
+    """The covariance of residuals (n, m) of rows over their ``unit`` (m,): correlations shrunk
+    after Schaefer and Strimmer (Stat. Appl. Genet. Mol. Biol. 4, 2005, article 32)."""
     count, rows = residual.shape
     squares = residual**2
-    variance = squares.mean(axis=0)
-    spread = squares.var(axis=0, ddof=1) / count if count > 1 else variance**2
-    median = float(np.median(variance[variance > 0])) if (variance > 0).any() else 1.0
-    towards = min(1.0, float(spread.sum() / max(((variance - median) ** 2).sum(), 1e-300)))
-    variance = towards * median + (1 - towards) * variance
-    variance = np.maximum(variance, 1e-6 * median)
-    x = residual / np.sqrt(np.maximum(squares.mean(axis=0), 1e-12 * median))
+    x = residual / np.sqrt(np.maximum(squares.mean(axis=0), 1e-300))
     correlation = x.T @ x / count
     second = (x**2).T @ (x**2) / count
     off = ~np.eye(rows, dtype=bool)
@@ -151,9 +147,29 @@ def noise_of(residual: FloatArray) -> Noise:
         np.clip(uncertain / max((correlation[off] ** 2).sum(), 1e-300), LEAST_SHRINKAGE, 1)
     )
     correlation = np.where(off, (1 - shrinkage) * correlation, 1.0)
-    sd = np.sqrt(variance)
+    sd = np.sqrt(_variances(squares, unit))
     covariance = sd[:, None] * correlation * sd
     return Noise(whitening_of(covariance), covariance, shrinkage)
+
+
+def _variances(squares: FloatArray, unit: FloatArray) -> FloatArray:
+    """The variance (m,) of each row from squared residuals (n, m): its logarithm is drawn towards
+    what rows of the same ``unit`` have, as far as n residuals leave it unknown; weak rows have
+    more noise in their unit."""
+    variance, count = squares.mean(axis=0), len(squares)
+    median = float(np.median(variance[variance > 0])) if (variance > 0).any() else 1.0
+    known = variance > 1e-6 * median
+    if count < 2 or not known.any():
+        return np.full(len(variance), median)
+    y, x = np.log(variance[known]), np.log(unit)
+    mean, x = float(y.mean()), x - float(x[known].mean())
+    slope = float(x[known] @ y) / max(float(x[known] @ x[known]), 1e-300)
+    expected = mean + slope * x
+    unknown = np.mean(squares[:, known].var(axis=0, ddof=1) / variance[known] ** 2) / count
+    spread = np.mean((y - expected[known]) ** 2)
+    towards = min(1.0, UNKNOWN * float(unknown / max(spread, 1e-300)))
+    expected[known] += (1 - towards) * (y - expected[known])
+    return np.asarray(np.exp(expected))
 
 
 def whitening_of(covariance: FloatArray) -> FloatArray:
@@ -220,6 +236,18 @@ class Learned:
         return np.asarray((difference / self.unit) @ self.noise.whitening.T)
 
 
+def with_drift(learned: Learned, untouched: FloatArray, age: int) -> Learned:
+    """``learned``, whose noise has the drift between ``untouched`` frames (n, m) V in order of time
+    that are ``age`` presses apart as well; 0 for none."""
+    if age == 0:
+        return learned
+    drift = (untouched[age:] - untouched[:-age]) / learned.unit
+    covariance = learned.noise.covariance + DRIFT * drift.T @ drift / len(drift)
+    return replace(learned, noise=replace(
+        learned.noise, whitening=whitening_of(covariance), covariance=covariance
+    ))  # fmt: skip
+
+
 def learn(
     kernel: Kernel,
     place_mm: FloatArray,
@@ -247,15 +275,15 @@ def learn(
             kernel, place_mm, amplitude, data, angles=angles, progress=progress
         )
     process = condition(kernel, place_mm, amplitude, data)
-    noise = noise_of(process.left_out())
+    noise = noise_of(process.left_out(), unit)
     for _ in range(KNOWN_ROUNDS if given is not None else UNKNOWN_ROUNDS):
         amplitude = refitted_amplitudes(process, noise, given)
         process = condition(kernel, place_mm, amplitude, data)
-        noise = noise_of(process.left_out())
+        noise = noise_of(process.left_out(), unit)
     if choose:
         kernel, likelihood = chosen_kernel(kernel, place_mm, amplitude, data, angles=1)
         process = condition(kernel, place_mm, amplitude, data)
-        noise = noise_of(process.left_out())
+        noise = noise_of(process.left_out(), unit)
     return Learned(process, noise, unit, likelihood)
 
 

@@ -126,6 +126,14 @@ def shifted(presses: Presses, by: int) -> Presses:
     )
 
 
+def aged(presses: Presses, by: int) -> Presses:
+    """Each press with the untouched frame of the one ``by`` earlier, the first ones with one as
+    much later; they are in order of time."""
+    count = np.arange(len(presses))
+    other = np.where(count < by, np.minimum(count + by, count[-1]), count - by)
+    return replace(presses, untouched=presses.untouched[other])
+
+
 def joined(first: Presses, second: Presses) -> Presses:
     """The presses of both, one after the other; what only one of them has becomes NaN, time goes.
 

@@ -32,6 +32,8 @@ from eitskin.teaching.explained import (
     Progress,
     known_size,
     quiet_progress,
+    shift_note,
+    shifts,
     starting_kernel,
 )
 from eitskin.teaching.fit import (
@@ -48,7 +50,7 @@ from eitskin.teaching.known import Known, known_of
 from eitskin.teaching.left_out import stranger_note
 from eitskin.teaching.make import taught_model
 from eitskin.teaching.move import UNMOVED, Move
-from eitskin.teaching.presses import Presses
+from eitskin.teaching.presses import Presses, shifted
 from eitskin.teaching.process import condition
 from eitskin.teaching.teach import Tried, chosen_share, solve_presses
 
@@ -63,6 +65,7 @@ STRANGE = 6.0  # times the median misfit: no press like the others
 BETTER_BY = 1.0  # standard errors of the mean logarithm of two errors' ratio
 ERROR_FLOOR = 0.01  # of the skin's width: errors below are alike
 SHARE_FROM = 20  # presses: fewer do not tell the least share that a touch must explain
+ODD, SHIFTED = 0.5, 0.5  # of the energy unexplained: places may be shifted; are, where so much less
 STILL_POOR = 3.0  # times the error of the model when it was taught
 
 
@@ -127,13 +130,18 @@ def update(
         )
     skin = model.skin if "skin" in model.meta else None
     check_presses(presses, skin)
-    session, mirrored = _mirrored_or_not(_session(old, skin, presses), presses)
+    session = _session(old, skin, presses)
+    by = _shift(session, presses)
+    presses = shifted(presses, by)
+    session, mirrored = _mirrored_or_not(session, presses)
     found = {how: adapted(session, presses, how) for how in progress((MOVED, FULL), "candidates")}
     errors, tried = held_out_errors(model, session, presses, found, progress)
     chosen = choice(errors, ERROR_FLOOR * session.width_mm)
     before = float(model.meta["teach"].get("error_mm", {}).get("held_out_median", np.inf))
     strangers = _strangers(session, found[MOVED])
     notes = [stranger_note(strangers)] if len(strangers) else []
+    if by:
+        notes.append(shift_note(by))
     if mirrored and chosen != KEPT:
         notes.append("the new places are mirrored against the old; the model follows the new ones")
     medians = {how: float(np.median(one)) for how, one in errors.items()}
@@ -189,9 +197,32 @@ def _session(old: Known, skin: Skin | None, presses: Presses) -> Session:
     return Session(old, kernel, width_mm, unit)
 
 
+def _shift(session: Session, presses: Presses) -> int:
+    """By how many places the presses are off: 0 where the moved old model explains them."""
+    as_given = _unexplained(session, presses)
+    if as_given < ODD:
+        return 0
+    tried = {by: _unexplained(session, shifted(presses, by)) for by in shifts(presses)}
+    by = min(tried, key=lambda one: tried[one], default=0)
+    return by if by and tried[by] < SHIFTED * as_given else 0
+
+
+def _unexplained(session: Session, presses: Presses) -> float:
+    """Of the presses' energy, by the old answers at the likeliest new places."""
+    process = min(
+        (adapted(one, presses, MOVED) for one in (session, _mirrored(session))),
+        key=lambda one: -one.log_likelihood,
+    ).process
+    return float(np.sum(process.left_out() ** 2) / np.sum(process.data**2))
+
+
+def _mirrored(session: Session) -> Session:
+    return replace(session, kernel=replace(session.kernel, move=Move(mirrored=True)))
+
+
 def _mirrored_or_not(session: Session, presses: Presses) -> tuple[Session, bool]:
     """``session``, mirrored where that is far more likely."""
-    other = replace(session, kernel=replace(session.kernel, move=Move(mirrored=True)))
+    other = _mirrored(session)
     plain, turned = (adapted(one, presses, MOVED).log_likelihood for one in (session, other))
     return (other, True) if turned > plain + MIRROR_GAIN else (session, False)
 

@@ -133,7 +133,7 @@ def test_the_librarys_resting_hand_does_not_fade():
         assert not force[time_s < 120].any() and (constant == 0 or not force[time_s > 724].any())
         force = force[(time_s > 124) & (time_s < 720)]
         worst[constant] = np.abs(force / force[:3].mean() - 1).max()
-    assert worst[4] < 0.05 < 0.2 < worst[0]
+    assert worst[4] < 0.02 < 0.15 < worst[0]
 
 
 @pytest.mark.parametrize(("share", "grows"), [(1.0, 8), (0.3, 4)])

@@ -12,7 +12,7 @@ from eitskin.model.eitm import decode_model, encode_model, load_model, save_mode
 from eitskin.model.model import Model
 from eitskin.teaching.kernel import Placement
 from eitskin.teaching.known import known_of
-from eitskin.teaching.presses import Presses, save_presses
+from eitskin.teaching.presses import Presses, save_presses, shifted
 from eitskin.teaching.still import FITS, TEACH_AGAIN, UPDATE, still_fits
 from eitskin.teaching.teach import Taught, solve_presses, teach
 from eitskin.teaching.update import FULL, KEPT, MOVED, choice, update
@@ -126,3 +126,11 @@ def test_mirrored_and_strange_presses_are_told(model):
     judged = presses(40, seed=9)
     judged = replace(judged, place_mm=judged.place_mm * (1, -1))
     assert median_error(updated.model, judged) < 0.03 * RADIUS_MM < median_error(model, judged)
+
+
+@pytest.mark.parametrize(("by", "note"), [(2, "2 more came first"), (-1, "the first was missed")])
+def test_places_shifted_by_some_presses_are_put_right(model, by, note):
+    updated = update(model, shifted(presses(12, seed=4, **REMOUNTED), by))
+    assert updated.move.turn_deg % 360 == pytest.approx(130, abs=3)
+    assert any(note in one for one in updated.report["notes"])
+    assert median_error(updated.model, presses(40, seed=9, **REMOUNTED)) < 0.03 * RADIUS_MM

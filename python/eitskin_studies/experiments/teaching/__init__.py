@@ -48,6 +48,8 @@ PAIRS = 150
 HAND_SD_MM = 5.0
 ELECTRODE_OUT = 5
 TARE, FOLLOW_FRAMES = 8, 2  # 1 or 2: chosen on presses 200 to 299, one untouched frame a press
+AGES = (1, 5, 20)  # presses, of a reference
+AGE_TAUGHT = 4  # of 100 of 500 presses, 20 of all
 TARGETS = {
     "20": "3.2 / 13", "50": "2.0 / 6", "100": "1.5 / 4.5", "400": "1.1 / 4",
     "100, first to last in time": "3.4", "pairs over 45 mm": ".90", "singles": ".97",
@@ -184,16 +186,21 @@ def _more(presses: Presses, splits: int) -> dict[str, Any]:
     out["shuffled"] = _middle(teach(shuffled, SKIN, refuse=False), judged)
     out["untaught"] = untaught(presses, SKIN)
     out["no description"] = _middle(teach(known, None), judged)
-    hand, electrode = [], []
+    hand, electrode, aged = [], [], []
     for seed in range(splits):
         known, judged = _parts(presses, 100, seed)
         off = draw.normal(0, HAND_SD_MM, known.place_mm.shape)
         given = replace(known, place_mm=known.place_mm + off)
         hand.append((_middle(teach(given, SKIN), judged),
                      _middle(teach(given, SKIN, place_sd_mm=HAND_SD_MM), judged)))  # fmt: skip
-        electrode.append(_electrode_out(teach(known, SKIN).model, judged))
+        plain = teach(known, SKIN).model
+        electrode.append(_electrode_out(plain, judged))
+        aged.append(
+            (_by_age(plain, presses, seed), _by_age(_drift_known(presses, seed), presses, seed))
+        )
     out["by hand, as given"], out["by hand"] = np.median(hand, axis=0).tolist()
     out["electrode out"] = float(np.median(electrode))
+    out["old reference"], out["old reference, drift known"] = np.median(aged, axis=0).tolist()
     return out
 
 
@@ -209,6 +216,23 @@ def first_model(presses: Presses) -> Model:
 
 def _middle(taught: Taught, judged: Presses) -> float:
     return float(np.median(solve_presses(taught.model, judged)[0]))
+
+
+def _drift_known(presses: Presses, seed: int) -> Model:
+    """Of the same presses, in order of time, with drift as noise."""
+    order = np.random.default_rng(seed).permutation(len(presses))
+    known = presses.take(np.sort(order[:100]))
+    return teach(known, SKIN, reference_age=AGE_TAUGHT).model
+
+
+def _by_age(model: Model, presses: Presses, seed: int) -> list[float]:
+    """Median error of the judged presses by a reference of each of ``AGES``."""
+    judged = np.random.default_rng(seed).permutation(len(presses))[-JUDGED:]
+    some, found = presses.take(judged), []
+    for age in AGES:
+        old = replace(some, untouched=presses.untouched[np.maximum(judged - age, 0)])
+        found.append(float(np.median(solve_presses(model, old)[0])))
+    return found
 
 
 def _electrode_out(model: Model, judged: Presses) -> float:
@@ -280,6 +304,9 @@ def _targets(taught: dict[str, Any], more: dict[str, Any], splits: int) -> Table
          TARGETS["100, first to last in time"]),
         ("the same, one tare 300 presses before, reference stays / follows, mm",
          f"{more['stays']:.0f} / {more['follows']:.1f}", TARGETS["100, first to last in time"]),
+        (f"100, reference {' / '.join(map(str, AGES))} presses old, plain; drift as noise, mm",
+         "; ".join(" / ".join(f"{one:.1f}" for one in more[key])
+                   for key in ("old reference", "old reference, drift known")), "-"),
         ("100, shuffled places, mm", f"{more['shuffled']:.0f}", "chance, about 50"),
         ("100, no description, mm", f"{more['no description']:.1f}", "-"),
         ("untaught, presses 0 to 249 and 250 to 499, % of the diameter; touches a press",
