@@ -11,7 +11,6 @@ import pytest
 
 from eitm_bytes import sealed, sections_of
 from eitskin.cli.main import COMMANDS, build_parser, main
-from eitskin.errors import FileError
 from eitskin.skin.protocol import opposite
 from fresh_python import MAIN, run_python, without
 from small_models import prebuilt, session, small_blob
@@ -466,11 +465,6 @@ def test_an_interrupt_is_said_and_coded(refused, monkeypatch):
 
     monkeypatch.setattr("eitskin.model.prebuilt.load_prebuilt", interrupted)
     assert refused(130, "model", "info") == "stopped"
-
-
-def test_a_traceback_where_it_is_asked_for(tmp_path):
-    with pytest.raises(FileError):
-        main(["--traceback", "model", "info", str(tmp_path / "none")])
 
 
 def test_a_reader_that_stops_is_no_error(monkeypatch):

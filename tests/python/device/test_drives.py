@@ -132,11 +132,6 @@ TOUCH = FollowedTouch(1, True, 1.0, 2.0, 3.0, 4.0, 5.0)
 GOOD = pack(HEAD) + pack(TOUCH)
 
 
-def test_a_packet_of_a_drive_is_read():
-    found: Any = parse(PacketType.FOLLOWED, GOOD)
-    assert (found.head, found.touches, found.frame) == (HEAD, (TOUCH,), 3)
-
-
 @pytest.mark.parametrize(
     "payload",
     [

@@ -8,7 +8,7 @@ import pytest
 
 from eitskin.device.bank import bank_bytes
 from eitskin.device.flash import TOOLS, FlashPlan, find_tool, plan_flash, run_flash
-from eitskin.errors import DeviceError, FileError, UsageError
+from eitskin.errors import DeviceError, UsageError
 from small_models import tiny_blob
 
 IMAGE = struct.pack("<II", 0x2000_4000, 0x0800_0201) + bytes(2000)
@@ -126,13 +126,3 @@ def test_what_is_no_firmware_is_refused(content, message, tmp_path, tools):
     (tmp_path / "bad.bin").write_bytes(content)
     with pytest.raises(DeviceError, match=message):
         plan_flash(tmp_path / "bad.bin", None, tmp_path)
-
-
-def test_an_image_that_is_not_there(tmp_path, tools):
-    with pytest.raises(FileError, match="no such firmware image"):
-        plan_flash(tmp_path / "none.bin", None, tmp_path)
-
-
-def test_a_model_too_large_is_refused(image, tools):
-    with pytest.raises(DeviceError, match="a bank of the board holds 524256"):
-        plan_flash(image, bytes(600_000), image.parent)

@@ -194,10 +194,6 @@ def test_a_payload_of_another_length_is_refused(extra):
             pl.parse(kind, payload[:extra] if extra < 0 else payload + bytes(extra))
 
 
-def test_an_unknown_type_is_passed_over():
-    assert pl.parse(0x33, b"anything") is None
-
-
 @given(words, halves, halves, words)
 def test_a_command_lies_as_its_layout_says(request, what, every, frames):
     command = link.StreamCommand(what, every, frames)

@@ -12,7 +12,6 @@ from eitskin.frames.frames import load_frames
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.importer import import_frames
 from eitskin.frames.lines import LineFormat, LineReader
-from eitskin.frames.orders import source_table
 from eitskin.frames.source import SourceOptions
 from eitskin.frames.tables import read_table
 from eitskin.skin.protocol import adjacent, opposite
@@ -129,7 +128,3 @@ def test_a_foreign_file_for_a_frames_file_names_import(tmp_path):
     (tmp_path / "x.csv").write_text("1,2,3\n")
     with pytest.raises(EitskinError, match=r"no frames file; make one of it:  eitskin import"):
         load_frames(tmp_path / "x.csv")
-
-
-def test_a_source_table_of_opposite_has_192_rows():
-    assert len(source_table("fixed", opposite(16))) == 192

@@ -242,11 +242,6 @@ def test_other_hosts_without_a_token(capsys, tmp_path):
     assert "cannot listen" in refused(capsys, 2, "--host", "no.such.host.invalid", "--token", TOKEN)
 
 
-def test_a_device_that_is_not_there(capsys):
-    assert main(["view", "--device", "sim:nowhere", "--port", "0"]) == 3
-    assert "no such scene" in capsys.readouterr().err.splitlines()[-1]
-
-
 def test_every_kind_is_asked_for(server):
     with opened(server, TOKEN) as line:
         assert told(line, "setup")["mode"] == ["raw", "image", "touches"]

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eitskin.errors import ConfigError, EitskinError, FileError
+from eitskin.errors import ConfigError, EitskinError
 from eitskin.scene.description import Scene, load_scene
 from eitskin.scene.laws import Piezoresistive, ShortCircuit
 from eitskin.scene.touch_path import Keyframe, TouchTrack, always, sample, touches_at
@@ -121,11 +121,6 @@ def test_what_cannot_be_is_refused_in_one_line_naming_file_table_and_key(tmp_pat
     with pytest.raises(EitskinError, match=said) as caught:
         load_scene(path)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
-
-
-def test_a_scene_that_is_not_there_is_said_so(tmp_path):
-    with pytest.raises(FileError, match="no such scene"):
-        load_scene(tmp_path / "none.toml")
 
 
 def test_scenes_made_in_python_are_checked_too():

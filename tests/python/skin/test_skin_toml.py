@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eitskin.errors import ConfigError, FileError, GeometryError, ProtocolError
+from eitskin.errors import ConfigError, GeometryError, ProtocolError
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.protocol import adjacent, opposite
@@ -244,8 +244,3 @@ def test_refused_files(tmp_path, text, error, message):
         load_skin(_write(tmp_path, text))
     assert "\n" not in str(caught.value)
     assert "skin.toml" in str(caught.value)
-
-
-def test_missing_file(tmp_path):
-    with pytest.raises(FileError, match="no such skin description"):
-        load_skin(tmp_path / "none.toml")

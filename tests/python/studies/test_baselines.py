@@ -44,12 +44,6 @@ def test_noser_solves_the_weighted_normal_equations(exponent):
     )
 
 
-def test_noser_without_exponent_is_gauss_newton():
-    assert baselines.noser(J, 0.1, 0.0).matrix == pytest.approx(
-        baselines.gauss_newton(J, 0.1).matrix
-    )
-
-
 def test_strength_is_free_of_units():
     one = baselines.noser(J, 0.01).reconstruct(DV)
     assert 1e6 * baselines.noser(J * 1e6, 0.01).reconstruct(DV) == pytest.approx(

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from study_pages import coarse, fills_its_page, goes_on
 
-from eitskin.errors import UsageError
-from eitskin.scoring import metrics
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import algorithms
@@ -159,9 +157,3 @@ def test_candidates():
 def test_it_fills_its_page(outcome, tmp_path):
     assert set(outcome.pictures) == {"images.png", "masks.png", "curves.png", "bars.png"}
     assert "whatever their parameter" in fills_its_page(outcome, "algorithms", tmp_path)
-
-
-def test_what_it_refuses(tmp_path):
-    with pytest.raises(UsageError, match="at least 1 scene"):
-        touch_set(paper_skin().outline, 2, 1, 0)
-    assert metrics.THRESHOLDS.index(FIXED_THRESHOLD) == 4

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from study_pages import coarse, fills_its_page, goes_on
 
-from eitskin.core.options_table import ALL_TOUCH_FIT
 from eitskin_studies.experiments import levers
 from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
@@ -40,12 +39,6 @@ def test_what_coupling_explains_and_refining_costs(done):
         if one.options.get("second_pass"):
             base = images[one.name.removesuffix(", refined")]["60"]
             assert base["macs"] < images[one.name]["60"]["macs"] < 2.2 * base["macs"]
-
-
-def test_the_default_is_among_them():
-    assert {one.options["touch_fit"] for one in SEARCHES if one.name == "all (the default)"} == {
-        ALL_TOUCH_FIT
-    }
 
 
 def test_it_goes_on_and_fills_its_page(done, tmp_path):

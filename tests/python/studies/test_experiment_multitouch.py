@@ -36,7 +36,6 @@ from eitskin_studies.experiments.multitouch.cells import (
     RING,
     WIDE,
     Cell,
-    counting_cells,
     draw,
     mixed_cells,
 )
@@ -132,11 +131,6 @@ def test_what_does_not_fit_is_said(tmp_path, monkeypatch):
     assert set(counted.unfit) == {(WIDE, 40), (WIDE, 41)} and not counted.scores
     twelve = measure.CountedScenes({}, {(WIDE, k): "full" for k in range(2, 13)})
     assert all("do not fit" in row[1] for row in exact_table(twelve, WIDE, "x").rows)
-
-
-def test_targets_have_more_scenes():
-    usual = {(cell.geometry, cell.touches): cell.usual for cell in counting_cells()}
-    assert len(usual) == 33 and usual[WIDE, 8] >= 4 * usual[WIDE, 7]
 
 
 def test_wilson_interval():

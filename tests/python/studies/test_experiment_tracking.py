@@ -6,7 +6,6 @@ import pytest
 from study_pages import fills_its_page, goes_on
 
 from eitskin.core.diagnostics_table import Touch
-from eitskin.errors import UsageError
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import tracking
@@ -123,8 +122,3 @@ def test_the_best_pairs_may_not_be_the_nearest():
     assert measured.nearest_pairs(distance, 10.0) == [(0, 0), (1, 1)]
     assert measured.best_pairs(distance, 2.5) == [(0, 0)]
     assert measured.best_pairs(np.zeros((0, 2)), 1.0) == []
-
-
-def test_a_share_that_cannot_be():
-    with pytest.raises(UsageError, match="--share 0"):
-        ExperimentSettings(share=0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from eitskin.core.diagnostics_table import Touch
-from eitskin.errors import FileError
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import polygon
@@ -92,11 +91,6 @@ def test_many_panels(tmp_path):
     draw_panels(tmp_path / "many.png", SKIN, GRID, panels, 3, title="five", note="a note")
     height, width, _ = read(tmp_path / "many.png").shape
     assert 0.7 < height / width < 1.1  # two rows of three, a bar, a note
-
-
-def test_a_folder_that_is_not_there_is_a_file_error(tmp_path):
-    with pytest.raises(FileError, match="existing folder"):
-        draw_frame(tmp_path / "none" / "a.png", SKIN, GRID, np.zeros(GRID.n_pixels))
 
 
 def test_a_known_place_is_an_ellipse_of_ninety_percent():
