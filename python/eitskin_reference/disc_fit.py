@@ -43,13 +43,15 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Disc:
-    """A disc of uniform conductivity ``change`` (S/m), whose sign is ``polarity``."""
+    """A disc of uniform conductivity ``change`` (S/m), whose sign is ``polarity``. ``whole``: two
+    were fitted in its place, and were no better."""
 
     x_mm: float
     y_mm: float
     radius_mm: float
     change: float
     polarity: float
+    whole: bool = False
 
 
 class Fit:
@@ -68,6 +70,7 @@ class Fit:
         weight = model.column_weight.astype(np.float64)
         self.per_change = frame.seen / np.where(weight != 0, weight, np.inf)
         self.discs: list[Disc] = []
+        self.moves = 0  # steps of single discs so far
 
     def answers(self, disc: Disc) -> tuple[FloatArray, FloatArray]:
         """The atom (r,) and its derivatives by x, y and radius (3, r)."""
@@ -171,6 +174,7 @@ class Fit:
     def move(self, k: int) -> float:
         """One damped Gauss-Newton step of disc k, others held; returns how far it went, mm."""
         o, target = self.options, self.residual(leave_out=k)
+        self.moves += 1
         atom, slope = self.answers(self.discs[k])
         disc = replace(self.discs[k], change=self.best_change(self.discs[k], atom, target))
         self.discs[k] = disc

@@ -379,7 +379,8 @@ class Hypothesis:
     def one_less(self, answer: Answer, now: Likelihood, k: int) -> tuple[Answer, Likelihood | None]:
         """``answer`` without disc k, and F about it, None where there is room for more shapes."""
         rest, about = now.without(answer, k)
-        shaped = self.shaped(rest)
+        columns = len(rest.discs) * parameters_of(self.fit, self.errors, len(rest.discs))
+        shaped = self.shaped(rest) if self.budget.allows(columns) else rest
         return shaped, about if shaped.parameters == rest.parameters else None
 
     def as_one(self, answer: Answer, i: int, j: int) -> Answer:
@@ -533,10 +534,11 @@ class Hypothesis:
 
     def eliminate(self, now: Likelihood | None = None, *, to_the_end: bool) -> bool:
         """From the discs as they are to those that stay; not ``to_the_end``: false as soon as the
-        data are found not to fit, to be gone on with another time. Where no more columns may be
-        made, what stands then stays. ``now``: F about the answer, if it is at hand."""
+        data are found not to fit, to be gone on with another time, and where no column may be made
+        at all. Where no more may be made, what stands then stays. ``now``: F about the answer, if
+        it is at hand."""
         if now is None and not self.budget.allows(self.answer.columns):
-            return True
+            return False
         while len(self.answer.discs) > self.errors.kept:
             now = self.about(now)
             weakest = self.look(now)

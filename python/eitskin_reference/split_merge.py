@@ -9,14 +9,17 @@ import numpy as np
 
 from eitskin.core.constants_table import (
     DIRECTIONS_OF_NOISE,
+    FIT_MOVES,
     MERGE_LEFT,
     MERGE_NEAR,
     MERGE_SWEEPS,
     MERGE_TOTAL,
     PARALLEL,
+    SPLIT_CROWD,
     SPLIT_DIRECTIONS,
     SPLIT_DISTANCE,
     SPLIT_FIRST,
+    SPLIT_FIRST_OF_CROWD,
     SPLIT_GAIN,
     SPLIT_NOISE,
     SPLIT_OFFSET,
@@ -39,7 +42,7 @@ def join(fit: Fit) -> bool:
     were."""
     any_joined = False
     while pairs := _near_pairs(fit.discs):
-        joined = next((True for _, i, j in pairs if _try_join(fit, i, j)), False)
+        joined = any(fit.moves < FIT_MOVES and _try_join(fit, i, j) for _, i, j in pairs)
         if not joined:
             break
         any_joined = True
@@ -90,16 +93,20 @@ def part(fit: Fit) -> bool:
     any_parted = False
     left_to_look = list(range(len(fit.discs)))
     while left_to_look and len(fit.discs) < fit.options.max_touches and fit.left() >= enough:
+        if fit.moves >= FIT_MOVES:
+            break
         k = max(left_to_look, key=lambda i: (fit.discs[i].radius_mm, -i))
         left_to_look.remove(k)
-        any_parted |= _try_part(fit, k)
+        if not fit.discs[k].whole:
+            any_parted |= _try_part(fit, k)
     return any_parted
 
 
 def _try_part(fit: Fit, k: int) -> bool:
     before, left, last = list(fit.discs), fit.left(), len(fit.discs)
     best = min(_pairs_for(fit, k), key=lambda found: found[0], default=None)
-    if best is None or best[0] > SPLIT_FIRST * left:
+    first = SPLIT_FIRST if last < SPLIT_CROWD else SPLIT_FIRST_OF_CROWD
+    if best is None or best[0] > first * left:
         return False
     fit.discs[k] = best[1]
     fit.discs.append(best[2])
@@ -115,6 +122,7 @@ def _try_part(fit: Fit, k: int) -> bool:
     if gained and edge_distance(fit.discs[k], fit.discs[last]) > SPLIT_DISTANCE:
         return True
     fit.discs = before
+    fit.discs[k] = replace(before[k], whole=True)
     return False
 
 

@@ -88,7 +88,7 @@ static double least_without(const square *q, const eits_answer *answer, const in
  * gives. */
 TEST(leaving_out_is_solving_again_without)
 {
-    static const eits_disc third = {2, 19, 11, R(0.01), 1};
+    static const eits_disc third = {2, 19, 11, R(0.01), 1, 0};
     const eits_disc discs[] = {ONE, OTHER, third};
     const double room = BOTH_WIDTHS(3e-3, 1e-8);
     for (uint32_t count = 2; count < 4; ++count) {

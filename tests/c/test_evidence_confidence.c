@@ -133,7 +133,7 @@ TEST(two_lie_on_the_line_of_the_bulge)
 {
     eits_likelihood likelihood = {.count = 2 * EITS_SHAPE_PARAMETERS};
     eits_answer one = {.count = 2, .parameters = EITS_SHAPE_PARAMETERS}, two;
-    const eits_disc disc = {5, -3, 8, R(0.02), 1};
+    const eits_disc disc = {5, -3, 8, R(0.02), 1, 0};
     one.disc[0] = one.disc[1] = disc;
     one.shape[0][0] = R(0.1);
     eits_real line[2];

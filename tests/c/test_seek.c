@@ -69,21 +69,21 @@ TEST(touches_that_the_image_does_not_show_are_found)
         eits_sign sign;
         eits_disc disc[6];
     } cases[] = {
-        {1, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1}}},
-        {2, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(0.01), 1}}},
+        {1, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1, 0}}},
+        {2, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1, 0}, {27, -15, 9, R(0.01), 1, 0}}},
         /* what answers most lies between them */
-        {2, EITS_SIGN_INCREASE, {{-10, 3, 9, R(0.05), 1}, {12, 3, 9, R(0.05), 1}}},
-        {2, EITS_SIGN_DECREASE, {{-21, 9, 9, R(-0.05), -1}, {27, -15, 9, R(-0.02), -1}}},
-        {2, EITS_SIGN_BOTH, {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(-0.04), -1}}},
+        {2, EITS_SIGN_INCREASE, {{-10, 3, 9, R(0.05), 1, 0}, {12, 3, 9, R(0.05), 1, 0}}},
+        {2, EITS_SIGN_DECREASE, {{-21, 9, 9, R(-0.05), -1, 0}, {27, -15, 9, R(-0.02), -1, 0}}},
+        {2, EITS_SIGN_BOTH, {{-21, 9, 9, R(0.05), 1, 0}, {27, -15, 9, R(-0.04), -1, 0}}},
         /* more than are exchanged */
         {6,
          EITS_SIGN_INCREASE,
-         {{-39, -39, 9, R(0.05), 1},
-          {39, -39, 9, R(0.045), 1},
-          {-39, 39, 9, R(0.04), 1},
-          {39, 39, 9, R(0.05), 1},
-          {0, 0, 9, R(0.04), 1},
-          {3, -45, 9, R(0.05), 1}}},
+         {{-39, -39, 9, R(0.05), 1, 0},
+          {39, -39, 9, R(0.045), 1, 0},
+          {-39, 39, 9, R(0.04), 1, 0},
+          {39, 39, 9, R(0.05), 1, 0},
+          {0, 0, 9, R(0.04), 1, 0},
+          {3, -45, 9, R(0.05), 1, 0}}},
     };
     for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
         dense_bench b = {0};
@@ -104,7 +104,7 @@ TEST(touches_that_the_image_does_not_show_are_found)
 
 TEST(what_explains_too_little_is_no_touch)
 {
-    const eits_disc disc[2] = {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(0.02), 1}};
+    const eits_disc disc[2] = {{-21, 9, 9, R(0.05), 1, 0}, {27, -15, 9, R(0.02), 1, 0}};
     dense_bench b = {0};
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = pressed(&b, disc, 2, EITS_SIGN_INCREASE);
@@ -135,14 +135,18 @@ TEST(a_disc_a_whole_pixel_beyond_the_rim_is_no_touch)
     } cases[] = {{R(0.99), 1}, {R(0.9999), 0}, {1, 0}, {R(1.0001), 0}};
     for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
         dense_bench b = {0};
-        const eits_disc at = {0, 0, 9, R(0.05), 1};
+        const eits_disc at = {0, 0, 9, R(0.05), 1, 0};
         eits_context *ctx = pressed(&b, &at, 1, EITS_SIGN_INCREASE);
         const eits_model *model = ctx->model;
         const eits_real pixel = (eits_real)model->pixel_mm;
         eits_fit f = eits_fit_none(ctx, &ctx->scratch);
         f.disc[0] =
             (eits_disc){(eits_real)model->origin_x_mm + (SIDE - R(0.5) + cases[c].beyond) * pixel,
-                        (eits_real)model->origin_y_mm + R(9.5) * pixel, 2 * pixel, 0, 1};
+                        (eits_real)model->origin_y_mm + R(9.5) * pixel,
+                        2 * pixel,
+                        0,
+                        1,
+                        0};
         (void)eits_disc_atom(ctx, &ctx->scratch, &f.disc[0], ctx->frame.y, NULL);
         f.total = eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, RANK);
         f.count = 1;
@@ -170,7 +174,7 @@ static void answer(eits_context *ctx, const eits_touch *touch, double dx, double
 /* C = unit (G'G)^-1, G by finite differences, beside the answers of both touches. */
 TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
 {
-    static const eits_disc disc[2] = {{-10, 3, 9, R(0.05), 1}, {14, 3, 9, R(0.05), 1}};
+    static const eits_disc disc[2] = {{-10, 3, 9, R(0.05), 1, 0}, {14, 3, 9, R(0.05), 1, 0}};
     const double step = sizeof(eits_real) == 4 ? 0.02 : 1e-4, factor = 2.5;
     eits_touch touch[EITS_MAX_TOUCHES];
     dense_bench b = {0};
@@ -186,7 +190,7 @@ TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
     CHECK(unit > 0);
     for (int k = 0; k < 2; ++k) {
         double g[2][RANK], back[RANK], both[2 * RANK], h[3];
-        const eits_disc at = {touch[k].x_mm, touch[k].y_mm, touch[k].radius_mm, 0, 1};
+        const eits_disc at = {touch[k].x_mm, touch[k].y_mm, touch[k].radius_mm, 0, 1, 0};
         const double change = (double)(touch[k].strength_s_per_m_mm2 / eits_disc_area(ctx, &at));
         for (int axis = 0; axis < 2; ++axis) {
             const double dx = axis == 0 ? step : 0, dy = axis == 1 ? step : 0;
@@ -211,7 +215,7 @@ TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
 /* A touch that nothing is left beside has no place to be unsure of. */
 TEST(without_a_residual_a_place_is_not_rated)
 {
-    static const eits_disc disc = {-21, 9, 9, R(0.05), 1};
+    static const eits_disc disc = {-21, 9, 9, R(0.05), 1, 0};
     dense_bench b = {0};
     eits_context *ctx = pressed(&b, &disc, 1, EITS_SIGN_INCREASE);
     eits_fit f = eits_fit_none(ctx, &ctx->scratch);
@@ -288,7 +292,7 @@ static eits_fit one_left(eits_context *ctx, double confidence)
     eits_fit f = eits_fit_none(ctx, &ctx->scratch);
     ctx->reference.far = f.count = f.tested = 1;
     f.confidence[0] = (eits_real)confidence;
-    f.disc[0] = (eits_disc){40, 40, 3, R(0.01), 1};
+    f.disc[0] = (eits_disc){40, 40, 3, R(0.01), 1, 0};
     f.place_mm2[0][0] = f.place_mm2[0][2] = f.long_mm[0][1] = 9;
     eits_fit_restart(ctx, &ctx->scratch, &f);
     return f;
@@ -322,8 +326,8 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
     dense_bench b = {0};
     for (int k = 0; k < 6; ++k) {
         const int down = k % 3 == 1 || k == 5;
-        const eits_disc at[2] = {{-21, 9, 11, down ? R(-0.05) : R(0.05), 1},
-                                 {18, -14, 8, down ? R(0.01) : R(-0.01), 1}};
+        const eits_disc at[2] = {{-21, 9, 11, down ? R(-0.05) : R(0.05), 1, 0},
+                                 {18, -14, 8, down ? R(0.01) : R(-0.01), 1, 0}};
         eits_context *ctx = pressed(&b, at, k < 3 ? 1 : 2, signs[k % 3]);
         double *y = dense_copy(ctx->frame.y, RANK), *image = dense_numbers(b.d.n), peak = 0;
         const double origin[2] = {0, 0};
@@ -359,7 +363,7 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
  * says nothing of that sign: as the test left it. */
 TEST(other_touches_stay)
 {
-    static const eits_disc at = {-21, 9, 11, R(0.05), 1};
+    static const eits_disc at = {-21, 9, 11, R(0.05), 1, 0};
     dense_bench b = {0};
     for (int k = 0; k < 6; ++k) {
         eits_context *ctx = pressed(&b, &at, 1, EITS_SIGN_INCREASE);

@@ -35,7 +35,7 @@ static void merge(const eits_context *ctx, eits_answer *answer, uint32_t i, uint
 }
 
 /* Leave out of `rest`, one after another from the weakest on, whatever the linearisation can do
- * without. */
+ * without. The others get shapes where columns are left for them. */
 static void drop_linearly(eits_context *ctx, const eits_scratch *scratch, const eits_verdict *v,
                           uint32_t weakest, eits_answer *rest, eits_likelihood *likelihood,
                           uint64_t *macs)
@@ -48,7 +48,8 @@ static void drop_linearly(eits_context *ctx, const eits_scratch *scratch, const 
             break;
         weakest = eits_weakest(scratch, rest, likelihood, rise);
     }
-    add_shapes(ctx, rest, likelihood);
+    if (eits_may_make(ctx, rest->count * eits_shape_parameters(ctx, rest->count)))
+        add_shapes(ctx, rest, likelihood);
 }
 
 /* The best of the answers with one disc less: without the weakest, unless that is clear, or with a
@@ -101,7 +102,7 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
 {
     eits_likelihood now = *first;
     if (!now.at_hand && !eits_may_make(ctx, eits_columns_of(&v->answer)))
-        return 1;
+        return 0;
     while (v->answer.count > ctx->reference.far) {
         if (!now.at_hand)
             *macs += eits_linearise(ctx, scratch, &v->answer, &now);

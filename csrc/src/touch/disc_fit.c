@@ -168,6 +168,7 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
     eits_disc *disc = &f->disc[k];
     eits_real *atom = eits_atom(ctx, k), *trial_atom = scratch->row[2], *left = scratch->row[3],
               *target = f->residual;
+    ++f->moves;
     eits_axpy(ctx->kernels, target, disc->change, atom, rank);
     f->macs += eits_disc_atom(ctx, scratch, disc, atom, &scratch->row[5]);
     disc->change = eits_best_change(ctx, disc, atom, target);

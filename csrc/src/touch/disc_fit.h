@@ -40,6 +40,7 @@ typedef struct eits_fit {
     /* options.touch_radius_weight, times what the stage of the touch fit asks for */
     eits_real radius_weight;
     uint32_t count;
+    uint32_t moves; /* steps of single discs so far */
     uint64_t macs;
 } eits_fit;
 
@@ -96,7 +97,7 @@ void eits_fit_explain(eits_context *ctx, eits_fit *f);
  * others take up what it leaves. */
 void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
-/* split_merge.c */
+/* split_merge.c: neither tries any more once the fit has made EITS_FIT_MOVES */
 
 /* One disc in the place of two, of their area. Its strength is not set. */
 eits_disc eits_merged_disc(const eits_options *o, const eits_disc *a, const eits_disc *b);

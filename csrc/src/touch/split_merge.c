@@ -6,12 +6,13 @@
  * residual does not bear it out. Merging may cost a little (fewer parameters explain less),
  * splitting has to gain clearly (more of them always explain more): hence two
  * sets of limits. One may undo what the other did, so touch.c runs them in turn a fixed number of
- * times.
+ * times, and a disc that was tried as two is not tried again.
  *
  * Limits are parts of |y|^2, of what is left, and of what noise gives one direction
  * (f->noise / rank): the first guards against the model's own error, which scales with the touch,
  * the last against noise. A trial costs a few moves of disc_fit.c; the search is greedy, nearest
- * pair and largest disc first, since trying all subsets would grow without bound. */
+ * pair and largest disc first, since trying all subsets would grow without bound. Once the fit has
+ * made EITS_FIT_MOVES the discs stay as many as they are, and go to the test of touches. */
 #include "touch/constants.h"
 #include "touch/disc_fit.h"
 
@@ -118,7 +119,7 @@ int eits_fit_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     int any = 0;
     pair next, last;
     const pair *after = NULL;
-    while (next_pair(f, after, &next)) {
+    while (f->moves < EITS_FIT_MOVES && next_pair(f, after, &next)) {
         if (try_merge(ctx, scratch, f, &next)) {
             any = 1;
             after = NULL;
@@ -210,15 +211,18 @@ static two best_two(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
 
 /* Make disc k two; 1 if that is kept.
  *
- * A start that leaves far more than the one disc did is not worth fitting; what comes of the fit
+ * A start that leaves far more than the one disc did is not worth fitting, among many discs less
+ * surely so, as neighbours have taken up what the two would have; what comes of the fit
  * has to leave clearly less, beyond what noise would give, and to be two discs that one can tell
  * apart. */
 static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
     const uint32_t last = f->count;
     const eits_fit_kept before = eits_fit_keep(ctx, f);
+    const eits_real first =
+        before.count < EITS_SPLIT_CROWD ? EITS_SPLIT_FIRST : EITS_SPLIT_FIRST_OF_CROWD;
     const two begin = best_two(ctx, scratch, f, k);
-    if (begin.left < 0 || begin.left > EITS_SPLIT_FIRST * before.left)
+    if (begin.left < 0 || begin.left > first * before.left)
         return 0;
     f->disc[k] = begin.disc[0];
     f->disc[last] = begin.disc[1];
@@ -238,10 +242,11 @@ static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
         edge_distance(&f->disc[k], &f->disc[last]) > EITS_SPLIT_DISTANCE)
         return 1;
     eits_fit_undo(ctx, scratch, f, &before);
+    f->disc[k].whole = 1;
     return 0;
 }
 
-/* The largest disc is the likeliest to be two touches. Each is tried once. */
+/* The largest disc is the likeliest to be two touches. Each is tried once a frame. */
 int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     uint8_t looked[EITS_MAX_TOUCHES] = {0};
@@ -250,7 +255,8 @@ int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     /* those that come by splitting are not split again at once */
     const uint32_t before = f->count;
     for (uint32_t turn = 0; turn < before; ++turn) {
-        if (f->count >= ctx->options.max_touches || eits_fit_left(ctx, f) < enough)
+        if (f->count >= ctx->options.max_touches || f->moves >= EITS_FIT_MOVES ||
+            eits_fit_left(ctx, f) < enough)
             return any;
         uint32_t k = before;
         for (uint32_t i = 0; i < before; ++i) { /* the largest first */
@@ -258,7 +264,8 @@ int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
                 k = i;
         }
         looked[k] = 1;
-        any |= try_split(ctx, scratch, f, k);
+        if (!f->disc[k].whole)
+            any |= try_split(ctx, scratch, f, k);
     }
     return any;
 }
