@@ -89,6 +89,7 @@ SPOILT: dict[str, Callable[[], Frames]] = {
     "constant channels": lambda: spoilt(22, lambda v, _: put(v, (slice(None), [4, 60]), 1e-4)),
     "random": lambda: spoilt(23, lambda v, draw: draw.normal(size=v.shape)),
     "opposite": lambda: healthy_frames(24, opposite(16)),
+    "few channels": lambda: times(healthy_frames(26), (np.arange(208) % 50 == 0) * 1.0),
     "turned": lambda: as_if_electrodes(
         healthy_frames(25), orders.electrode_map(16, 5, True), seed=25
     ),

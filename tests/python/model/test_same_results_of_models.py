@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eitm_bytes import sealed, sections_of
+from eitm_bytes import entry_place, sealed, sections_of
 from eitskin.model import force_law, model_errors, reduction, row_form, storage
 from eitskin.model.build import BuildSettings, make_model
 from eitskin.model.eitm import decode_model, encode_model
@@ -79,6 +79,27 @@ def damaged(tag: str) -> list[Any]:
             other = bytearray(blob)
             other[at : at + 4] = value
             said.append(words_of(sealed(other, rehash=tag in ("DIMS", "PROT"))))
+    return said
+
+
+def taught() -> Model:
+    """A model of another form: a precision in place of rows that are orthogonal."""
+    folded = len(made(rank=5).fold.first)
+    precision = np.eye(folded)[np.tril_indices(folded)].astype(np.float32)
+    return replace(made(rank=5), load=law(), row_form=None, precision=precision, place_factor=1.5)
+
+
+def of_other_sizes() -> list[Any]:
+    """What is said where a section has four bytes less or more."""
+    said = []
+    for blob in (encode_model(taught()), encode_model(replace(made(rank=5), load=law()))):
+        for tag in sections_of(blob):
+            at = entry_place(blob, tag) + 8
+            for change in (-4, 4):
+                other = bytearray(blob)
+                size = int.from_bytes(blob[at : at + 4], "little") + change
+                other[at : at + 4] = size.to_bytes(4, "little", signed=False)
+                said.append([tag, words_of(sealed(other))])
     return said
 
 
@@ -153,6 +174,8 @@ CALLS: dict[str, Callable[[], Any]] = {
         if tag in ("DIMS", "PROT", "FOLD", "GRID", "DEFS", "META", "WHIT", "FLDS")
     },
     "damaged LOAD": lambda: damaged("LOAD"),
+    "taught, read": lambda: of(decode_model(encode_model(taught()), "file")),
+    "sections of other sizes": of_other_sizes,
     "cut off": cut,
     **{f"stored as {kind}": lambda kind=kind: stored(kind) for kind in STORAGES},
     **{
