@@ -1,4 +1,4 @@
-/* What the fuzz targets fraction. A target is LLVMFuzzerTestOneInput of its file; clang's libFuzzer
+/* What the fuzz targets share. A target is LLVMFuzzerTestOneInput of its file; clang's libFuzzer
  * calls it with bytes of its own making, replay.c with files, under any compiler. */
 #ifndef EITSKIN_FUZZ_H
 #define EITSKIN_FUZZ_H
