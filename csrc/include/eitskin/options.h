@@ -107,8 +107,7 @@ typedef struct eits_options {
     uint32_t touch_sweeps;
     /* a touch that moved at most so far since the last frame keeps its id */
     eits_real follow_mm;
-    /* > 0: stop with the best so far where the next step, and the gap after it, would take
-     * info.macs beyond this (solve.h) */
+    /* > 0: stop with the best so far before info.macs goes beyond this (solve.h) */
     uint32_t mac_limit;
     /* the diagnostics that are looked for, a bit each */
     uint32_t diagnostics;
@@ -129,8 +128,7 @@ typedef struct eits_options {
      * S'y is as great as that of noise, in pixels */
     eits_real track_smooth;
     /* the whitening's regularisation is at least this times noise_v / v0_rms, where both are known;
-     * 0: as the model has it. 5 was chosen on training scenes of one to three touches, six, light
-     * ones and drift, at 30 to 55 dB */
+     * 0: as the model has it */
     eits_real regularisation_noise_factor;
     /* 1: where the model says what it may be wrong by, each row's data are multiplied by what makes
      * its reference the model's, unless the reference says that the instrument differs and not the

@@ -69,9 +69,7 @@ class OptionFields:
     saturation_v: float = 0.0  # > 0: a channel at or beyond +-saturation_v is unusable, V
     # sweeps of the off-grid fit over all touches; 0: peaks with their strengths only
     touch_sweeps: int = 6
-    # > 0: stop with the best so far where the next step, and the gap after it, would take info.macs
-    # beyond this (solve.h)
-    mac_limit: int = 0
+    mac_limit: int = 0  # > 0: stop with the best so far before info.macs goes beyond this (solve.h)
     diagnostics: int = ALL_DIAGNOSTICS  # the diagnostics that are looked for, a bit each
     # 1: where more than one touch is found, eits_find_touches solves again with their interaction
     # taken out of the data; image and info are then the second solve's. Not with a mac_limit
@@ -85,8 +83,7 @@ class OptionFields:
     # S'y is as great as that of noise, in pixels
     track_smooth: float = 0.0
     # the whitening's regularisation is at least this times noise_v / v0_rms, where both are known;
-    # 0: as the model has it. 5 was chosen on training scenes of one to three touches, six, light
-    # ones and drift, at 30 to 55 dB
+    # 0: as the model has it
     regularisation_noise_factor: float = 5.0
     # 1: where the model says what it may be wrong by, each row's data are multiplied by what makes
     # its reference the model's, unless the reference says that the instrument differs and not the

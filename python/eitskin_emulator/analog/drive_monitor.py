@@ -1,5 +1,13 @@
-"""Watches what the firmware does to current, at every write that reaches multiplexers or
-generator: docs/guide/emulated-board.md has the rules."""
+"""Watches what the firmware does to current, at every write that reaches multiplexers or generator
+(``tests/firmware`` and ``sim:`` have the same in C). A test that meets a violation fails with its
+sentence:
+
+- I+ and I-, or V+ and V-, are on one electrode.
+- An address changes while its multiplexer is enabled.
+- The generator takes a word other than its reset while a multiplexer is enabled.
+- Current flows though no host has asked, or 1 s after its last packet, where the owner has not
+  allowed it.
+"""
 
 from __future__ import annotations
 

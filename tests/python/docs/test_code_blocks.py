@@ -24,7 +24,6 @@ PAGES = (
     "docs/guide/touches-out.md",
     "docs/guide/your-board.md",
     "docs/reference/python-api.md",
-    "docs/guide/emulated-board.md",
     "docs/reference/frames-format.md",
     "docs/results/tradeoff.md",
 )
