@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path, PosixPath
@@ -10,7 +11,13 @@ from typing import Any
 
 from eitskin.errors import UsageError
 
-MAX_RING_OHM = 1e7
+
+def above(low: float) -> float:
+    """The lower end of a range that does not belong to it."""
+    return math.nextafter(low, math.inf)
+
+
+RING_OHM = (above(0), 1e7)  # of --resistor-ring
 
 
 class Output(PosixPath):
@@ -59,13 +66,14 @@ def option(
     kind: Callable[[str], Any] | None = None,
     *,
     default: Any = None,
+    within: tuple[float, float] | None = None,
     **more: Any,
 ) -> None:
     """Add an option: ``names`` are its names and what stands for its value, as "-o --output OUT".
 
     Without a value's name, ``kind``, ``default`` and ``choices`` it is a flag. ``kind`` turns the
-    text into the value; where it is not given it is that of the default. The default is said in
-    the help.
+    text into the value; where it is not given it is that of the default. A number must lie
+    ``within``, ends included. The default is said in the help.
     """
     listed = names.split()
     metavar = listed.pop() if len(listed) > 1 and not listed[-1].startswith("-") else None
@@ -74,6 +82,8 @@ def option(
         return
     if kind is None and isinstance(default, (int, float)):
         kind = type(default)
+    if within is not None:
+        kind = _within(kind or int, listed[-1], *within)
     if metavar is not None:
         more["metavar"] = metavar
     if default is not None:
@@ -82,13 +92,16 @@ def option(
     parser.add_argument(*listed, type=kind, default=default, help=text, **more)
 
 
-def check_ring(resistance_ohm: float) -> None:
-    """Check what ``--resistor-ring`` says.
+def _within(kind: Callable[[str], Any], name: str, low: float, high: float) -> Callable[..., Any]:
+    """``kind``, refusing what lies outside."""
 
-    Raises:
-        UsageError: no resistor has that resistance.
-    """
-    if not 0 < resistance_ohm <= MAX_RING_OHM:
-        raise UsageError(
-            f"--resistor-ring {resistance_ohm:g} is out of range; use ohms up to {MAX_RING_OHM:g}"
-        )
+    def read(text: str) -> Any:
+        value = kind(text)
+        if not low <= value <= high:
+            said = value if isinstance(value, int) else f"{value:g}"
+            lowest = f"{'' if low == round(low, 12) else 'above '}{round(low, 12):.12g}"
+            raise UsageError(f"{name} {said} is out of range; use {lowest} to {high:.12g}")
+        return value
+
+    read.__name__ = getattr(kind, "__name__", "value")  # argparse says it of what is no number
+    return read

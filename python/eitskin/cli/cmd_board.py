@@ -7,8 +7,25 @@ import json
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import add_device, open_named, print_table, whole
-from eitskin.errors import UsageError
+from eitskin.cli.device_options import add_device, open_named, print_table
+
+SETTINGS = (  # bits of eits_setting, each with what sets and what clears it
+    (
+        "LOCKED",
+        ("--lock", "uploads, settings and lower excitations need the blue button"),
+        ("--unlock", "nothing needs the button"),
+    ),
+    (
+        "KEEP_DRIVE",
+        ("--keep-drive", "current flows on where no program listens"),
+        ("--no-keep-drive", "it stops within a second (as delivered)"),
+    ),
+    (
+        "SENSE",
+        ("--sense", "a sense resistor is fitted: measure the current"),
+        ("--no-sense", "none is fitted (as delivered)"),
+    ),
+)
 
 
 def add_parser(subparsers: Any) -> None:
@@ -22,13 +39,16 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     add_device(parser)
-    option(parser, "--lock", "uploads, settings and lower excitations need the blue button")
-    option(parser, "--unlock", "nothing needs the button")
-    option(parser, "--keep-drive", "current flows on where no program listens")
-    option(parser, "--no-keep-drive", "it stops within a second (as delivered)")
-    option(parser, "--sense", "a sense resistor is fitted: measure the current")
-    option(parser, "--no-sense", "none is fitted (as delivered)")
-    option(parser, "--limit-ua UA", "rms, above which it is switched off; 0: as the board is", int)
+    for name, (on, text), (off, contrary) in SETTINGS:
+        either = parser.add_mutually_exclusive_group()
+        for flag, value, said in ((on, True, text), (off, False, contrary)):
+            either.add_argument(flag, dest=name, action="store_const", const=value, help=said)
+    option(
+        parser,
+        "--limit-ua UA",
+        "rms, above which it is switched off; 0: as the board is",
+        within=(0, 10_000),
+    )
     option(parser, "--clear-faults", "forget faults, a current above its limit among them")
     parser.set_defaults(run=run)
 
@@ -37,22 +57,15 @@ def run(options: argparse.Namespace) -> int:
     """Change what is named, and show all."""
     from eitskin.device.wire.link_table import Setting
 
-    pairs = (
-        (Setting.LOCKED, options.lock, options.unlock, "lock"),
-        (Setting.KEEP_DRIVE, options.keep_drive, options.no_keep_drive, "keep-drive"),
-        (Setting.SENSE, options.sense, options.no_sense, "sense"),
-    )
-    for _, on, off, name in pairs:
-        if on and off:
-            raise UsageError(f"board: --{name} and its contrary contradict each other; give one")
-    whole("--limit-ua", options.limit_ua, 0, 10_000)
     with open_named(options) as device:
         if options.clear_faults:
             device.clear_faults()
         info = device.board if device.transport.replays else device.info()
         wanted = Setting(info.settings)
-        for bit, on, off, _ in pairs:
-            wanted = (wanted | bit) if on else (wanted & ~bit) if off else wanted
+        for name, *_ in SETTINGS:
+            named = getattr(options, name)
+            if named is not None:
+                wanted = wanted | Setting[name] if named else wanted & ~Setting[name]
         if wanted != info.settings or options.limit_ua is not None:
             info = device.settings(wanted, options.limit_ua)
         url = device.transport.url

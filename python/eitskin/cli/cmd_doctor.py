@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eitskin.cli.arguments import Output, check_ring, option
+from eitskin.cli.arguments import RING_OHM, Output, option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.cli.import_options import (
     add_import_options,
@@ -46,7 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     option(parser, "source", "frames file, or CSV, NPZ, MAT as for import", Path, nargs="?")
     device = parser.add_argument_group("a board in place of a source")
     option(device, "--device URL", DEVICE_HELP)
-    option(device, "--frames N", "to be measured, 4 to 1024", default=32)
+    option(device, "--frames N", "to be measured", default=32, within=(4, 1024))
     option(device, "--model MODEL.eitm", "the board's, where it is not the prebuilt one", Path)
     option(parser, "--json", "print the report as JSON")
     option(parser, "--picture FILE", "draw what was measured (needs matplotlib)", Output)
@@ -65,6 +65,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--resistor-ring OHM",
         "a ring of equal resistors between neighbouring electrodes stands in for the skin",
         float,
+        within=RING_OHM,
     )
     option(parser, "--touch-in FRAME", "the frame with these touches; else the largest change")
     add_import_options(parser)
@@ -79,12 +80,10 @@ def run(options: argparse.Namespace) -> int:
     if (options.source is None) == (options.device is None):
         raise UsageError("doctor: name frames to examine, or a board: --device URL")
     ring_ohm = options.resistor_ring
-    if ring_ohm is not None:
-        check_ring(ring_ohm)
-        if options.touch or options.skin is not None:
-            raise UsageError(
-                "--resistor-ring: a ring stands in for the skin; leave --skin and --touch out"
-            )
+    if ring_ohm is not None and (options.touch or options.skin is not None):
+        raise UsageError(
+            "--resistor-ring: a ring stands in for the skin; leave --skin and --touch out"
+        )
     if options.picture is not None:
         from eitskin.view.panels import check_picture
 
@@ -116,12 +115,11 @@ def _repaired(options: argparse.Namespace, repair: str) -> argparse.Namespace:
 def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
     """Measure, examine, say; with ``--touch`` the second half of the frames is of the touched
     skin."""
-    from eitskin.cli.device_options import open_named, say, whole
+    from eitskin.cli.device_options import open_named, say
     from eitskin.device.diagnose_board import board_findings, board_subject, measure
     from eitskin.device.known_model import find_model
     from eitskin.frames.doctor.examine import examine_case
 
-    whole("--frames", options.frames, 4, 1024)
     with open_named(options) as device:
         known = find_model(device.board, options.model, device.transport.name)
         simulated = device.transport.synchronous

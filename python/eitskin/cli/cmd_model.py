@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import Output, check_ring, option
+from eitskin.cli.arguments import RING_OHM, Output, option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.errors import MissingExtraError, UsageError, VerificationError
 
@@ -41,7 +41,7 @@ def add_parser(subparsers: Any) -> None:
         choices=("difference", "normalised", "log-ratio"),
         default="difference",
     )
-    option(build, "--elements", "about how many the mesh has", default=3000)
+    option(build, "--elements", "about how many the mesh has", default=3000, within=(100, 500_000))
     option(build, "--regularisation", "mu of the whitening", default=0.01)
     option(
         build,
@@ -49,6 +49,7 @@ def add_parser(subparsers: Any) -> None:
         "expected change under a touch over the skin's conductivity: 1.35 for contrasts 3 to"
         " 10, 2 for metal, 0 for unknown",
         default=1.35,
+        within=(0, 100),
     )
     option(
         build,
@@ -70,7 +71,11 @@ def add_parser(subparsers: Any) -> None:
     option(voltages, "skin SKIN.toml", "skin description", Path, nargs="?")
     option(voltages, "--paper", "the paper's 194 mm disk instead of a file")
     option(
-        voltages, "--resistor-ring OHM", "between neighbouring electrodes, in place of it", float
+        voltages,
+        "--resistor-ring OHM",
+        "between neighbouring electrodes, in place of it",
+        float,
+        within=RING_OHM,
     )
     option(voltages, "--json")
     voltages.set_defaults(run=run_voltages)
@@ -115,14 +120,6 @@ def run_build(options: argparse.Namespace) -> int:
     their = read_eidors(options.skin) if _is_eidors(options) else None
     skin, protocol = _skin_of(options) if their is None else skin_of_eidors(their)
     refuse_unwritable(options.output)
-    if not 100 <= options.elements <= 500_000:
-        raise UsageError(
-            f"model build: --elements {options.elements} is out of range; use 100 to 500000"
-        )
-    if not 0 <= options.touch_change <= 100:
-        raise UsageError(
-            f"model build: --touch-change {options.touch_change:g} is out of range; use 0 to 100"
-        )
     settings = BuildSettings(
         rank=options.rank or 0,
         pixels_across=options.pixels,
@@ -168,7 +165,6 @@ def run_voltages(options: argparse.Namespace) -> int:
     if ring_ohm is None:
         transfer_ohm, of = transfer_by_elements(skin), f"skin {skin.name!r}"
     else:
-        check_ring(ring_ohm)
         ring = resistor_ring(protocol.n_electrodes, ring_ohm)
         transfer_ohm, of = ring.transfer_ohm, ring.source
     rows = protocol.drive_measure.astype(int)

@@ -8,7 +8,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import Output, option
+from eitskin.cli.arguments import Output, above, option
 from eitskin.cli.device_options import (
     add_device,
     add_scan,
@@ -18,7 +18,6 @@ from eitskin.cli.device_options import (
     say_progress,
     session_settings,
 )
-from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -41,7 +40,8 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "-o --output RUN.eits", None, Output, required=True)
     option(parser, "--overwrite", "write over a file that exists")
     add_stream(parser, "raw,image,touches")
-    option(parser, "--seconds S", "stop after S seconds of the board's time", float)
+    seconds = "stop after S seconds of the board's time"
+    option(parser, "--seconds S", seconds, float, within=(above(0), 1e6))
     add_scan(parser)
     parser.set_defaults(run=run)
 
@@ -51,8 +51,6 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.live.session import Session
 
     settings = session_settings(options, read_mode(options.mode), record=options.output)
-    if options.seconds is not None and not 0 < options.seconds <= 1e6:
-        raise UsageError(f"--seconds {options.seconds:g} is out of range; use above 0 to 1000000")
     with Session(options.device, settings, say=say, progress=say_progress) as session:
         items = session.items()
         try:

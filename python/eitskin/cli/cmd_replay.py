@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.device_options import add_verbose, add_zones, read_mode, read_zones, say, whole
+from eitskin.cli.device_options import add_verbose, add_zones, read_mode, read_zones, say
 from eitskin.errors import FrameError, UsageError, VerificationError
 
 
@@ -28,7 +28,7 @@ def add_parser(subparsers: Any) -> None:
     option(
         parser, "--mode KIND[,KIND]", "raw, image, touches, events, or several (default: touches)"
     )
-    option(parser, "--first N", "the first N frames only", int)
+    option(parser, "--first N", "the first N frames only", within=(1, 2**32 - 1))
     add_zones(parser)
     option(parser, "--model MODEL.eitm", "the board's model where it is not the prebuilt one", Path)
     option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Output)
@@ -44,7 +44,6 @@ def run(options: argparse.Namespace) -> int:
     """Show, export or check."""
     from eitskin.fileio import refuse_unwritable
 
-    whole("--first", options.first, 1, 2**32 - 1)
     refuse_unwritable(options.picture, options.frames)
     if options.check or options.frames is not None:
         shown = (options.mode, options.picture, options.film, options.first)

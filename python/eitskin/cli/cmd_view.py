@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
     add_device,
+    add_every,
     add_outputs,
     add_report,
     add_scan,
@@ -22,7 +23,6 @@ from eitskin.cli.device_options import (
     read_mode,
     say,
     session_settings,
-    whole,
 )
 from eitskin.errors import FileError, UsageError
 
@@ -50,8 +50,8 @@ def add_parser(subparsers: Any) -> None:
         "raw, image, touches, or several (default: all; of a real board image,touches)",
     )
     add_report(parser)
-    option(parser, "--every N", "every N-th frame (default: as many as the line carries)", int)
-    option(parser, "--port PORT", f"to listen on; 0 for any (default: {PORT})", int, default=PORT)
+    add_every(parser)
+    option(parser, "--port PORT", "to listen on; 0 for any", default=PORT, within=(0, 65535))
     option(
         parser,
         "--host ADDRESS",
@@ -86,7 +86,6 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.page.server import MIN_TOKEN, PageServer, listen, load_server
 
     load_server()
-    whole("--port", options.port, 0, 65535)
     if options.token is not None and len(options.token) < MIN_TOKEN:
         raise UsageError(f"--token: a word of at least {MIN_TOKEN} characters")
     remote = not _this_machine(options.host)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.arguments import option
+from eitskin.cli.arguments import above, option
 from eitskin.cli.budget_options import add_wish, named_target
 from eitskin.errors import FileError, UsageError
 
@@ -27,6 +27,7 @@ DEVICE_HELP = (
     " last three, ?speed=1&loop=1"
 )
 TARE_FRAMES = 16
+MAX_U32 = 2**32 - 1
 
 
 def add_device(parser: argparse.ArgumentParser, *, model: bool = True, json: bool = True) -> None:
@@ -48,11 +49,13 @@ def add_device(parser: argparse.ArgumentParser, *, model: bool = True, json: boo
 def add_scan(parser: argparse.ArgumentParser) -> None:
     """How frames are scanned and solved, and how the reference is taken."""
     scan = parser.add_argument_group("scan; what is not named stays as the board has it")
-    option(scan, "--excitation-hz HZ", "of the generator", float)
-    option(scan, "--sample-rate-hz HZ", "of the converter", int)
-    option(scan, "--samples N", "of a measurement: a whole number of periods", int)
-    option(scan, "--settle-us US", "from switching the multiplexers to the first sample", int)
-    option(scan, "--frame-period-us US", "from frame to frame; 0: as fast as the scan goes", int)
+    option(scan, "--excitation-hz HZ", "of the generator", float, within=(1, 250_000))
+    option(scan, "--sample-rate-hz HZ", "of the converter", within=(1000, 5_000_000))
+    option(scan, "--samples N", "of a measurement: a whole number of periods", within=(4, 1024))
+    settle = "from switching the multiplexers to the first sample"
+    option(scan, "--settle-us US", settle, within=(0, 0xFFFF))
+    period = "from frame to frame; 0: as fast as the scan goes"
+    option(scan, "--frame-period-us US", period, within=(0, MAX_U32))
     rows = scan.add_mutually_exclusive_group()
     option(rows, "--full", "measure every row of the protocol")
     option(
@@ -60,7 +63,7 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
         "--reciprocal N",
         "measure one row of each reciprocal pair, and all rows in every N-th frame as a check"
         " (0: never)",
-        int,
+        within=(0, 0xFFFF),
     )
     solver = parser.add_argument_group("solver")
     add_solver(solver)
@@ -101,28 +104,20 @@ def add_solver(parser: Any) -> None:
     option(
         parser, "--solver", "default: the model's; all minimise the same objective", choices=known
     )
-    option(
-        parser, "--iterations N", "of FISTA, sweeps or rounds, at most (default: the model's)", int
-    )
-    option(parser, "--gap REL", "stop once the duality gap is below this share of |y|^2 / 2", float)
+    most = "of FISTA, sweeps or rounds, at most (default: the model's)"
+    option(parser, "--iterations N", most, within=(1, 1_000_000))
+    gap = "stop once the duality gap is below this share of |y|^2 / 2"
+    option(parser, "--gap REL", gap, float, within=(above(0), 1))
     option(
         parser,
         "--mac-limit N",
         "return the best so far when the next step would pass N multiply-accumulates",
-        int,
+        within=(1, MAX_U32),
     )
 
 
 def named_solver(options: argparse.Namespace) -> dict[str, Any]:
-    """What ``add_solver``'s options name, by the names of ``core.results.Options``.
-
-    Raises:
-        UsageError: a number is out of range.
-    """
-    whole("--iterations", options.iterations, 1, 1_000_000)
-    whole("--mac-limit", options.mac_limit, 1, 2**32 - 1)
-    if options.gap is not None and not 0 < options.gap <= 1:
-        raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")
+    """What ``add_solver``'s options name, by the names of ``core.results.Options``."""
     values = {
         "solver": options.solver,
         "iterations": options.iterations,
@@ -136,10 +131,19 @@ def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
     """What is streamed, and how much of it."""
     option(parser, "--mode KIND[,KIND]", "raw, image, touches, events, or several", default=default)
     add_report(parser)
-    option(parser, "--every N", "every N-th frame (default: as many as the line carries)", int)
+    add_every(parser)
     option(
-        parser, "--frames N", "stop after N (default: go on until Ctrl-C, or the scene ends)", int
+        parser,
+        "--frames N",
+        "stop after N (default: go on until Ctrl-C, or the scene ends)",
+        within=(1, MAX_U32),
     )
+
+
+def add_every(parser: argparse.ArgumentParser) -> None:
+    """How many of the frames."""
+    text = "every N-th frame (default: as many as the line carries)"
+    option(parser, "--every N", text, within=(1, 0xFFFF))
 
 
 def add_report(parser: argparse.ArgumentParser) -> None:
@@ -217,46 +221,14 @@ def read_mode(text: str) -> Stream:
     return kinds_of(text, "--mode")
 
 
-def read_every(options: argparse.Namespace) -> tuple[int, int]:
-    """``--every`` (0: as many as the line carries) and ``--frames`` (0: no limit).
-
-    Raises:
-        UsageError: one is out of range.
-    """
-    return (
-        whole("--every", options.every, 1, 0xFFFF),
-        whole("--frames", options.frames, 1, 2**32 - 1) or 0,
-    )
-
-
-def whole(name: str, value: int | None, low: int, high: int) -> int:
-    """``value`` (0 for None) if it lies within.
-
-    Raises:
-        UsageError: it does not.
-    """
-    if value is not None and not low <= value <= high:
-        raise UsageError(f"{name} {value} is out of range; use {low} to {high}")
-    return value or 0
-
-
 def read_scan(options: argparse.Namespace) -> ScanSettings:
     """What is named of the scan.
 
     Raises:
-        UsageError: a number is out of range.
+        UsageError: every frame would be checked.
     """
     from eitskin.device.settings import ScanSettings
 
-    if options.excitation_hz is not None and not 1 <= options.excitation_hz <= 250_000:
-        raise UsageError(
-            f"--excitation-hz {options.excitation_hz:g} is out of range; use 1 to 250000"
-        )
-    whole("--sample-rate-hz", options.sample_rate_hz, 1000, 5_000_000)
-    whole("--samples", options.samples, 4, 1024)
-    whole("--settle-us", options.settle_us, 0, 0xFFFF)
-    whole("--frame-period-us", options.frame_period_us, 0, 2**32 - 1)
-    whole("--reciprocal", options.reciprocal, 0, 0xFFFF)
     if options.reciprocal == 1:
         raise UsageError(
             "--reciprocal 1 would check every frame, which is a full scan; use --full, or at least"
@@ -276,7 +248,7 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
     """What is named of the solver.
 
     Raises:
-        UsageError: a number is out of range.
+        UsageError: a diagnostic is unknown.
     """
     from eitskin.device.settings import SolverSettings
 
@@ -326,22 +298,15 @@ def check_recording(path: Path | None, overwrite: bool) -> None:
 
 
 def open_named(options: argparse.Namespace) -> Device:
-    """The device of ``--device``, with the model of ``--model``.
+    """The device of ``--device``, with ``--model`` and ``--firmware`` where the command has them.
 
     Raises:
-        EitskinError: as ``eitskin.device.open.open_device``.
+        EitskinError: as ``eitskin.device.open.open_with_files``.
     """
-    from eitskin.device.open import open_device
-    from eitskin.model.eitm import load_model
+    from eitskin.device.open import open_with_files
 
-    blob = load_model(options.model)[1] if getattr(options, "model", None) is not None else None
-    firmware = getattr(options, "firmware", None)
-    if firmware is not None and not options.device.startswith("emu:"):
-        raise UsageError(
-            f"--firmware {firmware}: only emu: runs an image; a board is given one with  eitskin"
-            " flash --image"
-        )
-    return open_device(options.device, model=blob, image=firmware)
+    files = (getattr(options, name, None) for name in ("model", "firmware"))
+    return open_with_files(options.device, *files)
 
 
 def say(text: str) -> None:
@@ -361,7 +326,7 @@ def session_settings(
     from eitskin.device.settings import check_tare_frames
     from eitskin.live.settings import SessionSettings
 
-    every, frames = read_every(options)
+    every = options.every or 0
     if options.report == "drive" and every > 1:
         raise UsageError(f"--report drive needs every frame; leave --every {every} out")
     check_recording(record, options.overwrite)
@@ -369,7 +334,7 @@ def session_settings(
         mode=mode,
         report=options.report,
         every=every,
-        frames=frames,
+        frames=options.frames or 0,
         model=options.model,
         firmware=options.firmware,
         model_for=model_for,

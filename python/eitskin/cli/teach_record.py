@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import add_device, say
-from eitskin.errors import FrameError, UsageError
+from eitskin.errors import FrameError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,8 +56,8 @@ def add_parser(actions: Any) -> None:
         Path,
     )
     each = parser.add_mutually_exclusive_group()
-    option(each, "--depth-mm MM", "of every press, where the plan says none", float)
-    option(each, "--force-n N", "of every press, where the plan says none", float)
+    for name in ("--depth-mm MM", "--force-n N"):
+        option(each, name, "of every press, where the plan says none", float, within=(0, 1e6))
     add_device(parser, json=False)
     parser.set_defaults(run=run)
 
@@ -95,9 +95,6 @@ def _with_given(plan: Plan, options: argparse.Namespace) -> Plan:
     for name, value in given.items():
         if value is None:
             continue
-        if not 0 <= value <= 1e6:
-            flag = "--" + name.replace("_", "-")
-            raise UsageError(f"{flag} {value:g} is out of range; use 0 to 1000000")
         old = getattr(plan, name)
         plan = replace(plan, **{name: np.where(np.isnan(old), value, old)})
     return plan

@@ -64,6 +64,26 @@ def open_device(
     return device
 
 
+def open_with_files(
+    url: str, model: Path | None, firmware: Path | None, *, reconnect: Reconnect | None = None
+) -> Device:
+    """``open_device`` with the files of ``--model`` and ``--firmware``.
+
+    Raises:
+        UsageError: firmware for what runs none.
+        EitskinError: as ``open_device`` and ``load_model``.
+    """
+    from eitskin.model.eitm import load_model
+
+    if firmware is not None and not url.startswith("emu:"):
+        raise UsageError(
+            f"--firmware {firmware}: only emu: runs an image; a board is given one with  eitskin"
+            " flash --image"
+        )
+    blob = None if model is None else load_model(model)[1]
+    return open_device(url, model=blob, image=firmware, reconnect=reconnect)
+
+
 def open_transport(url: str, *, model: bytes | None = None, image: Path | None = None) -> Transport:
     """The bare bytes behind ``url``; raises as ``open_device``."""
     bare, timing = split_timing(url)

@@ -30,13 +30,13 @@ from eitskin.device.live_frames import (
     put_together,
     replayed,
 )
-from eitskin.device.open import open_device
+from eitskin.device.open import open_with_files
 from eitskin.device.set_up import begin_scene, set_up, take_reference
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.timing import Pacer, Slowness, WaitingClock, split_timing
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.device.wire.packets import Fault
-from eitskin.errors import EitskinError, UsageError
+from eitskin.errors import EitskinError
 from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.gestures import GestureTeller
 from eitskin.live.settings import KINDS, Say, SessionSettings
@@ -263,16 +263,8 @@ class Session:
     # ---- steps ----
 
     def _open(self) -> Device:
-        from eitskin.model.eitm import load_model
-
         how = self.settings
-        blob = load_model(how.model)[1] if how.model is not None else None
-        if how.firmware is not None and not self.url.startswith("emu:"):
-            raise UsageError(
-                f"--firmware {how.firmware}: only emu: runs an image; a board is given one with"
-                "  eitskin flash --image"
-            )
-        return open_device(self.url, model=blob, image=how.firmware, reconnect=self._reconnect)
+        return open_with_files(self.url, how.model, how.firmware, reconnect=self._reconnect)
 
     def _find(self) -> None:
         """The board's model, and the truth of its scene."""

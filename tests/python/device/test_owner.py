@@ -7,7 +7,7 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.device.client import Device
-from eitskin.device.open import open_device
+from eitskin.device.open import open_device, open_with_files
 from eitskin.device.wire.link_table import LIMIT_KEPT, Drive, Setting, Settings
 from eitskin.errors import DeviceError
 from eitskin.live.session import KEPT_ON, Session
@@ -64,9 +64,9 @@ def test_whoever_follows_a_board_hears_that_current_flows_on(
         device.settings(Setting.KEEP_DRIVE)
         return device
 
-    for opening, told in ((open_device, []), (opened, [KEPT_ON])):
+    for opening, told in ((open_with_files, []), (opened, [KEPT_ON])):
         said: list[str] = []
-        monkeypatch.setattr("eitskin.live.session.open_device", opening)
+        monkeypatch.setattr("eitskin.live.session.open_with_files", opening)
         with Session("sim:two_touch", SessionSettings(frames=1), say=said.append) as session:
             session.start()
         assert said == told
