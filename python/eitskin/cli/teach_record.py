@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import add_device, say
-from eitskin.errors import FrameError
+from eitskin.errors import FrameError, ProtocolError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -77,13 +77,14 @@ def run(options: argparse.Namespace) -> int:
         plan, text = load_plan(options.plan), ""
     plan = _with_given(plan, options)
     refuse_unwritable(options.output)
-    if options.skin is not None:
-        _say_off(plan, load_skin(options.skin)[0])
+    skin = None if options.skin is None else load_skin(options.skin)[0]
+    if skin is not None:
+        _say_off(plan, skin)
         text = read_bytes(options.skin, "skin description", 1_000_000).decode("utf-8")
     if options.frames is not None:
         frames = load_frames(options.frames, allow_nonfinite=True)
         return _guide(options, plan, text, frames.protocol, _in_time(frames))
-    return _before_a_board(options, plan, text)
+    return _before_a_board(options, plan, skin, text)
 
 
 def _with_given(plan: Plan, options: argparse.Namespace) -> Plan:
@@ -112,11 +113,17 @@ def _in_time(frames: Frames) -> TimedFrames:
         yield frame, float(number if frames.time_s is None else frames.time_s[number])
 
 
-def _before_a_board(options: argparse.Namespace, plan: Plan, text: str) -> int:
+def _before_a_board(options: argparse.Namespace, plan: Plan, skin: Skin | None, text: str) -> int:
     from eitskin.device.known_model import scanned_protocol
 
     with raw_session(options, options.model) as session:
         protocol = scanned_protocol(session.device.board, session.known, session.name)
+        if skin is not None and skin.electrodes.count != protocol.n_electrodes:
+            raise ProtocolError(
+                f"{options.skin}: {skin.electrodes.count} electrodes, but the board scans"
+                f" {protocol.n_electrodes}; give it a model of this skin first:  eitskin model"
+                f" build {options.skin} -o MODEL.eitm,  then --model MODEL.eitm"
+            )
         return _guide(options, plan, text, protocol, _live(session))
 
 

@@ -157,3 +157,11 @@ def test_frames_without_a_press_leave_the_old_file(files, frames_file, capsys):
 def test_frames_of_another_protocol_check_nothing(refused, files, frames_file):
     line = refused(PROTOCOL, "teach", "check", files / "taught.eitm", frames_file)
     assert line.endswith("give the model of this skin")
+
+
+def test_a_board_of_other_electrodes_is_told_before_any_press(refused, files):
+    plan = files / "plan.csv"
+    plan.write_text("x_mm,y_mm\n1,2\n")
+    given = ("--plan", plan, "-o", files / "new.npz", "--skin", files / "skin.toml")
+    line = refused(PROTOCOL, "teach", "record", *given, "--device", "sim:hydrogel")
+    assert "8 electrodes, but the board scans 16; give it a model of this skin first" in line
