@@ -247,10 +247,12 @@ def test_row_gains_undo_what_multiplies_rows(engine):
 
 
 def test_all_engines_place_the_unsure_touch_of_a_far_instrument_alike():
-    """At the middle of the image's blob, with the seed's radius."""
+    """At the middle of the image's blob, with the seed's radius. Not with seed 1: its one disc is
+    sure, and rounding decides by which of two places, 2.5 mm apart, its last fit in float32 ends.
+    """
     quiet_v, frame_v = exact()
     placed = 0
-    for seed in range(3):
+    for seed in (0, 2, 3, 4):
         factors, others = (row_factors(0.8, 2 * seed + k) for k in range(2))
         touched_v = factors * quiet_v[0] + others * (frame_v - quiet_v[0])
         results = {engine: one(engine, factors * quiet_v, touched_v) for engine in ENGINES}
@@ -260,7 +262,7 @@ def test_all_engines_place_the_unsure_touch_of_a_far_instrument_alike():
             placed += 1
             assert touch.radius_mm == made("c").options.touch_seed_radius_mm
             assert touch.long_x_mm is None and touch.x_variance_mm2 > 10
-    assert placed >= 2
+    assert placed == 4
 
 
 def test_all_engines_agree_with_rows_masked_and_lost():
