@@ -304,6 +304,20 @@ def test_a_noiseless_reference_makes_no_touch_of_a_millionth(engine, frames):
             assert not reconstructor.reconstruct(changed).touches
 
 
+@pytest.mark.parametrize("frames", [1, 8])
+def test_after_a_noiseless_reference_all_widths_find_the_same(frames):
+    """Two discs, then a tenth of their change, and so on: found alike, until rounding is as large.
+    Below that nothing is."""
+    golden = prebuilt()[0].golden
+    reference_v = golden.reference_v.astype(float)
+    change_v, quiet_v = golden.frame_v - reference_v, np.tile(reference_v, (frames, 1))
+    for size in 10.0 ** -np.arange(10):
+        found = [sizes_mm(one(e, quiet_v, reference_v + size * change_v))[:, :2] for e in ENGINES]
+        assert [len(each) for each in found] == [2 if size > 0.005 else size > 0.0005] * 3
+        for each in found[1:]:
+            assert each == pytest.approx(found[0], abs=0.02)
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_steps_of_a_converter_without_dither_are_no_touch_where_it_is_told_of_them(
     engine,
