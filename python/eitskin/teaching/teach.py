@@ -41,6 +41,7 @@ FloatArray = npt.NDArray[np.float64]
 Tried = list[tuple[Model, npt.NDArray[np.int64]]]
 
 FEW_PRESSES = 50
+FEWEST_LEVELS = 3  # of depth or force, for a law
 FOLDS, MAX_HELD_OUT = 5, 250
 COUNTED_ONCE, LEAST_ONCE = 0.96, 0.93  # of single presses, without sums and with them
 # sums of two held-out presses: so far apart and so near their places, of the skin's width; at most
@@ -300,6 +301,12 @@ def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | Non
         return None, []
     size = given[held.which]
     good = np.isfinite(size) & (size > 0) & (held.strength > 0) & (held.count == 1)
+    levels = len(np.unique(size[good]))
+    if levels < FEWEST_LEVELS:
+        return None, [
+            f"touches have no force: {levels} different depths or forces are too few; press with at"
+            f" least {FEWEST_LEVELS}"
+        ]
     reach = float(np.hypot(*grid.centres_mm().T).max())
     unit = "force in newtons" if presses.force_n is not None else "depth in mm, in place of newtons"
     try:

@@ -19,7 +19,7 @@ from eitskin.teaching.left_out import (
 )
 from eitskin.teaching.make import taught_model
 from eitskin.teaching.presses import aged, shifted
-from eitskin.teaching.teach import Taught, best_share, near_sums, solve_presses, teach
+from eitskin.teaching.teach import Taught, best_share, near_sums, size_law, solve_presses, teach
 from simulated_presses import RADIUS_MM, SKIN, TRUE, presses
 
 FloatArray = npt.NDArray[np.float64]
@@ -176,6 +176,12 @@ def test_more_presses_are_not_promised_wonders(taught):
     """Five presses of thirty are hopeless; that they become good is no sign of what follows."""
     curve = taught.report["held_out_by_presses"]
     assert 0.5 * curve["measured_24"] < curve["expected_120"] < curve["expected_60"]
+
+
+def test_presses_of_one_depth_give_no_force_and_say_so(taught):
+    one = replace(taught.held, which=np.zeros(30, dtype=int))
+    law, notes = size_law(presses(30), one, taught.model.grid)
+    assert law is None and "1 different depths or forces are too few" in notes[0]
 
 
 def test_drift_that_is_known_as_noise_does_less_harm():
