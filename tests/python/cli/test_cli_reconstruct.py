@@ -272,7 +272,8 @@ def test_the_demo(tmp_path, capsys):
     assert (facts["hits"], facts["false"]) == (3, 0)
     assert max(facts["position_errors_mm"]) < 1
     assert (tmp_path / "demo.png").read_bytes()[:8] == PNG
-    assert 0 < facts["difference_to_float64_over_peak"] < 1e-4
+    difference = facts["difference_over_peak"]
+    assert 0 < difference["C float32 to numpy"] < 1e-4 and difference["C float64 to numpy"] < 1e-12
 
 
 def test_tracked_frames_keep_ids_and_confirm_births(done, tmp_path):
