@@ -53,7 +53,7 @@ typedef struct eits_fast eits_fast;
 
 /* What its size is made of: drives that wait, the state itself, and what is kept of a drive. */
 #define EITS_FAST_WAITING 9u
-#define EITS_FAST_STATE   EITS_ALIGN16(660u + 40u * sizeof(void *) + 1840u * sizeof(eits_real))
+#define EITS_FAST_STATE   EITS_ALIGN16(700u + 40u * sizeof(void *) + 1840u * sizeof(eits_real))
 #define EITS_FAST_DRIVE   (16u + 3u * EITS_FAST_TOUCHES * sizeof(eits_real))
 #define EITS_FAST_CELLS(nx, ny)        (((size_t)(nx) + 1u) / 2u * (((size_t)(ny) + 1u) / 2u))
 #define EITS_FAST_TRIANGLE(drive_rows) ((size_t)(drive_rows) * ((size_t)(drive_rows) + 1u) / 2u)

@@ -129,6 +129,11 @@ static int whitened(eits_fast *fast, const fast_held *held, const eits_real *pla
 {
     if (!eits_fast_answer(fast, held->drive, place, out))
         return 0;
+    /* A row that is not in use says nothing of touches: neither that there is one nor none. */
+    for (uint32_t i = 0; i < fast->drive[held->drive].count; ++i) {
+        for (uint32_t way = 0; way < FAST_WAYS && (held->used >> i & 1u) == 0; ++way)
+            out[(size_t)way * fast->most_rows + i] = 0;
+    }
     whiten_ways(held, out, fast->most_rows, fast->drive[held->drive].count);
     return 1;
 }

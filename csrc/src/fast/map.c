@@ -41,8 +41,9 @@ static void whiten_back(eits_real *factor, eits_real *u, uint32_t rows)
     }
 }
 
-/* What is the same for all cells. `known`: a touch's answer, NULL for none. */
-static void look_at(eits_fast *fast, const fast_held *held, const eits_real *known, sight *s)
+/* What is the same for all cells. `known`: a touch's answer, NULL for none; rows that are not in
+ * use become zero. */
+static void look_at(eits_fast *fast, const fast_held *held, eits_real *known, sight *s)
 {
     const fast_drive *d = &fast->drive[held->drive];
     const eits_real volts = (eits_real)fast->model->fields.volts;
@@ -53,11 +54,14 @@ static void look_at(eits_fast *fast, const fast_held *held, const eits_real *kno
     s->energy = 0;
     eits_copy(left, held->white, s->rows);
     for (uint32_t i = 0; i < s->rows; ++i) {
-        const eits_real per = 1 / fast_line(held->factor, i)[i];
+        const int used = held->used >> i & 1u;
+        const eits_real per = used ? 1 / fast_line(held->factor, i)[i] : 0;
         s->weight[i] = fast_square(volts * per);
         s->measured[i] = eits_row(fast->ctx, fast->row[d->first + i]) + 2;
         s->of[i][0] = s->f + s->measured[i][0];
         s->of[i][1] = s->f + s->measured[i][1];
+        if (known != NULL && !used)
+            known[i] = 0;
         own[i] = known == NULL ? 0 : known[i] * per * per;
     }
     if (known != NULL) {
@@ -99,8 +103,7 @@ static eits_real explained(const eits_fast *fast, sight *s, uint32_t pixel)
     return own > 0 ? along * along / own : 0;
 }
 
-static void add_cells(eits_fast *fast, const fast_held *held, const eits_real *known,
-                      eits_real *score)
+static void add_cells(eits_fast *fast, const fast_held *held, eits_real *known, eits_real *score)
 {
     sight s;
     look_at(fast, held, known, &s);

@@ -23,6 +23,9 @@ void eits_fast_wait(eits_fast *fast, uint32_t drive, uint32_t rows, int news)
     const uint32_t count = fast->drive[drive].count;
     held->drive = (uint16_t)drive;
     held->rows = (uint16_t)rows;
+    held->used = 0;
+    for (uint32_t i = 0; i < count; ++i)
+        held->used |= (uint32_t)fast->used[i] << i;
     held->news = news != 0;
     held->alone = fast->count == 0;
     held->said = 0;

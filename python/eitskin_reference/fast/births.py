@@ -40,14 +40,19 @@ FloatArray = npt.NDArray[np.float64]
 @dataclass(frozen=True, eq=False)
 class Held:
     """A drive that waits, by its place in the scan: its rows ``white`` (r,) with the factor L (r,
-    r) that whitened them, how many are in use, and whether it was news."""
+    r) that whitened them, which are in ``use`` (r,), and whether it was news."""
 
     drive: Drive
     white: FloatArray
     factor: FloatArray
-    rows: int
+    use: npt.NDArray[np.bool_]
     news: bool
     number: int
+
+    @property
+    def rows(self) -> int:
+        """How many are in use."""
+        return int(self.use.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,10 +169,10 @@ class Births:
     def _explained_at_cells(self, one: Held, places: FloatArray) -> FloatArray:
         """About what a touch at each cell (n,) would explain of a drive's chi^2, beside one at
         ``places`` (0 or 1, 2): with the diagonal of the factor where squares are asked for."""
-        seen, per = self._at_cells(one.drive), 1 / np.diag(one.factor)
+        seen, per = self._at_cells(one.drive), one.use / np.diag(one.factor)
         left, own = one.white, self.model.squares(one.drive, seen, per)
         for place in places:
-            known = self.model.answer(one.drive, *place)[0][0]
+            known = np.where(one.use, self.model.answer(one.drive, *place)[0][0], 0.0)
             white = lower_solve(one.factor, known)
             energy, over = dot(white, white), known * per * per
             shared = summed(seen * self.model.over_electrodes(one.drive, over), axis=1)
@@ -208,7 +213,9 @@ class Births:
             seen = [self.model.answer(one.drive, *place) for place in places]
             if not all(there for _, there in seen):
                 return None
-            answers = np.array([lower_solve(one.factor, raw.T).T for raw, _ in seen])
+            answers = np.array(
+                [lower_solve(one.factor, np.where(one.use, raw, 0.0).T).T for raw, _ in seen]
+            )
             g, slopes = answers[:, 0], answers[:, 1:]
             c = strengths(g, one.white, self.sign)
             rest, energy = one.white.copy(), dot(one.white, one.white)

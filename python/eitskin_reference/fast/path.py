@@ -209,7 +209,7 @@ class FastPath:
                 self._changed = place_mm > 0  # perhaps within the drive
         news = seen.chi2 >= FAST_NEWS
         if news or self._held:
-            self._wait(Held(drive, seen.white, seen.factor, int(used.sum()), news, number))
+            self._wait(Held(drive, seen.white, seen.factor, used, news, number))
         if news:
             return self._find_births()
         if self._quiet >= FAST_QUIET:
