@@ -126,7 +126,7 @@
 
 /* after which no merge and no split is tried any more [steps of a disc]. larger: crowds cost more;
  * smaller: counts stay as the image's peaks say */
-#define EITS_FIT_MOVES 120
+#define EITS_FIT_MOVES 240
 
 /* ---- Chosen: on sums of two presses of a hydrogel skin, splits of seeds 100 to 105, not those
  * that the study reports. Check: eitskin study teaching */
