@@ -202,6 +202,9 @@ def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
     """The best of ``LEAST_SHARES`` for presses that a model of ``tried`` did not know, each model
     for its own of ``presses``; and what the core gives for them with it."""
     sums = [near_sums(presses.place_mm[which], width_of(one)) for one, which in tried]
+    few = sum(map(len, sums)) < FEWEST_SUMS
+    if few:  # they would decide nothing: the first share that leaves single presses alone is taken
+        sums = [pairs[:0] for pairs in sums]
     found: list[list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]] = []
     alone, two = [], []
     for share in LEAST_SHARES:
@@ -214,7 +217,7 @@ def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
         found.append(parts)
         alone.append(float(np.mean(np.concatenate([part[1] for part in parts]) == 1)))
         two.append(np.concatenate(exact))
-        if alone[-1] == 1:  # more leaves sums alone to be lost
+        if alone[-1] >= (COUNTED_ONCE if few else 1):  # more could only lose touches
             break
     k = best_share(np.array(alone), np.array(two))
     error, number, strength, mahalanobis2 = (
