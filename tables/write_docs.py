@@ -24,7 +24,7 @@ def pages(tables: Tables) -> Iterator[tuple[str, Lines]]:
 
 def _table(tables: Tables, known: dict[str, Table], name: str) -> Lines:
     if name == "eits_options":
-        yield from _options(tables["options"]["options"])
+        yield from _options(tables["options"]["options"], tables["options"]["limits"])
     else:
         yield from _enum(known, known[name])
 
@@ -65,10 +65,10 @@ def _values(enum: Table) -> Lines:
         yield from wrapped(doc, head, " " * len(head))
 
 
-def _options(options: Table) -> Lines:
-    yield from (_row("option", "usual", "least", "greatest", "what"), "|---|---|---|---|---|")
+def _options(options: Table, limits: Table) -> Lines:
+    yield from (_row("option", "usual", "range", "what"), "|---|---|---|---|")
     for name, kind, usual, least, greatest, doc in options["rows"]:
-        if kind not in ("u32", "real"):
-            least, greatest = "", ""
+        most = limits.get(str(greatest).removeprefix("EITS_"), greatest)
+        span = f"from {least}" if greatest in ("any", "huge") else f"{least} to {most}"
         shown = str(usual).replace("EITS_", "").lower()
-        yield _row(f"`{name}`", shown, least, {"any": "", "huge": ""}.get(greatest, greatest), doc)
+        yield _row(f"`{name}`", shown, span if kind in ("u32", "real") else "", doc)

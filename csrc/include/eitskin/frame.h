@@ -7,15 +7,15 @@
  *
  * Rows left out: of a reciprocal pair the other row stands for both. Where both are out, what is
  * left is whitened again: the solver then meets the data by F S instead of S, as the reduction
- * would have had it without those rows (docs/reference/eitm-format.md, "Rows left out"), the
+ * would have had it without those rows (csrc/src/frame/whitening.h has the formulas), the
  * regularisation lower the fewer rows there are; lambda_noise grows with the noise that this lets
  * through. That needs a model of the builder's form, P's rows orthogonal and S whitened by them,
- * which eits_init finds out. Of any other model, the rows' values are minimised over: the span of
+ * which its section WHIT says. Of any other model, the rows' values are minimised over: the span of
  * their columns of P is projected away, too, which loses much of what the rows left know.
  *
  * Noise: a regularisation that suits 60 dB lets too much of it through at 40. What the tare learned
  * raises it (regularisation_noise_factor): with no row out F is a weight for each row of S then
- * (docs/reference/eitm-format.md, "Regularisation by noise"). Else there is no F, and no cost.
+ * (csrc/src/frame/whitening.h). Else there is no F, and no cost.
  */
 #ifndef EITSKIN_FRAME_H
 #define EITSKIN_FRAME_H

@@ -63,7 +63,7 @@ typedef struct eits_options {
     /* iterations between checks of the duality gap and of divergence, and until the working set is
      * chosen again */
     uint32_t gap_every;
-    /* the most touches that are reported */
+    /* the most touches that are reported; the model's number by default */
     uint32_t max_touches;
     /* the core rejects a frame with more unusable rows; half of the rows by default */
     uint32_t max_masked;
@@ -137,12 +137,11 @@ typedef struct eits_options {
     /* 1: where the model says what it may be wrong by, a touch that such errors could have made is
      * not reported, and near ones that could be one touch become one */
     uint32_t touch_test;
-    /* columns that the test of touches may make a frame, about 6 kMAC each at rank 64, beyond a
-     * first look at each touch; then what stands is reported, and said to be crowded; 0: any
-     * number */
+    /* columns that the test of touches may make a frame (about 6 kMAC each at rank 64) beyond a
+     * first look at each touch; then what stands is reported as crowded; 0: any number */
     uint32_t test_columns;
     /* > 0: between touches the reference follows the untouched skin, with this time constant in
-     * frames; 0: it stays as it was taken, also by default but in taught models. After
+     * frames; 0: it stays as it was taken, the default but in taught models. After
      * eits_find_touches alone, and not in a batch */
     uint32_t reference_frames;
     /* the noise of a row is at least this, V: of a converter its step over the root of 12 */

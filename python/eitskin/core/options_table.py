@@ -26,7 +26,7 @@ class OptionFields:
     """
 
     iterations: int  # the most iterations; exactly so many where gap_rel is 0
-    max_touches: int  # the most touches that are reported
+    max_touches: int  # the most touches that are reported; the model's number by default
     max_masked: int  # the core rejects a frame with more unusable rows; half of the rows by default
     solver: str  # fista, working-set, coordinate or active-set (solve.h)
     # 1: ignore changes along the reference frame, that is drift of the gain; 0 by default in taught
@@ -53,8 +53,8 @@ class OptionFields:
     # parts of the touch fit, a bit each; all but those that the model leaves out by default
     touch_fit: int
     # > 0: between touches the reference follows the untouched skin, with this time constant in
-    # frames; 0: it stays as it was taken, also by default but in taught models. After
-    # eits_find_touches alone, and not in a batch
+    # frames; 0: it stays as it was taken, the default but in taught models. After eits_find_touches
+    # alone, and not in a batch
     reference_frames: int
     # iterations between checks of the duality gap and of divergence, and until the working set is
     # chosen again
@@ -92,8 +92,8 @@ class OptionFields:
     # 1: where the model says what it may be wrong by, a touch that such errors could have made is
     # not reported, and near ones that could be one touch become one
     touch_test: bool = True
-    # columns that the test of touches may make a frame, about 6 kMAC each at rank 64, beyond a
-    # first look at each touch; then what stands is reported, and said to be crowded; 0: any number
+    # columns that the test of touches may make a frame (about 6 kMAC each at rank 64) beyond a
+    # first look at each touch; then what stands is reported as crowded; 0: any number
     test_columns: int = 200
     # the noise of a row is at least this, V: of a converter its step over the root of 12
     noise_floor_v: float = 0.0

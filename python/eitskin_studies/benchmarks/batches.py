@@ -20,7 +20,7 @@ from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.benchmarks.frame import golden_session
 from eitskin_studies.harness.bare_core import bare_block
 from eitskin_studies.harness.machine import machine
-from eitskin_studies.harness.sections import Filling, text_table
+from eitskin_studies.harness.sections import text_table
 
 
 @dataclass(frozen=True)
@@ -138,12 +138,3 @@ def as_text(result: BatchTimes) -> str:
         f" {result.machine}"
     )
     return f"{head}\n{text_table(HEAD, rows(result))}"
-
-
-def for_page(result: BatchTimes, command: str) -> Filling:
-    """The marks ``batches-run`` and ``batches``."""
-    run = (
-        f"By `{command}`: {result.frames} noisy golden frames, image and touches, {result.rounds}"
-        f" rounds in turns, {result.processors} processors; {result.machine}."
-    )
-    return {"batches-run": run}, {"batches": (HEAD, rows(result))}

@@ -20,7 +20,7 @@ import numpy as np
 from eitskin.errors import UsageError
 from eitskin_studies.harness.emulated import checkout_root, need_tools
 from eitskin_studies.harness.machine import machine
-from eitskin_studies.harness.sections import Filling, text_table
+from eitskin_studies.harness.sections import text_table
 
 WIDTHS = ("f32", "f64")
 PEAKS = ("fma", "chain", "read")
@@ -229,16 +229,7 @@ def as_text(result: KernelTimes) -> str:
         f" {result.rounds} rounds"
     )
     head += f"; {result.machine}"
-    return "\n".join([head, *map(peaks_text, result.widths), "", text_table(HEAD, rows(result))])
-
-
-def for_page(result: KernelTimes, command: str) -> Filling:
-    """The marks ``kernels-run`` and ``kernels``."""
-    hot = missed(result, True)
-    run = (
-        f"By `{command}`: {result.columns} columns of {result.rank} numbers,"
-        f" {result.widths[0].kernels} kernels, one thread, medians of {result.rounds} rounds in"
-        f" turns; {result.machine}. Of what a prepared context calls, beyond {MAX_TIMES:g} times"
-        f" its limit: {'; '.join(hot) or 'nothing'}."
-    )
-    return {"kernels-run": run}, {"kernels": (HEAD, rows(result))}
+    beyond = "; ".join(missed(result, True)) or "nothing"
+    last = f"of what a prepared context calls, beyond {MAX_TIMES:g} times its limit: {beyond}"
+    table = text_table(HEAD, rows(result))
+    return "\n".join([head, *map(peaks_text, result.widths), "", table, last])

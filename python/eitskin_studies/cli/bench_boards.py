@@ -117,7 +117,7 @@ def add_outputs(what: Any) -> None:
     option(parser, "--seconds", "of each sink alone", default=20.0)
     option(parser, "--load", "seconds of six sinks at once, 0 for none", default=20.0)
     option(parser, "--seed", "of contacts and noise", default=1)
-    add_page_option(parser)
+    add_page_option(parser, "outputs")
     parser.set_defaults(run=run_outputs)
 
 
@@ -137,7 +137,7 @@ def run_outputs(options: argparse.Namespace) -> int:
         f" {options.load:g} --seed {options.seed}"
     )
     filling = bench_outputs.for_page(result, command)
-    return show(options, result, bench_outputs.as_text(result), filling)
+    return show(options, result, bench_outputs.as_text(result), filling, "outputs")
 
 
 def add_latency(what: Any) -> None:

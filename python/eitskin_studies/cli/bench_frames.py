@@ -79,13 +79,12 @@ def add_batches(what: Any) -> None:
     option(parser, "--frames", default=1000)
     option(parser, "--rounds", default=9)
     option(parser, "--threads N", None, int, nargs="+", default=[1, 2])
-    add_page_option(parser)
+    option(parser, "--json")
     parser.set_defaults(run=run_batches)
 
 
 def run_batches(options: argparse.Namespace) -> int:
     """Time batches over threads."""
-    from eitskin.fileio import refuse_unwritable
     from eitskin.solve.batch import check_threads
     from eitskin_studies.benchmarks import batches as bench_batches
 
@@ -93,11 +92,8 @@ def run_batches(options: argparse.Namespace) -> int:
     check_within("--rounds", options.rounds, 1, 1000)
     for count in options.threads:
         check_threads(count)
-    refuse_unwritable(options.page)
     result = bench_batches.run(options.frames, options.rounds, options.threads)
-    command = f"eitskin bench batches --frames {options.frames} --rounds {options.rounds}"
-    filling = bench_batches.for_page(result, command)
-    return show(options, result, bench_batches.as_text(result), filling)
+    return show(options, result, bench_batches.as_text(result))
 
 
 def add_kernels(what: Any) -> None:
@@ -114,26 +110,19 @@ def add_kernels(what: Any) -> None:
     option(parser, "--rank", "numbers of a column", default=64)
     option(parser, "--columns", default=812)
     option(parser, "--rounds", default=41)
-    add_page_option(parser)
+    option(parser, "--json")
     parser.set_defaults(run=run_kernels)
 
 
 def run_kernels(options: argparse.Namespace) -> int:
     """Time each kernel beside the machine's peaks."""
-    from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import kernels as bench_kernels
 
     check_within("--rank", options.rank, 8, 1024)
     check_within("--columns", options.columns, 48, 20_000)
     check_within("--rounds", options.rounds, 1, 200)
-    refuse_unwritable(options.page)
     result = bench_kernels.run(options.rank, options.columns, options.rounds)
-    command = (
-        f"eitskin bench kernels --rank {options.rank} --columns {options.columns} --rounds"
-        f" {options.rounds}"
-    )
-    filling = bench_kernels.for_page(result, command)
-    return show(options, result, bench_kernels.as_text(result), filling)
+    return show(options, result, bench_kernels.as_text(result))
 
 
 def add_growth(what: Any) -> None:

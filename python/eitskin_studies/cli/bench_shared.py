@@ -31,13 +31,13 @@ def show(
     options: argparse.Namespace,
     result: Any,
     text: str,
-    filling: Filling,
+    filling: Filling | None = None,
     page: str = "benchmarks",
 ) -> int:
-    """Fill the page that ``options.page`` names, then print ``result`` as text or JSON."""
+    """Fill the page that ``options.page`` names, if any, then print ``result`` as text or JSON."""
     from eitskin_studies.harness.sections import fill_marks
 
-    if options.page is not None:
+    if filling is not None and options.page is not None:
         fill_marks(options.page, page, filling)
     print(json.dumps(result.as_dict(), indent=2) if options.json else text)
     return 0
