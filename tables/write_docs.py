@@ -66,9 +66,9 @@ def _values(enum: Table) -> Lines:
 
 
 def _options(options: Table, limits: Table) -> Lines:
-    yield from (_row("option", "usual", "range", "what"), "|---|---|---|---|")
     for name, kind, usual, least, greatest, doc in options["rows"]:
         most = limits.get(str(greatest).removeprefix("EITS_"), greatest)
         span = f"from {least}" if greatest in ("any", "huge") else f"{least} to {most}"
-        shown = str(usual).replace("EITS_", "").lower()
-        yield _row(f"`{name}`", shown, span if kind in ("u32", "real") else "", doc)
+        shown = str(usual).replace("EITS_", "").replace("SIGN_", "").lower()
+        shown += f"; {span}" if kind in ("u32", "real") else ""
+        yield from wrapped(plain(doc), f"- `{name}` ({shown}): ", "  ")

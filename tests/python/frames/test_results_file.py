@@ -72,11 +72,12 @@ def test_every_field(tmp_path, results):
 
 
 def test_the_documented_fields_are_the_saved_ones(tmp_path, results):
-    """Names and types of the table in docs/reference/frames-format.md, row by row."""
+    """Names and types of the list in docs/reference/frames-format.md, one by one."""
     page = (
         Path(__file__).resolve().parents[3] / "docs" / "reference" / "frames-format.md"
     ).read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (`.*?) \| (.*?) \|", page.split("# The results file")[1], re.MULTILINE)
+    fields = page.split("# The results file")[1].replace("\n  ", " ")
+    rows = re.findall(r"^- (`.*?`), ((?:text|float|int)[^:]*):", fields, re.MULTILINE)
     documented = {name: kind for names, kind in rows for name in re.findall(r"`(\w+)`", names)}
     save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), results)
     with np.load(tmp_path / "out.npz") as saved:
