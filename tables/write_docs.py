@@ -34,21 +34,25 @@ def _row(*cells: Any) -> str:
 
 
 def _enum(known: dict[str, Table], enum: Table) -> Lines:
-    """Number, name (or text), meaning, and the columns for the page, structs with their bytes; text
-    where there are none."""
+    """Number, name, meaning, and the columns for the page, structs with their bytes: a table where
+    the first of them is a text in place of the name, else a list; text where there are none."""
     columns = enum.get("columns", [])
     if not columns:
         yield from ("```text", *_values(enum), "```")
         return
     texts = columns[:1] == ["text"]
     shown = columns[texts:]
-    yield _row("number", "name", "what", *shown)
-    yield "|---|---|---|" + "---|" * len(shown)
+    if texts:
+        yield _row("number", "name", "what", *shown)
+        yield "|---|---|---|" + "---|" * len(shown)
     for name, value, doc, *others in enum["rows"]:
         number = f"0x{value:02x}" if enum.get("hexadecimal") else value
         named = f"`{others[0]}`" if texts else name
-        cells = (_sized(known, cell) for cell in others[texts : texts + len(shown)])
-        yield _row(number, named, doc, *cells)
+        cells = [_sized(known, cell) for cell in others[texts : texts + len(shown)]]
+        if texts:
+            yield _row(number, named, doc, *cells)
+        else:
+            yield from wrapped("; ".join([doc, *cells]), f"- {number} {named}: ", "  ")
 
 
 def _sized(known: dict[str, Table], payload: str) -> str:

@@ -18,9 +18,7 @@ from small_models import session, tiny_blob
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "error-codes.md"
 CODES = {
     int(row[1]): row[2]
-    for row in re.finditer(
-        r"^\| (\d+) \| *(?:`(\w+)`)? *\|", PAGE.read_text(encoding="utf-8"), re.M
-    )
+    for row in re.finditer(r"^- (\d+)(?: `(\w+)`)?:", PAGE.read_text(encoding="utf-8"), re.M)
 }
 OVERLAPPING = "[skin]\ndiameter_mm = 100\n[electrodes]\ncount = 16\nwidth_mm = 25\n"
 COMMANDS = {
