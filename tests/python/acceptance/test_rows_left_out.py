@@ -3,8 +3,7 @@ what that costs.
 
 Scenes are made as those of test_random_scenes.py, one to three touches, with 60 dB noise and spread
 contacts; in each an electrode detaches in the last frame (the effect `detached`), and its rows are
-given as NaN. Whole and damaged frames share a reference. The printed means are the table "Rows left
-out" of docs/reference/eitm-format.md.
+given as NaN. Whole and damaged frames share a reference.
 """
 
 from dataclasses import dataclass
