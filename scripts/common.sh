@@ -71,14 +71,17 @@ pip_install() {
     }
 }
 
+make_environment() {
+    [ -x "$venv/bin/python" ] && return 0
+    find_python
+    say "making a virtual environment in $venv"
+    "$python" -m venv "$venv"
+}
+
 # install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since.
 install_package() {
     stamp=$venv/installed-$(printf '%s' "$1" | tr ',' '-')
-    if [ ! -x "$venv/bin/python" ]; then
-        find_python
-        say "making a virtual environment in $venv"
-        "$python" -m venv "$venv"
-    fi
+    make_environment
     if changed_since "$stamp"; then
         find_python
         say "installing eitskin[$1]: packages, then compiling the C core; about a minute"

@@ -1,7 +1,8 @@
 """What every Python test may use."""
 
+import re
 from collections.abc import Iterator
-from fnmatch import fnmatch
+from fnmatch import translate
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -33,10 +34,11 @@ def pytest_sessionstart() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what ``long_tests.txt`` lists."""
     lines = LONG.read_text(encoding="utf-8").splitlines()
-    patterns = [line for line in lines if line and not line.startswith("#")]
+    patterns = [translate(line) for line in lines if line and not line.startswith("#")]
+    is_long = re.compile("|".join(patterns)).match
     for item in items:
         name = item.nodeid.rpartition("tests/python/")[2].replace("[", "(").replace("]", ")")
-        if any(fnmatch(name, pattern) for pattern in patterns):
+        if is_long(name):
             item.add_marker(pytest.mark.long)
 
 

@@ -16,7 +16,7 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "board-cost.md
 
 @pytest.fixture(scope="module")
 def result(cortex_m7) -> bench_board.BoardCost:
-    return bench_board.run(3, 1, frames=0, build=cortex_m7)
+    return bench_board.run(2, 1, frames=0, build=cortex_m7)
 
 
 def test_every_storage_by_plain_c_cold_and_warm(result):
@@ -66,7 +66,7 @@ def test_the_page_and_json(result, tmp_path):
         if not cost.warm and cost.kernels != "portable":
             assert f" | {cost.mean / 1e6:.2f} | " in page.read_text()
     facts = json.loads(json.dumps(result.as_dict()))
-    assert facts["costs"][1]["mean"] == result.costs[1].mean and facts["scenes"] == 3
+    assert facts["costs"][1]["mean"] == result.costs[1].mean and facts["scenes"] == 2
 
 
 def test_it_says_what_it_needs(monkeypatch, tmp_path, capsys):
