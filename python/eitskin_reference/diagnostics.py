@@ -193,7 +193,7 @@ class Examiner:
             alive = alive & ~impossible
         if dead.sum() < ROWS_TO_JUDGE:
             return out
-        silent, judged_electrodes = self._silent(judged, alive)
+        silent, judged_electrodes = self._silent(judged, alive, dead & ~unusable)
         if silent.sum() == judged_electrodes:  # it is not the electrodes
             self.found.no_signal = int((dead & ~unusable).sum()) >= ROWS_TO_JUDGE
             return out
@@ -213,12 +213,20 @@ class Examiner:
     def _using(self, electrodes: tuple[int, ...]) -> BoolArray:
         return np.asarray(np.isin(self.rows, electrodes).any(axis=1))
 
-    def _silent(self, judged: BoolArray, alive: BoolArray) -> tuple[BoolArray, int]:
-        """Electrodes (n,) without an alive row though enough tell, and how many have enough."""
+    def _silent(
+        self, judged: BoolArray, alive: BoolArray, silent: BoolArray
+    ) -> tuple[BoolArray, int]:
+        """Electrodes (n,) without an alive row though enough tell, or all of whose drives, with
+        several partners, are ``silent``; and of how many enough tell."""
         count = self.model.protocol.n_electrodes
         uses = np.array([(self.rows == e).any(axis=1) for e in range(count)])
         enough = (uses & judged).sum(axis=1) >= ROWS_TO_JUDGE
-        return enough & ~(uses & alive).any(axis=1), int(enough.sum())
+        found = enough & ~(uses & alive).any(axis=1)
+        for e in range(count):
+            driven = judged & (self.rows[:, :2] == e).any(axis=1)
+            several = len(np.unique(self.rows[driven, :2])) > 2
+            found[e] |= several and driven.sum() >= ROWS_TO_JUDGE and bool(silent[driven].all())
+        return found, int(enough.sum())
 
     def _bridged(self, dead: BoolArray, alive: BoolArray) -> tuple[int, ...]:
         if "electrodes bridged" not in self.wanted:

@@ -69,6 +69,12 @@ static inline int row_uses(const eits_context *ctx, uint32_t i, uint32_t e)
     return row[0] == e || row[1] == e || row[2] == e || row[3] == e;
 }
 
+static inline int row_drives(const eits_context *ctx, uint32_t i, uint32_t e)
+{
+    const uint8_t *row = eits_row(ctx, i);
+    return row[0] == e || row[1] == e;
+}
+
 static inline int row_crosses(const eits_context *ctx, uint32_t i, uint32_t e, uint32_t f)
 {
     const uint8_t *row = eits_row(ctx, i);

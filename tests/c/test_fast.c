@@ -606,6 +606,50 @@ TEST(test_what_is_named)
     bench_close(b);
 }
 
+/* Drives follow a gain that drifts; frames say so, from the second on, until it is back. */
+TEST(test_a_gain_that_drifts)
+{
+    enum { STALE = EITS_DIAGNOSTIC_STALE_REFERENCE };
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    const double drifts[3] = {0.5 * (double)EITS_FAST_DRIFTED, 0.005, -0.005};
+    eits_real aligned[SMALL_ROWS];
+    for (int k = 0; k < 3; ++k) {
+        b->gain_drift = drifts[k];
+        drives(b, 160);
+        (void)align(b, aligned);
+        CHECK_EQUAL(named(b, 0), 0);
+        drives(b, 8);
+        (void)align(b, aligned);
+        CHECK_EQUAL(named(b, 0), k == 0 ? 0 : STALE);
+        check_told(b, 0);
+        b->gain_drift = 0;
+        drives(b, 160);
+        (void)align(b, aligned);
+        CHECK_EQUAL(named(b, 0), 0);
+    }
+    b->gain_drift = 0.005;
+    drives(b, 160);
+    (void)align(b, aligned);
+    b->fast->noise_v *= 1000; /* so much may be noise */
+    drives(b, 8);
+    (void)align(b, aligned);
+    CHECK_EQUAL(named(b, 0), 0);
+    b->fast->noise_v /= 1000;
+    for (int k = 0; k < 2; ++k) {
+        drives(b, 8);
+        (void)align(b, aligned);
+    }
+    eits_options options = *eits_get_options(b->skin.ctx);
+    CHECK_EQUAL(eits_fast_begin(b->fast), EITS_OK);
+    CHECK_EQUAL(named(b, 0), STALE); /* of the frame before */
+    options.diagnostics &= ~(uint32_t)STALE;
+    CHECK_EQUAL(eits_set_options(b->skin.ctx, &options), EITS_OK);
+    CHECK_EQUAL(named(b, 0), 0);
+    (void)align(b, aligned);
+    CHECK_EQUAL(b->fast->drifted, 0);
+    bench_close(b);
+}
+
 TEST(test_a_clock_that_stands_or_goes_back)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);

@@ -114,7 +114,8 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
 /* The diagnostics in `info`, a copy of the last aligned frame's, that may be reported: where a
  * touch landed, moved or lifted in its scan, only what the two solved frames before had as well;
  * elsewhere all but CROWDED, which the one before must have had. Electrodes go with their bit;
- * saturated rows are always reported. Once a solved frame. Errors: EITS_E_ARGUMENT. */
+ * saturated rows are always reported. STALE_REFERENCE comes where drives found the gain drifted by
+ * .3 % in two frames on end. Once a solved frame. Errors: EITS_E_ARGUMENT. */
 eits_status eits_fast_name(eits_fast *fast, eits_info *info);
 
 #ifdef __cplusplus

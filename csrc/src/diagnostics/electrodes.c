@@ -76,25 +76,67 @@ static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
     return (any & (unsigned)state) != 0;
 }
 
-/* Every significant row of an open electrode is dead. Were that so for all of them, it would not be
- * the electrodes. Returns whether any electrode is alive; `alive` says which. */
+/* What the rows tell of each electrode: how many tell, and of those that drive with it how many are
+ * silent, both as far as that matters, FLOWS once one is not. */
+typedef struct told {
+    uint8_t rows[EITS_MAX_ELECTRODES], silent[EITS_MAX_ELECTRODES];
+} told;
+
+enum { FLOWS = UINT8_MAX };
+
+static void tell(told *of, uint8_t *alive, const uint8_t *row, int state, int usable)
+{
+    for (uint32_t k = 0; k < 4; ++k) {
+        const uint8_t e = row[k];
+        of->rows[e] = (uint8_t)(of->rows[e] + (of->rows[e] < EITS_ROWS_TO_JUDGE));
+        alive[e] |= (state & ALIVE) != 0;
+    }
+    for (uint32_t k = 0; k < 2; ++k) {
+        uint8_t *silent = &of->silent[row[k]];
+        if (state != DEAD || !usable)
+            *silent = FLOWS;
+        else
+            *silent = (uint8_t)(*silent + (*silent < EITS_ROWS_TO_JUDGE));
+    }
+}
+
+/* Whether it drives with several others in rows that tell: with one alone, a bridge between the two
+ * would stop its current as well. */
+static int has_partners(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t e)
+{
+    uint32_t partner = EITS_MAX_ELECTRODES;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        const uint8_t *row = eits_row(ctx, i);
+        if ((row[0] != e && row[1] != e) || judge_row(ctx, frame, lim, i) == 0)
+            continue;
+        const uint32_t other = row[0] == e ? row[1] : row[0];
+        if (partner != EITS_MAX_ELECTRODES && other != partner)
+            return 1;
+        partner = other;
+    }
+    return 0;
+}
+
+/* All significant rows of an open electrode are dead; or no current flows by way of it, whoever is
+ * its partner, and it floats where it is measured. A row without a number or saturated says nothing
+ * of a current. Were all open, it would not be the electrodes. Returns whether any is not; `alive`
+ * says which have rows that live. */
 static int find_open(eits_context *ctx, const eits_real *frame, limits lim, uint8_t *alive)
 {
-    uint8_t rows[EITS_MAX_ELECTRODES] = {0};
+    told of;
+    memset(&of, 0, sizeof of);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const int state = judge_row(ctx, frame, lim, i);
-        if (state == 0)
-            continue;
-        for (uint32_t k = 0; k < 4; ++k) {
-            const uint8_t e = eits_row(ctx, i)[k];
-            rows[e] = (uint8_t)(rows[e] + (rows[e] < EITS_ROWS_TO_JUDGE));
-            alive[e] |= (state & ALIVE) != 0;
-        }
+        if (state != 0)
+            tell(&of, alive, eits_row(ctx, i), state, ctx->rows.unusable[i] == 0);
     }
+    uint8_t *is_open = of.silent;
     uint32_t judged = 0, open = 0;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
-        judged += rows[e] >= EITS_ROWS_TO_JUDGE;
-        open += rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e];
+        judged += of.rows[e] >= EITS_ROWS_TO_JUDGE;
+        is_open[e] = (of.rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e]) ||
+                     (of.silent[e] == EITS_ROWS_TO_JUDGE && has_partners(ctx, frame, lim, e));
+        open += is_open[e];
     }
     /* All electrodes at once is a plug that is out, or a supply. */
     if (open == judged)
@@ -102,7 +144,7 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits lim, uint
     if (open == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_ELECTRODE_OPEN))
         return 1;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
-        if (rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e])
+        if (is_open[e])
             ctx->rows.electrode[e] |= EITS_ELECTRODE_OPEN;
     }
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_ELECTRODE_OPEN;

@@ -90,6 +90,17 @@
  * it; smaller: fast drift is news */
 #define EITS_FAST_MAX_DRIFT R(0.01)
 
+/* drift of which frames are named stale [of the gain]. larger: less is not named; smaller: so are
+ * frames of presses at 40 dB */
+#define EITS_FAST_DRIFTED R(0.003)
+
+/* and at least so much; 7 deviations [noise_v over v0_rms]. as FAST_DRIFTED */
+#define EITS_FAST_DRIFTED_NOISE R(0.3)
+
+/* on end, from which on it is named [frames]. larger: late; smaller: sudden presses are named until
+ * they are born */
+#define EITS_FAST_DRIFTED_FRAMES 2
+
 /* that wait to be explained [drives]. larger: memory and work; smaller: misses touches at 40 dB */
 #define EITS_FAST_HELD 9
 

@@ -80,7 +80,8 @@ struct eits_fast {
     eits_real *gain; /* n_rows: model volts per measured volt */
     uint8_t *masked; /* n_rows: uses an electrode that a frame named */
     eits_real sign, rho2, sigma, noise_v;
-    eits_real drift; /* of the gain */
+    eits_real drift;  /* of the gain */
+    uint32_t drifted; /* frames on end that it was far */
     uint32_t time_us, timed, begun, next_id;
     uint32_t unexplained; /* a bit for each of the last 32 drives */
     uint32_t unexplained_frames;

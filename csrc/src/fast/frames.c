@@ -71,6 +71,14 @@ static void align_touch(eits_fast *fast, uint32_t k, eits_real *aligned)
     }
 }
 
+/* The gain is far from what it was at the tare, by more than noise makes of it. */
+static int is_far(const eits_fast *fast)
+{
+    const eits_real drift = eits_fabs(fast->drift);
+    return drift > EITS_FAST_DRIFTED &&
+           drift * fast->ctx->reference.v0_rms > EITS_FAST_DRIFTED_NOISE * fast->noise_v;
+}
+
 eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t length,
                             eits_real *aligned, uint32_t *state)
 {
@@ -82,7 +90,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
         return EITS_E_NO_REFERENCE;
     eits_copy(aligned, volts, length);
     if (fast->fresh)
-        fast->named = fast->named_before = 0;
+        fast->named = fast->named_before = fast->drifted = 0;
     fast->fresh = 0;
     fast->stirred = fast->glitched || fast->next_id != fast->next_aligned;
     fast->next_aligned = fast->next_id;
@@ -101,6 +109,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
         explained &= fast->drive[n].explained;
     fast->unexplained_frames = explained ? 0 : fast->unexplained_frames + 1;
     fast->stirred |= !explained;
+    fast->drifted = is_far(fast) ? fast->drifted + 1 : 0;
     *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
     if (explained || fast->unexplained_frames > EITS_FAST_FRAMES)
         *state |= (uint32_t)EITS_FAST_TRUSTED;
@@ -222,6 +231,10 @@ eits_status eits_fast_name(eits_fast *fast, eits_info *info)
     const uint32_t twice = now & fast->named, thrice = twice & fast->named_before;
     info->diagnostics = fast->stirred ? thrice | (now & EITS_DIAGNOSTIC_SATURATED)
                                       : (now & ~crowded) | (twice & crowded);
+    /* Drives follow the drift and the solver ignores it: neither would say so otherwise. A press's
+     * contact passes for drift until a touch is born, so once is not enough. */
+    if (fast->drifted >= EITS_FAST_DRIFTED_FRAMES)
+        info->diagnostics |= fast->ctx->options.diagnostics & EITS_DIAGNOSTIC_STALE_REFERENCE;
     fast->named_before = fast->named;
     fast->named = now;
     if (!(info->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN))

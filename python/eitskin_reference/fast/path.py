@@ -29,6 +29,9 @@ from eitskin_reference.constants_table import (
     FAST_DEAD,
     FAST_DEAD_NOISE,
     FAST_DRIFT_STEP,
+    FAST_DRIFTED,
+    FAST_DRIFTED_FRAMES,
+    FAST_DRIFTED_NOISE,
     FAST_ENERGY_DRIVES,
     FAST_FAINT,
     FAST_FAR,
@@ -78,7 +81,9 @@ from eitskin_reference.fast.tracks import (
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 _MEMORY = 32  # drives of which it is known whether they were explained
-_SATURATED, _CROWDED = (1 << DIAGNOSTICS.index(name) for name in ("saturated", "crowded"))
+_SATURATED, _STALE, _CROWDED = (
+    1 << DIAGNOSTICS.index(name) for name in ("saturated", "stale reference", "crowded")
+)
 
 
 @dataclass(eq=False)
@@ -124,7 +129,9 @@ class FastPath:
         volts per measured volt of each row (m,)."""
         self._v0, self._noise_v, self._gain = v0, noise_v, gain
         self._sigma = noise_v * float(np.sqrt(dot(gain, gain) / len(gain)))
-        self._drift, self._time_us = 0.0, -1
+        self._drift, self._drifted, self._time_us = 0.0, 0, -1
+        noise = noise_v / max(float(np.sqrt(np.nanmean(v0 * v0))), float(np.finfo(float).tiny))
+        self._far = max(FAST_DRIFTED, FAST_DRIFTED_NOISE * noise)
         self.tracks, self._known = Tracks(), list[_Known]()
         self._held, self._quiet, self._waited, self._glitched = list[Held](), 0, 0, False
         self._first: FloatArray | None = None
@@ -396,9 +403,10 @@ class FastPath:
         """What may be reported of the bits that the solver found in the last aligned frame."""
         twice = diagnostics & self._named[0]
         thrice, self._named = twice & self._named[1], (diagnostics, self._named[0])
+        stale = _STALE if self._drifted >= FAST_DRIFTED_FRAMES else 0
         if self._stirred:
-            return thrice | diagnostics & _SATURATED
-        return diagnostics & ~_CROWDED | twice & _CROWDED
+            return thrice | diagnostics & _SATURATED | stale
+        return diagnostics & ~_CROWDED | twice & _CROWDED | stale
 
     def aligned(self, volts: FloatArray) -> AlignedFrame:
         """The last scan's rows (m,) in V, all drives measured once since the last call, brought to
@@ -420,6 +428,7 @@ class FastPath:
         explained = all(past.explained for past in self._past) and not self._held
         self._unexplained_frames = 0 if explained else self._unexplained_frames + 1
         self._stirred |= not explained
+        self._drifted = self._drifted + 1 if abs(self._drift) > self._far else 0
         return AlignedFrame(out, explained, explained or self._unexplained_frames > FAST_FRAMES)
 
     def _moved(self, k: int, now: FloatArray, then: FloatArray) -> bool:
