@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import ELLIPSE_EVIDENCE, ELLIPSE_HALF, ELLIPSE_MOST
+from eitskin.core.constants_table import (
+    ELLIPSE_EVIDENCE,
+    ELLIPSE_EXPECTED,
+    ELLIPSE_HALF,
+    ELLIPSE_MOST,
+    MAX_MOVE,
+)
+from eitskin_reference.disc_fit import Disc, Fit
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -22,3 +31,22 @@ def long_axis(
     e = ELLIPSE_MOST * d / (d + ELLIPSE_HALF)
     angle = np.arctan2(polarity * dipole[1], polarity * dipole[0]) / 2
     return np.asarray(np.sqrt((1 + e) / (1 - e)) * np.array([np.cos(angle), np.sin(angle)]))
+
+
+def placed(
+    fit: Fit, disc: Disc, best_mm: FloatArray, axis: FloatArray
+) -> tuple[float, float, float]:
+    """x, y and radius, mm, with which ``disc`` is reported: its own, but of an ellipse, which has
+    an ``axis`` (2,), where the test has it (``best_mm`` (2,)), and more as its strength suggests.
+    """
+    radius = disc.radius_mm
+    if not axis.any() or not np.isfinite(best_mm).all():
+        return disc.x_mm, disc.y_mm, radius
+    place, reach = np.array([disc.x_mm, disc.y_mm]), MAX_MOVE * fit.model.grid.pixel_mm
+    x, y = (place + np.clip(best_mm - place, -reach, reach)).tolist()
+    there = replace(disc, x_mm=x, y_mm=y)
+    if not fit.on_skin(there):
+        there = disc
+    if fit.options.touch_change_s_per_m > 0:
+        radius += ELLIPSE_EXPECTED * (fit.expected_radius(disc) - radius)
+    return there.x_mm, there.y_mm, radius

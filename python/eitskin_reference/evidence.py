@@ -13,6 +13,7 @@ from eitskin.core.constants_table import (
     CLEAR,
     CLEAR_AS_DISCS,
     CLEAR_OF_FEW,
+    CLEAR_OF_MANY,
     DIPOLE_PRECISION,
     FEW_DISCS,
     FITS,
@@ -43,7 +44,7 @@ from eitskin.core.constants_table import (
     TRIAL_COLUMNS,
 )
 from eitskin_reference.disc_fit import Disc, Fit
-from eitskin_reference.ellipse import long_axis
+from eitskin_reference.ellipse import long_axis, placed
 from eitskin_reference.pair import pair_lines, pair_scores
 from eitskin_reference.split_merge import merged
 
@@ -75,8 +76,9 @@ class DataErrors:
 class Tested:
     """For each disc that stays, minus twice the logarithm of the ratio of likelihoods without and
     with it (k,), the covariance xx, xy, yy of its place (k, 3), mm^2, where the test would have it
-    less where it is (k, 2), mm, the log odds that it is two touches (k,), and half of its long
-    axis (k, 2), mm, zeros where it is a disc as far as the data tell. ``spent``: more columns were
+    less where the disc is (k, 2), mm, the log odds that it is two touches (k,), half of its long
+    axis (k, 2), mm, zeros where it is a disc as far as the data tell, and the x, y and radius (k,
+    3), mm, that it is reported with. ``spent``: more columns were
     wanted than ``options.test_columns`` allows."""
 
     rise: FloatArray
@@ -84,6 +86,7 @@ class Tested:
     apart_mm: FloatArray
     pair: FloatArray
     long_mm: FloatArray
+    reported_mm: FloatArray
     spent: bool
 
 
@@ -363,7 +366,7 @@ class Hypothesis:
         of few discs further ones, too: two may lie along one long touch."""
         discs, few = self.answer.discs, len(self.answer.discs) <= FEW_DISCS
         reach = REACH_OF_FEW if few else MERGE_REACH
-        weak = self.rise < (CLEAR_OF_FEW if few else CLEAR_AS_DISCS) * self.needed()
+        weak = self.rise < (CLEAR_OF_FEW if few else CLEAR_OF_MANY) * self.needed()
         return [
             (i, j)
             for j in range(len(discs))
@@ -378,7 +381,11 @@ class Hypothesis:
 
     def one_less(self, answer: Answer, now: Likelihood, k: int) -> tuple[Answer, Likelihood | None]:
         """``answer`` without disc k, and F about it, None where there is room for more shapes."""
-        rest, about = now.without(answer, k)
+        return self.with_shapes(*now.without(answer, k))
+
+    def with_shapes(self, rest: Answer, about: Likelihood) -> tuple[Answer, Likelihood | None]:
+        """``rest`` with shapes, if they may be made, and F about it, ``about`` being that of
+        ``rest``; None where there is room for more shapes."""
         columns = len(rest.discs) * parameters_of(self.fit, self.errors, len(rest.discs))
         shaped = self.shaped(rest) if self.budget.allows(columns) else rest
         return shaped, about if shaped.parameters == rest.parameters else None
@@ -397,20 +404,26 @@ class Hypothesis:
         answer, self.here = self.answer, now.here
         if not self.fitted:
             self.answer = answer = replace(answer, misfit=now.least)
-        count, p = len(answer.discs), answer.parameters
-        unit = self.fit.model.grid.pixel_mm**2 * self.excess(answer.misfit, count)
-        x = p * np.arange(count) + 1
-        self.place_mm2 = unit * np.column_stack(
-            [now.inverse[x, x], now.inverse[x, x + 1], now.inverse[x + 1, x + 1]]
-        )
-        self.best_mm = np.array([(disc.x_mm, disc.y_mm) for disc in answer.discs])
-        self.best_mm += self.fit.model.grid.pixel_mm * now.step.reshape(count, p)[:, 1:3]
+        count = len(answer.discs)
+        self.place_mm2, self.best_mm = np.zeros((count, 3)), np.zeros((count, 2))
+        for k in range(count):
+            self.look_at_place(now, k)
         self.look_at_shapes(now)
         self.rise = np.array([now.rise(answer, k) for k in range(count)])
         return int(np.argmin(self.rise))
 
+    def look_at_place(self, now: Likelihood, k: int) -> None:
+        """Set how well the place of disc k is known, and where one more step would put it."""
+        disc, pixel = self.answer.discs[k], self.fit.model.grid.pixel_mm
+        unit = pixel**2 * self.excess(self.answer.misfit, len(self.answer.discs))
+        x = k * self.answer.parameters + 1
+        (xx, xy), (_, yy) = unit * now.inverse[x : x + 2, x : x + 2]
+        self.place_mm2[k] = xx, xy, yy
+        self.best_mm[k] = (disc.x_mm, disc.y_mm) + pixel * now.step[x : x + 2]
+
     def look_at_shapes(self, now: Likelihood) -> None:
-        """Set what its shape says of each disc."""
+        """Set what its shape says of each disc; what is an ellipse has its place by the look that
+        says so."""
         answer, p = self.answer, self.answer.parameters
         unit = self.excess(answer.misfit, len(answer.discs))
         self.pair = pair_scores(answer.offsets(), now.step, np.diag(now.inverse))
@@ -420,6 +433,8 @@ class Hypothesis:
             own = slice(k * p + EDGE, (k + 1) * p)
             dipole = answer.offsets()[k, EDGE:] + now.step[own]
             self.axis[k] = long_axis(dipole, now.inverse[own, own], disc.polarity, unit)
+            if self.axis[k].any():
+                self.look_at_place(now, k)
 
     def drop_linearly(self, now: Likelihood, weakest: int) -> tuple[Answer, Likelihood | None]:
         """The answer without whatever the linearisation can do without, one after another from the
@@ -432,8 +447,7 @@ class Hypothesis:
             rises = [about.rise(rest, k) for k in range(len(rest.discs))]
             weakest = int(np.argmin(rises))
             rise = rises[weakest]
-        shaped = self.shaped(rest)
-        return shaped, about if shaped.parameters == rest.parameters else None
+        return self.with_shapes(rest, about)
 
     def take_simpler(self, now: Likelihood, weakest: int) -> tuple[bool, Likelihood | None]:
         """Take the best of the answers with one disc less: without the weakest, unless that is
@@ -535,17 +549,20 @@ class Hypothesis:
     def eliminate(self, now: Likelihood | None = None, *, to_the_end: bool) -> bool:
         """From the discs as they are to those that stay; not ``to_the_end``: false as soon as the
         data are found not to fit, to be gone on with another time, and where no column may be made
-        at all. Where no more may be made, what stands then stays. ``now``: F about the answer, if
+        at all. Where no more may be made, what stands then stays, less what the linearisation can
+        do without. ``now``: F about the answer, if
         it is at hand."""
         if now is None and not self.budget.allows(self.answer.columns):
             return False
+        others = self.answer.columns  # of the discs as they came, gone on with another time
         while len(self.answer.discs) > self.errors.kept:
             now = self.about(now)
             weakest = self.look(now)
             if self.rise[weakest] > CLEAR * self.needed() and not self.near_pairs():
                 return True
             bad = FITS if self.fitted else FITS_AS_DISCS
-            if not to_the_end and self.excess(self.answer.misfit, len(self.answer.discs)) > bad:
+            excess = self.excess(self.answer.misfit, len(self.answer.discs))
+            if not to_the_end and excess > bad and self.budget.allows(others):
                 return False
             rest, about = self.drop_linearly(now, weakest)
             if len(rest.discs) < len(self.answer.discs):
@@ -563,8 +580,11 @@ class Hypothesis:
                 self.answer, now = self.refit(self.answer, now)
                 self.fitted, now = True, self.about(now)
                 weakest = self.look(now)
-            if not to_the_end and not self.fits():
+            if not to_the_end and not self.fits() and self.budget.allows(others):
                 return False
+            weak = self.rise[weakest] < self.needed()
+            if weak and not self.budget.allows(2 * self.answer.columns):
+                continue
             taken, now = self.take_simpler(now, weakest)
             if not taken:
                 return True
@@ -616,13 +636,15 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
     unit = best.excess(best.answer.misfit, count)
     if best.changed:
         fit.discs = list(best.answer.discs)
-    reported = np.array([(disc.x_mm, disc.y_mm) for disc in fit.discs]).reshape(-1, 2)
-    radius_mm = np.array([disc.radius_mm for disc in fit.discs]).reshape(-1, 1)
+    discs_mm = np.array([(disc.x_mm, disc.y_mm) for disc in fit.discs]).reshape(-1, 2)
+    looks = zip(fit.discs, best.best_mm, best.axis, strict=False)
+    reported_mm = np.array([placed(fit, *look) for look in looks]).reshape(-1, 3)
     return Tested(
         best.rise[:count] / unit,
         best.place_mm2[:count],
-        best.best_mm[:count] - reported,
+        best.best_mm[:count] - discs_mm,
         best.pair[:count],
-        best.axis[:count] * radius_mm,
+        best.axis[:count] * reported_mm[:, 2:],
+        reported_mm,
         budget.spent,
     )

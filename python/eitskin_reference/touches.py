@@ -120,7 +120,9 @@ def find_touches(
             if errors.kept and len(sure) == 1 and sure[0] < CENTRE_SURE:
                 moved = centre(fit, frame.y)
                 if moved is not None:
-                    places, tested = moved[None], replace(tested, long_mm=np.zeros((1, 2)))
+                    disc, places = fit.discs[0], moved[None]
+                    at = np.array([[disc.x_mm, disc.y_mm, disc.radius_mm]])
+                    tested = replace(tested, long_mm=np.zeros((1, 2)), reported_mm=at)
             explained = fit.explained()
     found = [
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
@@ -136,6 +138,9 @@ def find_touches(
         found = [
             replace(
                 touch,
+                x_mm=float(at[0]),
+                y_mm=float(at[1]),
+                radius_mm=float(at[2]),
                 confidence=float(one),
                 x_variance_mm2=float(xx),
                 xy_covariance_mm2=float(xy),
@@ -143,8 +148,8 @@ def find_touches(
                 long_x_mm=float(x) if x or y else None,
                 long_y_mm=float(y) if x or y else None,
             )
-            for touch, one, (xx, xy, yy), (x, y) in zip(
-                found, sure, places, tested.long_mm, strict=True
+            for touch, one, (xx, xy, yy), (x, y), at in zip(
+                found, sure, places, tested.long_mm, tested.reported_mm, strict=True
             )
         ]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))

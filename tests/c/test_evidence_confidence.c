@@ -211,6 +211,40 @@ TEST(an_ellipse_lies_along_its_dipole)
     CHECK(axis[0] == 0 && axis[1] == 0);
 }
 
+/* An ellipse is reported where the test has it, as long as that is on the skin, and with more of
+ * the radius that its strength suggests; a disc as it is. */
+TEST(an_ellipse_is_reported_where_the_test_has_it)
+{
+    const eits_disc disc = {3, -2, 8, R(0.02), 1, 0};
+    const eits_real axis[2] = {R(0.75), R(-1.25)}, none[2] = {0, 0};
+    const double reach = (double)EITS_MAX_MOVE * (double)ctx->model->pixel_mm;
+    const double apart[][2] = {{0.5, -1}, {1e6, 0.25}, {(double)NAN, 0}, {0.5, -1}, {0.5, -1}};
+    for (int i = 0; i < 5; ++i) {
+        const int is_long = i != 2 && i != 3, knows = i != 4;
+        CHANGE_OPTIONS(ctx, o.touch_change_s_per_m = knows ? R(0.045) : 0);
+        eits_fit f = {.count = 1, .tested = 1, .disc = {disc}};
+        f.apart_mm[0][0] = (eits_real)apart[i][0];
+        f.apart_mm[0][1] = (eits_real)apart[i][1];
+        eits_place_ellipse(ctx, &disc, i == 3 ? none : axis, &f, 0);
+        eits_touch touch;
+        CHECK_EQUAL(eits_report_touches(ctx, &f, &touch), 1);
+        const double expected = 8 * sqrt(0.02 / 0.045),
+                     radius = 8 + (knows ? (double)EITS_ELLIPSE_EXPECTED * (expected - 8) : 0);
+        CHECK_NEAR((double)touch.x_mm, is_long ? 3 + fmin(apart[i][0], reach) : 3, 1e-5);
+        CHECK_NEAR((double)touch.y_mm, is_long ? -2 + apart[i][1] : -2, 1e-5);
+        CHECK_NEAR((double)touch.radius_mm, is_long ? radius : 8, 1e-5);
+        CHECK_NEAR((double)touch.long_x_mm, is_long ? 0.75 * radius : 0, 1e-5);
+        CHECK_NEAR((double)touch.long_y_mm, is_long ? -1.25 * radius : 0, 1e-5);
+    }
+    eits_disc edge = disc;
+    while (eits_disc_on_skin(ctx, &edge))
+        edge.x_mm += R(0.5);
+    edge.x_mm -= R(0.5);
+    eits_fit f = {.count = 1, .tested = 1, .disc = {edge}, .apart_mm = {{2, 1}}};
+    eits_place_ellipse(ctx, &edge, axis, &f, 0);
+    CHECK(f.ellipse_mm[0][0] == edge.x_mm && f.ellipse_mm[0][1] == edge.y_mm);
+}
+
 int main(void)
 {
     static dense_bench bench;

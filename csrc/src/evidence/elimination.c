@@ -5,7 +5,10 @@
  * else is done. Else the discs are fitted to the data in Sigma's metric, and so are the likeliest
  * of the simpler answers: the weakest disc left out, near pairs as one. The simpler one is taken
  * while F rises by less than the threshold, times what the data fit worse than they should: where
- * the model is wrong by more than it says, more is asked of a touch. */
+ * the model is wrong by more than it says, more is asked of a touch.
+ *
+ * Where no more columns may be made, the linearisation alone decides: what it can do without goes.
+ */
 #include "evidence/verdict.h"
 
 #include "base/vec.h"
@@ -101,6 +104,8 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
                    eits_likelihood *first, int to_the_end, uint64_t *macs)
 {
     eits_likelihood now = *first;
+    /* of the discs as they came, which would be gone on with another time */
+    const uint32_t others = eits_columns_of(&v->answer);
     if (!now.at_hand && !eits_may_make(ctx, eits_columns_of(&v->answer)))
         return 0;
     while (v->answer.count > ctx->reference.far) {
@@ -110,8 +115,10 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
         if (v->rise[weakest] > EITS_CLEAR * eits_needed_rise(ctx, v) &&
             !eits_any_may_be_one(v, eits_needed_rise(ctx, v)))
             return 1;
-        if (!to_the_end && eits_excess(ctx, v->answer.misfit, v->answer.count) >
-                               (v->fitted ? EITS_FITS : EITS_FITS_AS_DISCS))
+        if (!to_the_end &&
+            eits_excess(ctx, v->answer.misfit, v->answer.count) >
+                (v->fitted ? EITS_FITS : EITS_FITS_AS_DISCS) &&
+            eits_may_make(ctx, others))
             return 0;
         eits_answer rest = v->answer;
         drop_linearly(ctx, scratch, v, weakest, &rest, &now, macs);
@@ -133,8 +140,11 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
                 *macs += eits_linearise(ctx, scratch, &v->answer, &now);
             weakest = eits_look(ctx, scratch, v, &now);
         }
-        if (!to_the_end && !eits_fits(ctx, v))
+        if (!to_the_end && !eits_fits(ctx, v) && eits_may_make(ctx, others))
             return 0;
+        if (v->rise[weakest] < eits_needed_rise(ctx, v) &&
+            !eits_may_make(ctx, 2 * eits_columns_of(&v->answer)))
+            continue;
         if (!take_simpler(ctx, scratch, v, weakest, &now, macs))
             return 1;
     }

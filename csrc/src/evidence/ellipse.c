@@ -10,7 +10,11 @@
  *
  * fitted on scenes of ellipses and fingers (docs/results/other-worlds.md): the dipole of an ellipse
  * with a finite contrast, less what the prior holds back. An insulating touch is weaker along its
- * long axis. */
+ * long axis.
+ *
+ * An ellipse is reported where the test has it, which knows its shape, and not where a disc fits
+ * best. The radius of that disc is wrong, too: it makes up for a shape that a disc has not. What
+ * the strength suggests counts for more then, where the change under a touch is known. */
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
@@ -50,4 +54,28 @@ void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
     eits_half_angle(polarity * u, polarity * v, d, axis);
     axis[0] *= length;
     axis[1] *= length;
+}
+
+void eits_place_ellipse(const eits_context *ctx, const eits_disc *disc, const eits_real axis[2],
+                        eits_fit *f, uint32_t k)
+{
+    const eits_options *o = &ctx->options;
+    const eits_real reach = EITS_MAX_MOVE * (eits_real)ctx->model->pixel_mm;
+    const eits_real *apart = f->apart_mm[k];
+    eits_real *ellipse = f->ellipse_mm[k], radius = disc->radius_mm;
+    eits_zero(f->long_mm[k], 2);
+    if ((axis[0] == 0 && axis[1] == 0) || !eits_all_finite(apart, 2))
+        return;
+    eits_disc there = *disc;
+    there.x_mm += eits_clamp(apart[0], -reach, reach);
+    there.y_mm += eits_clamp(apart[1], -reach, reach);
+    if (!eits_disc_on_skin(ctx, &there))
+        there = *disc;
+    if (o->touch_change_s_per_m > 0)
+        radius = eits_fma(EITS_ELLIPSE_EXPECTED, eits_expected_radius(o, disc) - radius, radius);
+    ellipse[0] = there.x_mm;
+    ellipse[1] = there.y_mm;
+    ellipse[2] = radius;
+    f->long_mm[k][0] = radius * axis[0];
+    f->long_mm[k][1] = radius * axis[1];
 }

@@ -134,6 +134,10 @@ void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
                     const eits_likelihood *likelihood, uint32_t k, eits_real excess,
                     eits_real axis[2]);
 
+/* Sets f->long_mm and, where there is an axis, f->ellipse_mm of disc k, by f->apart_mm. */
+void eits_place_ellipse(const eits_context *ctx, const eits_disc *disc, const eits_real axis[2],
+                        eits_fit *f, uint32_t k);
+
 /* confidence.c */
 
 /* What the test's numbers have meant on scenes with a truth: f->confidence, and f->place_mm2 as

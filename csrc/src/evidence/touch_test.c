@@ -181,8 +181,7 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
         f->apart_mm[k][0] = v.best_mm[k][0] - reported->x_mm;
         f->apart_mm[k][1] = v.best_mm[k][1] - reported->y_mm;
         f->pair[k] = v.pair[k];
-        f->long_mm[k][0] = reported->radius_mm * v.axis[k][0];
-        f->long_mm[k][1] = reported->radius_mm * v.axis[k][1];
+        eits_place_ellipse(ctx, reported, v.axis[k], f, k);
     }
     if (!v.changed)
         return;

@@ -22,7 +22,7 @@ int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real nee
     const int few = v->answer.count <= EITS_FEW_DISCS;
     const eits_disc *a = &v->answer.disc[i], *b = &v->answer.disc[j];
     const eits_real weaker = v->rise[i] < v->rise[j] ? v->rise[i] : v->rise[j],
-                    clear = few ? EITS_CLEAR_OF_FEW : EITS_CLEAR_AS_DISCS, dx = a->x_mm - b->x_mm,
+                    clear = few ? EITS_CLEAR_OF_FEW : EITS_CLEAR_OF_MANY, dx = a->x_mm - b->x_mm,
                     dy = a->y_mm - b->y_mm,
                     reach = (few ? EITS_REACH_OF_FEW : EITS_MERGE_REACH) *
                             (a->radius_mm + b->radius_mm);
@@ -53,6 +53,25 @@ uint32_t eits_weakest(const eits_scratch *scratch, const eits_answer *answer,
     return weakest;
 }
 
+/* How well a place is known: the inverse's block, times what the data fit worse. */
+static void place_of(const eits_context *ctx, const eits_scratch *scratch,
+                     const eits_likelihood *likelihood, eits_verdict *v, uint32_t k)
+{
+    /* `step` and the inverse are in pixels; results are in millimetres. best_mm is where one more
+     * Gauss-Newton step would put the disc. */
+    const uint32_t p = v->answer.parameters;
+    const size_t stride = EITS_STRIDE(likelihood->count);
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
+                    unit = pixel * pixel * eits_excess(ctx, v->answer.misfit, v->answer.count),
+                    *x = scratch->square + stride * (k * p + 1u) + k * p + 1u, *y = x + stride;
+    v->place_mm2[k][0] = unit * x[0];
+    v->place_mm2[k][1] = unit * x[1];
+    v->place_mm2[k][2] = unit * y[1];
+    v->best_mm[k][0] = eits_fma(pixel, likelihood->step[k * p + 1], v->answer.disc[k].x_mm);
+    v->best_mm[k][1] = eits_fma(pixel, likelihood->step[k * p + 2], v->answer.disc[k].y_mm);
+}
+
+/* What is an ellipse has its place by the look that says so. */
 void eits_look_at_shapes(const eits_context *ctx, const eits_scratch *scratch,
                          const eits_likelihood *likelihood, eits_verdict *v)
 {
@@ -61,28 +80,9 @@ void eits_look_at_shapes(const eits_context *ctx, const eits_scratch *scratch,
         v->pair[k] = eits_pair_score(scratch, &v->answer, likelihood, k);
         eits_pair_line(&v->answer, likelihood, k, v->line[k]);
         eits_long_axis(scratch, &v->answer, likelihood, k, unit, v->axis[k]);
+        if (v->axis[k][0] != 0 || v->axis[k][1] != 0)
+            place_of(ctx, scratch, likelihood, v, k);
     }
-}
-
-/* How well each place is known: the inverse's blocks, times what the data fit worse. */
-static void places_of(const eits_context *ctx, const eits_scratch *scratch,
-                      const eits_likelihood *likelihood, eits_verdict *v)
-{
-    /* `step` and the inverse are in pixels; results are in millimetres. best_mm is where one more
-     * Gauss-Newton step would put the disc. */
-    const uint32_t p = v->answer.parameters;
-    const size_t stride = EITS_STRIDE(likelihood->count);
-    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
-                    unit = pixel * pixel * eits_excess(ctx, v->answer.misfit, v->answer.count);
-    for (uint32_t k = 0; k < v->answer.count; ++k) {
-        const eits_real *x = scratch->square + stride * (k * p + 1u) + k * p + 1u, *y = x + stride;
-        v->place_mm2[k][0] = unit * x[0];
-        v->place_mm2[k][1] = unit * x[1];
-        v->place_mm2[k][2] = unit * y[1];
-        v->best_mm[k][0] = eits_fma(pixel, likelihood->step[k * p + 1], v->answer.disc[k].x_mm);
-        v->best_mm[k][1] = eits_fma(pixel, likelihood->step[k * p + 2], v->answer.disc[k].y_mm);
-    }
-    eits_look_at_shapes(ctx, scratch, likelihood, v);
 }
 
 uint32_t eits_look(const eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
@@ -91,7 +91,9 @@ uint32_t eits_look(const eits_context *ctx, const eits_scratch *scratch, eits_ve
     if (!v->fitted)
         v->answer.misfit = likelihood->least;
     v->here = likelihood->here;
-    places_of(ctx, scratch, likelihood, v);
+    for (uint32_t k = 0; k < v->answer.count; ++k)
+        place_of(ctx, scratch, likelihood, v, k);
+    eits_look_at_shapes(ctx, scratch, likelihood, v);
     return eits_weakest(scratch, &v->answer, likelihood, v->rise);
 }
 

@@ -30,6 +30,8 @@ typedef struct eits_fit {
     eits_real pair[EITS_MAX_TOUCHES];
     /* half of its long axis, as a vector; 0, 0: as far as the data tell a disc */
     eits_real long_mm[EITS_MAX_TOUCHES][2];
+    /* the x, y and radius of what has one (evidence/ellipse.c) */
+    eits_real ellipse_mm[EITS_MAX_TOUCHES][3];
     /* probability that the disc is one touch (evidence/confidence.c) */
     eits_real confidence[EITS_MAX_TOUCHES];
     const eits_real *data; /* stride: what the discs are to explain */

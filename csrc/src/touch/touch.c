@@ -154,10 +154,12 @@ uint32_t eits_report_touches(const eits_context *ctx, const eits_fit *f, eits_to
     uint32_t count = 0;
     for (uint32_t k = 0; k < f->count; ++k) {
         const eits_disc *disc = &f->disc[k];
+        const int is_long = f->tested && (f->long_mm[k][0] != 0 || f->long_mm[k][1] != 0);
+        const eits_real *ellipse = f->ellipse_mm[k];
         const eits_touch touch = {
-            .x_mm = disc->x_mm,
-            .y_mm = disc->y_mm,
-            .radius_mm = disc->radius_mm,
+            .x_mm = is_long ? ellipse[0] : disc->x_mm,
+            .y_mm = is_long ? ellipse[1] : disc->y_mm,
+            .radius_mm = is_long ? ellipse[2] : disc->radius_mm,
             .strength_s_per_m_mm2 = disc->change * eits_disc_area(ctx, disc),
             .explained = f->explained[k] < 1 ? f->explained[k] : 1,
             .confidence = f->tested ? f->confidence[k] : 0,

@@ -123,6 +123,19 @@ def test_all_engines_find_the_same_touches_in_other_worlds(name):
         assert (count == 0) == (name in UNTOUCHED)
 
 
+@pytest.mark.parametrize(
+    ("name", "k"), [("fingers", 1), ("fingers", 12), ("ellipses", 15), ("ellipses", 20)]
+)
+def test_a_long_touch_has_no_other_beyond_it(name, k):
+    """Without its shape a further disc at the rim would be clear; where the columns do not suffice
+    to see that (fingers 1, ellipses 20), the linearisation does."""
+    scenes = world(name, k + 1)
+    quiet_v, frame_v = scenes.quiet_v[k], scenes.frames_v[k]
+    count = agree({engine: one(engine, quiet_v, frame_v) for engine in ENGINES})
+    assert count == len(scenes.scenes[k].touches)
+    assert len(one("c", quiet_v, frame_v, touch_test=0).touches) > count
+
+
 @pytest.mark.parametrize("columns", [1, 60, 120])
 def test_all_engines_stop_at_the_same_column(columns):
     """With the same touches, and a count that is said to be uncertain where they did."""
