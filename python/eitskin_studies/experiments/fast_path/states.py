@@ -3,7 +3,7 @@ touches land, move and lift: scenes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from eitskin.model.model import Model
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import Scene, scene_from_table
-from eitskin.scene.runner import simulate_frames
+from eitskin.scene.runner import FrameMaker, simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.skin.protocol import Protocol, in_order
 from eitskin.skin.skin import Skin
@@ -63,6 +63,15 @@ class States:
         touch ``paths`` has keyframes (s, mm, mm, press, or also its radius in mm), the last held
         where it is at infinity."""
         return self._simulated(self._seeds[k], paths, frames)[1:].ravel()
+
+    def rows_at(
+        self, k: int, paths: Sequence[Keyframes], lasts_s: float
+    ) -> Callable[[FloatArray], FloatArray]:
+        """A function of instants (m,) in s that gives skin ``k``'s rows then, (m,) in V."""
+        frames = int(np.ceil(self._rate_hz * lasts_s))
+        scene = self._scene(self._seeds[k], paths, frames)
+        maker = FrameMaker(compile_scene(scene, mesh_cache=_MESHES))
+        return lambda times_s: maker.frame(1, times_s)
 
     def _simulated(self, seed: int, paths: Sequence[Keyframes], frames: int) -> FloatArray:
         """An untouched frame as the protocol stands, then ``frames`` scans in their order."""
