@@ -15,8 +15,6 @@ their ``rows`` are members:
   how its numbers were chosen, and what checks them
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reading the tables, and lines of text that the writers share."""
 
-from __future__ import annotations
-
 import re
 import sys
 import textwrap

@@ -1,7 +1,5 @@
 """The tables as C: public headers, texts of numbers, ranges of options."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The table of constants: a header a room and the Python module."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

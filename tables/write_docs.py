@@ -1,7 +1,5 @@
 """The tables in the reference pages, between marks: ``<!-- table NAME -->``, ``<!-- end -->``."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any

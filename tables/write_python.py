@@ -1,7 +1,5 @@
 """The tables as Python modules: options, what the core says of a frame, packets of the link."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -40,7 +38,7 @@ def python_modules(tables: Tables) -> Iterator[tuple[str, Lines]]:
 
 def _head(about: str, name: str, imports: str) -> Lines:
     yield from docstring(f"{about} {origin(name)}", "")
-    yield from ("", "from __future__ import annotations", "")
+    yield ""
     yield from imports.strip("\n").split("\n")
     yield ""
 

@@ -4,8 +4,6 @@ What stands in ``__all__`` is public and stays (docs/reference/python-api.md); t
 Each name is imported when it is first used.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 TYPE_CHECKING = False  # as typing has it, without importing that
@@ -51,7 +49,7 @@ _WHERE = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name not in _WHERE:
         raise AttributeError(f"module 'eitskin' has no attribute {name!r}")
     return getattr(import_module(f"eitskin.{_WHERE[name]}"), name)

@@ -1,8 +1,6 @@
 """TOML tables to dataclasses, strictly: an unknown key is an error that names the nearest known
 one."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import sys

@@ -5,8 +5,6 @@ An error's text is one line that says what was wrong, where, and what to do abou
 docs/reference/error-codes.md lists the codes.
 """
 
-from __future__ import annotations
-
 LONGEST, ENDING = 3000, 1000  # characters of a line, and of its end
 
 

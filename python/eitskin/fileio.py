@@ -3,8 +3,6 @@
 Links are followed; devices and FIFOs are written into.
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import json

@@ -1,7 +1,5 @@
 """What ``import eitskin`` gives beside classes: a skin's frames as they come, and models."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -7,8 +7,6 @@ for over ten thousand: a program that hangs with interrupts off must end too. No
 on the host's clock: the same image, banks, scene and input give the same bytes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin.errors import DeviceError

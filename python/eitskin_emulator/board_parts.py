@@ -1,7 +1,5 @@
 """The emulated board's parts, made and wired: processor, peripherals and what hangs on the pins."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from struct import unpack_from
 

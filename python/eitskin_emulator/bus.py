@@ -1,8 +1,6 @@
 """Peripherals by address. A peripheral whose clock is off reads 0 and ignores writes, as silicon
 does; what is not modelled too, and both are recorded."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 from eitskin_emulator.record import Record

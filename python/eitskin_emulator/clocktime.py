@@ -8,8 +8,6 @@ estimates: a Cortex-M7 issues up to two instructions a cycle, and waits for flas
 does not hang on the processor (slots, samples, bits on wires) is exact.
 """
 
-from __future__ import annotations
-
 from typing import Protocol
 
 TICKS_PER_S = 432_000_000

@@ -7,8 +7,6 @@ down here; a build in which they are not to be found is refused. Without them ti
 would be a guess, or a Python call an instruction.
 """
 
-from __future__ import annotations
-
 import ctypes
 import importlib
 from functools import lru_cache

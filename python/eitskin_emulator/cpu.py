@@ -8,8 +8,6 @@ unprivileged mode, double precision (Unicorn refuses it), the check of CPACR (th
 unaligned traps of LDRD and LDM.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Sequence
 from enum import Enum, auto

@@ -5,8 +5,6 @@ The large frame is used where the FPU was used (CONTROL.FPCA), and is written at
 may put it off. Entry takes 12 cycles and return 10. Only the main stack pointer is known.
 """
 
-from __future__ import annotations
-
 import struct
 
 from unicorn import arm_const as arm

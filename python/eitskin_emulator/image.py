@@ -1,8 +1,6 @@
 """The firmware image that runs on the emulated board: one of the user's, or the one that ships with
 eitskin."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eitskin.device.flash import check_image

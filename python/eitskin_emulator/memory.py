@@ -6,8 +6,6 @@ are not modelled: memory is always coherent here, and ``Record.hazards`` tells w
 that is cached on silicon.
 """
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 from typing import Any

@@ -1,7 +1,5 @@
 """What an emulated board has seen that a test wants to know, or a user should."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """What an emulated board did, in numbers: for tests, and for whoever wonders."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

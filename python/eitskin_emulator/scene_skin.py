@@ -1,7 +1,5 @@
 """A scene as the emulated skin's frames."""
 
-from __future__ import annotations
-
 from eitskin.errors import ProtocolError
 from eitskin.scene.board_frames import BoardFrames, RecordedRows
 from eitskin.scene.description import Scene

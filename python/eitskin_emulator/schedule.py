@@ -1,7 +1,5 @@
 """What happens when: events in the board's time, each at one time or none."""
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Callable
 

@@ -1,8 +1,6 @@
 """The wire between board and host: 1 Mbaud both ways, bytes with the times at which they are
 whole."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass

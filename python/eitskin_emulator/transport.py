@@ -1,8 +1,6 @@
 """``emu:SCENE``: the bytes of the unmodified firmware on an emulated board. Deterministic; no
 thread; time is the board's."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

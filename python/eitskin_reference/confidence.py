@@ -1,8 +1,6 @@
 """The numpy reference of csrc/src/evidence/confidence.c: what the numbers of the test have meant on
 scenes with a truth."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -4,8 +4,6 @@ csrc/src/diagnostics/{electrodes,outliers,model_mismatch,crowded}.c, written for
 docs/reference/diagnostics.md says what each rule is for and what its thresholds were chosen on.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import combinations
@@ -105,7 +103,7 @@ class Sheet(NamedTuple):
     shrink: FloatArray
 
     @classmethod
-    def of(cls, rows: RowForm | None) -> Sheet | None:
+    def of(cls, rows: RowForm | None) -> "Sheet | None":
         """None where the model does not say."""
         if rows is None:
             return None

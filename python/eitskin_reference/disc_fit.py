@@ -1,8 +1,6 @@
 """The numpy reference of the off-grid fit of discs in csrc/src/touch/disc_fit.c, keep.c and disc.c:
 the same steps, written for reading."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

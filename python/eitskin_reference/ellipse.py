@@ -1,7 +1,5 @@
 """The numpy reference of csrc/src/evidence/ellipse.c: whether a disc is an ellipse, and which."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ minimise |y - S x|^2 / 2 + lambda |x|_1 by FISTA (Beck and Teboulle, SIAM J. Ima
 183, doi 10.1137/080716542); ``exact`` has the other solvers, ``frame_stage`` what comes before.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,8 +1,6 @@
 """The numpy reference of csrc/src/evidence: which of the fitted discs are touches, given what the
 model itself may be wrong by; the same steps, written for reading."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -139,7 +137,7 @@ class Answer:
         """The priors' part of F."""
         return float((self.offsets() ** 2 @ PRECISION[: self.parameters]).sum())
 
-    def without(self, k: int) -> Answer:
+    def without(self, k: int) -> "Answer":
         """Without disc k."""
         return replace(
             self,
@@ -177,7 +175,7 @@ class Likelihood:
         w = self.hold(answer, k)[2]
         return float(w @ w)
 
-    def without(self, answer: Answer, k: int) -> tuple[Answer, Likelihood]:
+    def without(self, answer: Answer, k: int) -> "tuple[Answer, Likelihood]":
         """``answer`` without disc k, and F linearised about the others where they are."""
         own, lower, w = self.hold(answer, k)
         rows = np.linalg.solve(lower, self.inverse[own])

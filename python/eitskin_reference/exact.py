@@ -5,8 +5,6 @@ csrc/src/solve/coordinate_descent.c and active_set.c say where the methods are f
 products are solved with again at each step; the core keeps a factor of them up to date.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,8 +1,6 @@
 """FISTA (Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183, doi 10.1137/080716542), on every
 column or on a working set."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from eitskin.core.constants_table import (

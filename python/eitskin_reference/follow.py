@@ -1,8 +1,6 @@
 """The reference that follows the untouched skin, in numpy terms: what csrc/src/frame/follow.c and
 eits_check_drift do, for tests and studies."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -3,8 +3,6 @@ reference is taken, a frame examined, folded against it, reduced and whitened fo
 it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

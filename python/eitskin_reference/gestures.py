@@ -1,8 +1,6 @@
 """The numpy reference of the core's gestures (csrc/src/gesture): the same events and the same bits
 in float32, written for reading. Times are whole microseconds modulo 2^32."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

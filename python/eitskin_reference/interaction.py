@@ -1,8 +1,6 @@
 """The numpy reference of csrc/src/touch/interaction.c: what touches do to each other's field, as
 data on the folded rows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

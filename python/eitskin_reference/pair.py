@@ -1,7 +1,5 @@
 """The numpy reference of csrc/src/evidence/pair.c: whether a disc may be two touches."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

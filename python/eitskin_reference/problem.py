@@ -1,8 +1,6 @@
 """The problem that the numpy reference's solvers share, float64: minimise |Q (y - S x)|^2 / 2 +
 lambda |x|_1."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,8 +1,6 @@
 """Outliers in reference frames, in numpy: the rules of csrc/src/diagnostics/reference_outliers.c,
 written for reading."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

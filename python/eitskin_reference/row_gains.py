@@ -1,8 +1,6 @@
 """The numpy reference of the row gains in csrc/src/frame/reference.c: what makes the reference the
 model's own, row by row."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

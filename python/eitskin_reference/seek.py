@@ -1,8 +1,6 @@
 """The numpy reference of the discs sought in the data in csrc/src/touch/seek.c: the same steps,
 written for reading."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

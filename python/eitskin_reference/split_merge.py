@@ -1,8 +1,6 @@
 """The numpy reference of csrc/src/touch/split_merge.c: discs that are one touch are joined, those
 that are two are parted."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The numpy reference of the search for touches in csrc/src/touch/touch.c and track.c: the same
 steps, written for reading."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

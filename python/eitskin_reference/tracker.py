@@ -1,8 +1,6 @@
 """Touches followed in time, in numpy terms: what csrc/src/touch/tracker.c does, for tests and
 studies."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

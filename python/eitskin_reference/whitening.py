@@ -1,8 +1,6 @@
 """The numpy reference of csrc/src/frame/whitening.c and regularisation.c: the reduction that a
 model would have had without the rows that a frame lacks, or with a higher regularisation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

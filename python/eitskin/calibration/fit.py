@@ -9,8 +9,6 @@ seen over modelled strength. Law and order are those that predict best what was 
 after another, or one press after another where there are too few places.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

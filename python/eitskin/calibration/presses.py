@@ -1,7 +1,5 @@
 """What a recording of known weights shows: a strength and a place for each press."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -31,7 +29,7 @@ class Presses:
     def __len__(self) -> int:
         return len(self.force_n)
 
-    def take(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Presses:
+    def take(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> "Presses":
         """Some of them."""
         return Presses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
 

@@ -1,8 +1,6 @@
 """The list of known weights that belongs to a recording: CSV with a header, or TOML with
 ``[[press]]`` tables."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass

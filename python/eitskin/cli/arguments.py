@@ -1,7 +1,5 @@
 """How commands declare their options: a line each, defaults said in the help."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

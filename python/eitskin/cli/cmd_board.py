@@ -1,7 +1,5 @@
 """``eitskin board``: what the board's owner may set: lock, current, limit."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Any

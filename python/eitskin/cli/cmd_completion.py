@@ -1,7 +1,5 @@
 """``eitskin completion SHELL``: commands and options completed by the shell."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

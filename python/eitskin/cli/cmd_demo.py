@@ -1,8 +1,6 @@
 """``eitskin demo``: three simulated touches, found by the C core and by an emulated board, beside
 the truth."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -85,7 +83,7 @@ class _Steps:
         print(f"{self.count}/{self.total} {text}", file=sys.stderr, flush=True)
 
 
-def _board(step: _Steps) -> BoardDemo | None:
+def _board(step: _Steps) -> "BoardDemo | None":
     """The same touches on the emulated board; None, with a word on stderr, where emulator or
     firmware are not installed."""
     from eitskin.demo.demo_board import run_board_demo
@@ -98,7 +96,7 @@ def _board(step: _Steps) -> BoardDemo | None:
         return None
 
 
-def _board_json(board: BoardDemo | None) -> dict[str, Any] | None:
+def _board_json(board: "BoardDemo | None") -> dict[str, Any] | None:
     from eitskin.demo.demo_board import to_json
 
     return None if board is None else to_json(board)

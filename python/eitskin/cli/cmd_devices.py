@@ -1,8 +1,6 @@
 """``eitskin devices``: serial ports, the boards that answer on them, and how everything else is
 named."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import TYPE_CHECKING, Any
@@ -58,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _line(found: FoundPort) -> str:
+def _line(found: "FoundPort") -> str:
     port = found.port
     usb = "" if port.vendor is None else f", USB {port.vendor:04x}:{port.product or 0:04x}"
     described = "" if port.description in ("", "n/a") else f"  {port.description}"

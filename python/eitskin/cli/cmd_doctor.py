@@ -7,7 +7,7 @@ import copy
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import RING_OHM, Output, option
 from eitskin.cli.device_options import DEVICE_HELP
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 TOUCH_RADIUS_PER_SIZE = 0.05
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "doctor",

@@ -1,7 +1,5 @@
 """``eitskin export [FRAMES] -o OUT.mat``: model, frames and images for EIDORS."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

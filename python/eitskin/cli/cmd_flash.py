@@ -1,7 +1,5 @@
 """``eitskin flash``: firmware, and a model beside it, onto a board through its ST-LINK."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import shutil

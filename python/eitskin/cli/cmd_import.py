@@ -1,7 +1,5 @@
 """``eitskin import``: somebody else's measured frames to a frames file."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -12,7 +10,7 @@ from eitskin.cli.arguments import Output, option
 from eitskin.cli.import_options import add_import_options, read_options, read_protocol, write_layout
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "import",

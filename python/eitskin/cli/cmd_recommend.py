@@ -1,8 +1,6 @@
 """``eitskin recommend``: the measured settings to take for a budget or an accuracy, and their
 model."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``eitskin reconstruct FRAMES``: images and touches of recorded frames."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

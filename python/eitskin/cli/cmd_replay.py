@@ -1,8 +1,6 @@
 """``eitskin replay``: a recording as it was streamed, as frames, or compared with this host's
 core."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``eitskin scene run | plan | picture | list | effects``: simulated sessions."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -1,8 +1,6 @@
 """``eitskin stream``: a board's touches, images or raw frames as they come, and what they amounted
 to."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

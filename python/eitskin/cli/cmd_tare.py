@@ -1,7 +1,5 @@
 """``eitskin tare``: the reference from the untouched skin."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Any

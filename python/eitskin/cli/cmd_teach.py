@@ -1,8 +1,6 @@
 """``eitskin teach ACTION``: a model learned from presses at known places. One file an action beside
 this one, ``teach_ACTION``, with ``add_parser(actions)``."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``eitskin view``: the live page in a browser."""
 
-from __future__ import annotations
-
 import argparse
 import ipaddress
 import secrets
@@ -122,7 +120,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _teacher(options: argparse.Namespace) -> Teacher | None:
+def _teacher(options: argparse.Namespace) -> "Teacher | None":
     if options.teach is None:
         return None
     from eitskin.fileio import read_bytes, refuse_unwritable

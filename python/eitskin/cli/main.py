@@ -1,8 +1,6 @@
 """The command line: ``eitskin COMMAND``. One file a command beside this one; each imports what it
 needs only when it runs."""
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import io

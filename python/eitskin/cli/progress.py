@@ -1,8 +1,6 @@
 """How far long work is, and how long it still takes: bars on stderr where that is a terminal, a
 line every ten seconds elsewhere."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sized

@@ -1,8 +1,6 @@
 """``eitskin teach check MODEL [FRAMES]``: whether a taught model still fits, from the untouched
 skin alone."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import zipfile
@@ -69,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _of_file(path: Path) -> tuple[np.ndarray, Protocol]:
+def _of_file(path: Path) -> "tuple[np.ndarray, Protocol]":
     from eitskin.frames.frames import load_frames
     from eitskin.teaching.presses import load_presses
 
@@ -88,7 +86,7 @@ def _holds_presses(path: Path) -> bool:
         return False
 
 
-def _of_board(options: argparse.Namespace) -> tuple[np.ndarray, Protocol]:
+def _of_board(options: argparse.Namespace) -> "tuple[np.ndarray, Protocol]":
     import numpy as np
 
     from eitskin.cli.teach_record import raw_session

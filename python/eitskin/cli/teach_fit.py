@@ -1,7 +1,5 @@
 """``eitskin teach fit PRESSES -o MODEL``: the model and its report."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Iterable
@@ -80,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def described_skin(presses: Presses, path: Path | None) -> Skin | None:
+def described_skin(presses: "Presses", path: Path | None) -> "Skin | None":
     """The skin of the file ``path``, else of the presses' own description, else None. Their own
     table of rows stands, whatever protocol the description has."""
     from eitskin.config import parse_toml

@@ -1,7 +1,5 @@
 """``eitskin teach plan SKIN -n N``: where to press, as a list and as a template to lay on."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``eitskin teach update MODEL PRESSES -o NEW``: a taught model after remounting or drying."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Iterable

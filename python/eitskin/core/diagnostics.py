@@ -1,8 +1,6 @@
 """What was found wrong with a frame, by name and in a few words
 (csrc/include/eitskin/diagnostics.h, docs/reference/diagnostics.md)."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 from eitskin.core.diagnostics_table import DIAGNOSTICS

@@ -1,7 +1,5 @@
 """What the core says of a frame. Written by tables/make_tables.py from tables/diagnostics.toml."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 # eits_diagnostic: Bits of info.diagnostics and options.diagnostics. No bit ever gets another

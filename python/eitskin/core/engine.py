@@ -1,7 +1,5 @@
 """The C core through cffi, in either width: what the microcontroller runs, on the host."""
 
-from __future__ import annotations
-
 import importlib
 import struct
 from dataclasses import asdict, fields

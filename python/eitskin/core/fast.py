@@ -1,7 +1,5 @@
 """The C core's fast path: touches after each drive of a scan (csrc/include/eitskin/fast.h)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

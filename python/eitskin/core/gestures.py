@@ -1,8 +1,6 @@
 """Events from touches in time: the C core's, which a board runs too. docs/guide/gestures.md says
 what makes each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any

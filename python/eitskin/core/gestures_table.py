@@ -1,7 +1,5 @@
 """Events from touches in time. Written by tables/make_tables.py from tables/gestures.toml."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -1,7 +1,5 @@
 """Touches as notebooks show them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from eitskin.core.diagnostics_table import Touch

@@ -1,7 +1,5 @@
 """The options of the core. Written by tables/make_tables.py from tables/options.toml."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS

@@ -1,12 +1,10 @@
 """What goes into a reconstruction and what comes out, whichever engine does it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
@@ -28,20 +26,23 @@ class Options(OptionFields):
         return self.track_confirm > 1 or self.track_hold > 0 or self.track_smooth > 0
 
 
+_OPTION_KINDS = get_type_hints(Options)
+
+
 def check_options(o: Options) -> None:
     """Refuse what eits_set_options in the C core refuses, naming the option.
 
     Raises:
         UsageError: one is out of its range, or of the wrong type.
     """
-    for one in fields(o):
-        name, value = one.name, getattr(o, one.name)
+    for name, kind in _OPTION_KINDS.items():
+        value = getattr(o, name)
         if name in RANGES:
-            _check_number(name, value, *RANGES[name], whole=one.type == "int")
+            _check_number(name, value, *RANGES[name], whole=kind is int)
         elif name in CHOICES and value not in CHOICES[name]:
             known = ", ".join(CHOICES[name])
             raise UsageError(f"options: {name} = {value!r} is not known; use one of {known}")
-        elif one.type == "bool" and value not in (False, True):
+        elif kind is bool and value not in (False, True):
             raise UsageError(f"options: {name} = {value!r} must be true or false")
     if not o.touch_min_radius_mm <= o.touch_seed_radius_mm <= o.touch_max_radius_mm:
         raise UsageError(
@@ -127,15 +128,17 @@ class Info(InfoFields):
         return values | {"diagnostics": list(self.diagnostics_by_name), "found": list(self.found)}
 
 
+_MAY_BE_UNKNOWN = [kind == float | None for kind in get_type_hints(Touch).values()]
+
+
 def known_touch(values: Sequence[Any]) -> Touch:
     """A touch from eits_touch's fields in order; what is 0 because it is not known is None."""
     whole = list(values)
-    known = [one.type == "float | None" for one in fields(Touch)]
-    first = known.index(True)
+    first = _MAY_BE_UNKNOWN.index(True)
     if not whole[first]:
         whole[first] = None
     if not whole[first + 1]:
-        whole[first + 1 :] = [None] * (len(known) - first - 1)
+        whole[first + 1 :] = [None] * (len(whole) - first - 1)
     if not any(whole[-2:]):  # no long axis: a disc, as far as the data tell
         whole[-2:] = [None, None]
     return Touch(*whole)

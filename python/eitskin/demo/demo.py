@@ -1,8 +1,6 @@
 """Three simulated touches, found by each engine: the whole path from a skin to touches in one small
 session."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter

@@ -1,8 +1,6 @@
 """The demo's touches on the emulated board: the firmware's own results beside this host's, bit for
 bit."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter

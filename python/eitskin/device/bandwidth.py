@@ -1,7 +1,5 @@
 """What a serial line carries: how many frames of which kinds, before packets must be dropped."""
 
-from __future__ import annotations
-
 from math import ceil
 
 from eitskin.device.client import Device

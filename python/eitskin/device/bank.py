@@ -5,8 +5,6 @@ The firmware programs the record last, as the commit of an upload; docs/referenc
 "Model banks", specifies it.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 

@@ -1,8 +1,6 @@
 """Whether a board is the one that is meant: versions, model, identity; and why one does not
 answer."""
 
-from __future__ import annotations
-
 import zlib
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """A board's commands with their answers, and what it streams, whatever kind of device is behind
 it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path

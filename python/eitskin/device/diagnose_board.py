@@ -1,8 +1,6 @@
 """A board before the doctor: frames that it measures now, and the faults and counts that it reports
 itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

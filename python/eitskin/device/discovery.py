@@ -1,7 +1,5 @@
 """Which ports there are, and which boards answer on them."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

@@ -5,8 +5,6 @@ A board tells most of what it finds as faults, and all of it in the head of each
 tell is said once.
 """
 
-from __future__ import annotations
-
 from eitskin.core.diagnostics import names, words
 from eitskin.device.link import LinkEvent
 from eitskin.device.live_frames import Item, LiveDrive

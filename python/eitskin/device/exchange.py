@@ -1,8 +1,6 @@
 """One command and its answer at a time, sent again where it was lost; what a board streams between
 is kept."""
 
-from __future__ import annotations
-
 import random
 import time
 from collections import deque

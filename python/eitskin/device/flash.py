@@ -1,8 +1,6 @@
 """Putting firmware, and a model beside it, on a NUCLEO-F767ZI by whichever programmer's tool is
 installed."""
 
-from __future__ import annotations
-
 import shlex
 import shutil
 import struct

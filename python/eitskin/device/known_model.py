@@ -1,8 +1,6 @@
 """The board's model on the host, where the host has it: what turns pixels into places and rows into
 electrodes."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -95,7 +93,7 @@ def _usual(electrodes: int) -> Iterator[Protocol]:
             yield make(electrodes)
 
 
-def board_options(model: Model, board: BoardInfo | None = None, *, track: bool = True) -> Options:
+def board_options(model: Model, board: BoardInfo | None = None, *, track: bool = True) -> "Options":
     """The options that a board starts with: the model's own, the noise floor of ``board``'s
     converter, and touches tracked; or without that."""
     from eitskin.model.options import default_options, tracking

@@ -1,8 +1,6 @@
 """A transport with its decoder: packets come out, commands go in. With a thread for real boards,
 without one for the others."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import deque

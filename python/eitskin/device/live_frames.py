@@ -1,7 +1,5 @@
 """A board's frames as they come, each with everything that came of it."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -165,7 +163,7 @@ def follow(
 
 
 def put_together(
-    items: Iterator[Any], what: Stream, clock: Clock | None = None
+    items: Iterator[Any], what: Stream, clock: "Clock | None" = None
 ) -> Generator[Item, None, None]:
     """Frames out of a stream's packets, timed by ``clock``; ``items`` is closed with it."""
     try:
@@ -175,7 +173,7 @@ def put_together(
             items.close()
 
 
-def _put_together(items: Iterator[Any], what: Stream, clock: Clock) -> Iterator[Item]:
+def _put_together(items: Iterator[Any], what: Stream, clock: "Clock") -> Iterator[Item]:
     wanted = bin(what & ~Stream.FOLLOWED).count("1")
     parts: dict[str, Any] = {}
     number: int | None = None

@@ -2,8 +2,6 @@
 and what packages bring (``source``). The same frames, commands and errors behind each. After sim:,
 emu: and file: ``?speed=1&loop=1`` (``timing``)."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Serial ports: which there are, which is a board's, and a transport over one."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import threading

@@ -1,7 +1,5 @@
 """A bounded memory of many numbers: quantiles of a stream that may go on for ever."""
 
-from __future__ import annotations
-
 import random
 from array import array
 

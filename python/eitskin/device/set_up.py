@@ -1,7 +1,5 @@
 """What comes before a board's frames: scan, solver, reference, and a scene's beginning."""
 
-from __future__ import annotations
-
 from eitskin.core.results import Options
 from eitskin.device.client import Device
 from eitskin.device.known_model import NAMES_IT, KnownModel

@@ -1,7 +1,5 @@
 """What a user asks of a board's scan and solver: only what is named is changed."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 

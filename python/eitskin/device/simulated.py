@@ -5,8 +5,6 @@ that of the frames, no noise but the scene's, and no processor time, so that eve
 tell of one is 0. The clock runs only while the board scans for someone. Deterministic; no thread.
 """
 
-from __future__ import annotations
-
 import zlib
 from typing import Any
 

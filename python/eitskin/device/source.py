@@ -6,8 +6,6 @@ A source of your own is a class with ``read``; the entry point group ``eitskin.s
 scheme (docs/guide/your-board.md).
 """
 
-from __future__ import annotations
-
 import threading
 import time
 import zlib

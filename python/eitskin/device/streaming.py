@@ -1,7 +1,5 @@
 """The loop behind ``Device.stream``: frames as they come, and what to do when none do."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 

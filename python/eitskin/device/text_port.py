@@ -1,7 +1,5 @@
 """Where lines come from: a serial port, a file, standard input, a FIFO, a TCP connection."""
 
-from __future__ import annotations
-
 import errno
 import os
 import select

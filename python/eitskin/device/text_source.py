@@ -1,7 +1,5 @@
 """``text:PORT?layout=FILE``: an instrument that sends its frames as lines of text."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from urllib.parse import unquote

@@ -1,8 +1,6 @@
 """When simulated, emulated and recorded frames are given on: ``?speed=1&loop=1`` after a device's
 URL, and the clock that keeps to it."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time

@@ -1,7 +1,5 @@
 """How bytes reach a board and come back: what every kind of device gives, and nothing more."""
 
-from __future__ import annotations
-
 from typing import Protocol, runtime_checkable
 
 

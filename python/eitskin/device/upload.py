@@ -1,8 +1,6 @@
 """A model over the wire into a board's other bank: announced, sent in pieces, committed. Cut at any
 byte, the old model stays."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -12,8 +12,6 @@ last electrode's U is fixed at 0, which leaves the matrix symmetric positive def
 are then shifted to zero electrode mean.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -4,8 +4,6 @@ The rim's nodes are displaced along it and outwards; inside, each coordinate of 
 harmonic, so that it is smooth and dies away with the distance from the rim, for any outline.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -5,8 +5,6 @@ fields themselves: each touch answers as a dipole in the field that the others b
 (csrc/src/touch/interaction.h has the formula).
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,8 +1,6 @@
 """The image grid: square pixels over the outline's bounding box, of which those with their centre
 inside are kept."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,8 +1,6 @@
 """Triangle meshes of a skin, refined at its electrodes. Netgen makes them in a process of its own
 (mesh_worker.py)."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

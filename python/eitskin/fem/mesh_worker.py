@@ -6,8 +6,6 @@ Netgen can loop for ever on an outline it dislikes, so it runs where it can be k
 numpy along, and nothing else is imported.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from typing import Any

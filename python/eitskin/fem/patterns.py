@@ -1,7 +1,5 @@
 """Which current patterns a protocol needs solved, and how its rows are read off them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

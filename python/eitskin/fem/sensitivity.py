@@ -6,8 +6,6 @@ grad u . grad w (Geselowitz, IEEE Trans. Biomed. Eng. 18, 1971). A field is solv
 takes one small product of gradients.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

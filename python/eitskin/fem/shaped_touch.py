@@ -1,7 +1,5 @@
 """Touches of several shapes on a mesh: the mean change of conductivity over each element."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import cos, sin, sqrt
 
@@ -36,7 +34,7 @@ class ShapedTouch:
     angle_rad: float = 0.0
     profile: str = "uniform"
 
-    def disc(self) -> ShapedTouch:
+    def disc(self) -> "ShapedTouch":
         """The disc of equal area and mean."""
         return replace(self, aspect=1.0, angle_rad=0.0, profile="uniform")
 

@@ -1,8 +1,6 @@
 """The prebuilt image of the NUCLEO-F767ZI, and its manifest: compiler, hash of the sources, size
 and hash of the image."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import asdict, dataclass

@@ -1,8 +1,6 @@
 """Named arrays of .npz, .npy and .mat files, and picking one with an error that lists what is
 there."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Collection, Mapping
 from pathlib import Path

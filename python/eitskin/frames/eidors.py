@@ -1,8 +1,6 @@
 """Frames, model and images to EIDORS, and its frames and images to here, as .mat files of its own
 structs (skin.eidors says which fields, and in which units)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby

@@ -5,8 +5,6 @@ The file is an .npz; docs/reference/frames-format.md lists its fields. It is rea
 checked whole.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ reaches about 12 V at supplies of 15 V, and its converter 1.65 V. A skin that co
 less current, one that conducts well more current or gain.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -10,8 +10,6 @@ Kellogg, Foundations of Potential Theory, or Barber and Brown, J. Phys. E 17 (19
 electrode of finite width is taken as an even current density: averages of ln over widths.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The homogeneous prediction by finite elements, for outlines without a closed form. Needs the
 extra ``model``."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -19,7 +17,7 @@ TOUCH_CONTRAST = 3.0
 
 
 @lru_cache(maxsize=4)
-def fem_prediction(skin: Skin) -> FemPrediction:
+def fem_prediction(skin: Skin) -> "FemPrediction":
     """The prediction of ``skin``, made once."""
     return FemPrediction(skin)
 

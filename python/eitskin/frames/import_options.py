@@ -1,7 +1,5 @@
 """What ``import`` is told of a source: where its frames are, and what differs in them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from eitskin.frames.source import SourceOptions

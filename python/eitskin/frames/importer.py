@@ -6,8 +6,6 @@ protocol's order; undo a swap of wires; set the sign; negate channels, fill chan
 reciprocals; leave channels out; equalise gains.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """A layout: how an instrument's lines are frames, in a TOML file (docs/reference/layout.md). It
 serves files and live lines alike."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Lines of an instrument to rows of cells: one parser, of files and of what comes over a line."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

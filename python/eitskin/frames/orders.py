@@ -1,8 +1,6 @@
 """Channel orders: how others list a protocol's rows, how they number electrodes, and how rows are
 matched to ours."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

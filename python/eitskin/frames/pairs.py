@@ -3,8 +3,6 @@
 A header that says which is believed; where nothing says it, nothing is assumed.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

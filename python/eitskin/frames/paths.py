@@ -1,7 +1,5 @@
 """Where touches truly were at any instant, for frames whose rows have instants of their own."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 
 import numpy as np

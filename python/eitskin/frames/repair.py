@@ -1,8 +1,6 @@
 """What import does to channels: their sign, filling them from reciprocals, leaving them out, making
 gains equal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Results as a file: images, touches and solver info of each frame, named and with units
 (docs/reference/frames-format.md)."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """A measured source, text, NPY, NPZ or MAT, read into frames of channels that still stand in
 its own order."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path

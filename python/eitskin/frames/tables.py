@@ -1,8 +1,6 @@
 """Text tables of numbers as instruments write them: delimiter, header, label, decimal comma found,
 bad cells named."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,8 +1,6 @@
 """What a source says about its own scenes: touches and masks, turned into the frames file's
 units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """What a session gives: frames, and notices between them."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from typing import Any

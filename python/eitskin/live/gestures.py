@@ -1,8 +1,6 @@
 """A stream's gestures: the board's own where it sends them, else what its touches give here, by the
 same C code; named zones always here."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from eitskin.core.gestures import GestureEvent, Gestures, Zone

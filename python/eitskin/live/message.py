@@ -5,8 +5,6 @@ A field that is asked for and not known is null. Fields of images, raw voltages 
 only where those are.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

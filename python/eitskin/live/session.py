@@ -4,8 +4,6 @@
 through this.
 """
 
-from __future__ import annotations
-
 import queue
 import threading
 import time
@@ -104,7 +102,7 @@ class Session:
         self._asked: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._stopping, self._started, self._every = threading.Event(), False, 1
 
-    def __enter__(self) -> Session:
+    def __enter__(self) -> "Session":
         self.device = self._open()
         try:
             self._find()

@@ -1,7 +1,5 @@
 """What a session with a board is to be."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -66,7 +64,7 @@ class SessionSettings:
     scan: ScanSettings = field(default_factory=ScanSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
     zones: tuple[Zone, ...] = ()
-    target: Target | None = None
+    target: "Target | None" = None
     tare: int | None = None
     record: Path | None = None
     quiet_frames: bool = False

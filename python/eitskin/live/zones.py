@@ -1,7 +1,5 @@
 """Zones files: named keys, pads and rings of a skin (docs/guide/gestures.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations

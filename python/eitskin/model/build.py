@@ -1,8 +1,6 @@
 """From a skin's description to a model: mesh, forward model, Jacobian, reduction, storage, golden
 frame."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from typing import Any

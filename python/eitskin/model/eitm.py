@@ -2,8 +2,6 @@
 table of sections; ``eitm_sections`` has what stands in them. This reader is independent of the C
 one."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from pathlib import Path

@@ -1,8 +1,6 @@
 """What stands in the sections of an .eitm file (docs/reference/eitm-format.md), there and back,
 with every length, index and number checked."""
 
-from __future__ import annotations
-
 import json
 import struct
 from dataclasses import astuple, dataclass, fields

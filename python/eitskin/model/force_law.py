@@ -1,8 +1,6 @@
 """How a touch's strength and place tell its load: the optional section LOAD of a model
 (docs/guide/calibration.md), read and used."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The stored model as Python sees it: everything from a frame's rows to the image's pixels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """What a real skin's data may differ by from the model's: the section UNCE of a .eitm file."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ They use one thread each, and samples are summed in their order: the number of p
 bit.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import subprocess

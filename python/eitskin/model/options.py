@@ -1,7 +1,5 @@
 """A model's own defaults as options, and what suits a stream."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

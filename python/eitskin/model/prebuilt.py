@@ -5,8 +5,6 @@ Made by ``eitskin model build --paper -o python/eitskin/model/paper.eitm``; a te
 and compares.
 """
 
-from __future__ import annotations
-
 from importlib import resources
 from pathlib import Path
 

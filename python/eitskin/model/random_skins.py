@@ -8,8 +8,6 @@ the same discs in the skin as described. e_shape: shaped touches against discs, 
 described. What amplitude, place and radius of the discs can explain is taken out of both.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

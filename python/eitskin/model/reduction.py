@@ -11,8 +11,6 @@ that lets weak directions speak up to the regularisation mu, and a first-order s
 needs few iterations. It is Tikhonov-regularised whitening, a preconditioner on the data side.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

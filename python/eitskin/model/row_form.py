@@ -5,8 +5,6 @@ The numbers are those that float32 arithmetic takes from the stored P and S, in 
 rows, so that every core, on a board or on a host, works with the same.
 """
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass
 

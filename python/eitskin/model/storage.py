@@ -1,7 +1,5 @@
 """Storage of the reduced Jacobian: f32, f16, or i16 and i8 with a scale per column."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

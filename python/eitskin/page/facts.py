@@ -19,8 +19,6 @@ All else is text, a JSON object with a ``type``: to the page ``setup``, ``state`
 (docs/guide/live-view.md).
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from dataclasses import asdict

@@ -1,8 +1,6 @@
 """The thread that follows a board for the page: one session after another, each from its opening
 to its end."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -85,8 +83,8 @@ class Follower:
         folder: Path,
         on_frame: Callable[[Frame], None],
         on_news: Callable[[str, dict[str, Any]], None],
-        outputs: Callable[[Session], Outputs] | None = None,
-        teacher: Teacher | None = None,
+        outputs: "Callable[[Session], Outputs] | None" = None,
+        teacher: "Teacher | None" = None,
     ) -> None:
         self.teacher = teacher
         if teacher is not None:

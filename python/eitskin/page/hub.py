@@ -1,8 +1,6 @@
 """The pages that look on. A frame goes to each that has drawn what it got; what it cannot take is
 dropped and counted, and nobody waits for it."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections import deque

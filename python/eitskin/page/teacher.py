@@ -1,8 +1,6 @@
 """Teaching in the page: the guide of ``eitskin teach record`` fed with the frames that the page
 follows, the same file of presses, and the fit."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,7 +24,9 @@ class Teacher:
     ``text``, None and "" for that of the board's model. ``on_event`` gets the facts for pages
     whenever something is new."""
 
-    def __init__(self, plan: Plan, presses: Path, skin: Skin | None = None, text: str = "") -> None:
+    def __init__(
+        self, plan: "Plan", presses: Path, skin: "Skin | None" = None, text: str = ""
+    ) -> None:
         self.plan, self.path, self._skin, self._text = plan, presses, skin, text
         self.on_event: Callable[[dict[str, Any]], None] = lambda facts: None
         self._guide: PressGuide | None = None

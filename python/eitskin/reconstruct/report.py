@@ -1,7 +1,5 @@
 """What came of recorded frames, as a table for people and as a message for programs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +38,7 @@ def to_text(outcome: ReconstructOutcome) -> str:
 
 
 def _lines(
-    label: str, result: Reconstruction, score: FrameScore | None, weighed: bool
+    label: str, result: Reconstruction, score: "FrameScore | None", weighed: bool
 ) -> Iterator[str]:
     """A line a touch of one frame; a line where there is none, and one for what was found wrong."""
     info = result.info
@@ -67,7 +65,7 @@ def _lines(
         yield f"{'':11} found: {'; '.join(info.found)}"
 
 
-def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
+def summary(scores: "dict[int, FrameScore]") -> dict[str, Any]:
     """The scores of all frames in a few numbers; positions are NaN where nothing was found."""
     matchings = [score.matching for score in scores.values()]
     distances = [d for matching in matchings for d in matching.distances_mm]

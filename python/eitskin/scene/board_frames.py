@@ -1,7 +1,5 @@
 """A scene as what lies before a simulated or emulated board."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import replace
 
@@ -28,7 +26,7 @@ class BoardFrames:
         self.scene = replace(scene, effects=effects)
         self._rows: dict[tuple[int, tuple[int, ...]], SceneRows] = {}
 
-    def rows(self, protocol: Protocol) -> SceneRows:
+    def rows(self, protocol: Protocol) -> "SceneRows":
         """The frames in the rows of ``protocol``. Electrodes that it does not name stay unused.
 
         Raises:

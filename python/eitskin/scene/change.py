@@ -1,7 +1,5 @@
 """When a change after the tare happens: at once, or slowly."""
 
-from __future__ import annotations
-
 
 def part_at(time_s: float, at_s: float, rise_s: float) -> float:
     """The part of a change that has happened at ``time_s``: 0 before ``at_s``, then in proportion

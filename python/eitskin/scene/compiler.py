@@ -5,8 +5,6 @@ worked out here: which frames and rows share a state of sheet, touches and conta
 touches are solved by factorisation or by update. The frame loop (``runner.py``) then asks nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias

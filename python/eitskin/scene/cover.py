@@ -1,7 +1,5 @@
 """Which elements of a mesh a touch covers, and how much of each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

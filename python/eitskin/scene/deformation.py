@@ -5,8 +5,6 @@ forward problem is solved on the deformed mesh. A gel's resistivity is that of i
 does not change (Keplinger et al., Science 341, 2013); its lengths and thickness do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import cos, radians, sin

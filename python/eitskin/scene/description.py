@@ -5,8 +5,6 @@ Effects' tables are kept as they are; the compiler reads them when it imports th
 schema: docs/guide/scenes.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -284,7 +282,7 @@ def _track(table: Mapping[str, Any], where: str) -> TouchTrack:
     return TouchTrack(tuple(keys), law, hold, shape)
 
 
-def _shape(table: Mapping[str, Any], where: str) -> TouchShape | None:
+def _shape(table: Mapping[str, Any], where: str) -> "TouchShape | None":
     """What ``shape`` names; its module is imported for shapes other than a disc."""
     name = table.get("shape", "disc")
     if name == "disc":
@@ -407,7 +405,7 @@ def _gap_mm(one: TrackSamples, other: TrackSamples) -> FloatArray:
     return gap_mm
 
 
-def _disc() -> TouchShape:
+def _disc() -> "TouchShape":
     from eitskin.scene.touch_shape import TouchShape
 
     return TouchShape()

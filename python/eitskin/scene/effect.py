@@ -26,8 +26,6 @@ once is drawn in ``make`` from ``session.stream(NAME)`` (index 0) or ``session.s
 part")``. Several parts: several names.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum

@@ -1,8 +1,6 @@
 """An effect's table in a scene becomes its ``Parameters``: keys, types and ranges are checked
 against the dataclass."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import types

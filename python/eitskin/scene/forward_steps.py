@@ -12,8 +12,6 @@ for the unknowns it newly reaches. Which of the two is cheaper is decided by cou
 multiplications (``count_costs``).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Protocol
 

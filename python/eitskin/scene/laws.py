@@ -20,8 +20,6 @@ A law gives the contrast, the conductivity under the touch divided by the sheet'
   tank. The short circuit's formula with a contrast below 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias

@@ -1,7 +1,5 @@
 """The scenes that come with the package, found by name."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 from pathlib import Path
 

@@ -8,8 +8,6 @@ at most a step apart, and a row's voltage is interpolated in it between the two 
 instant. Where nothing changes there is one state, and nothing is interpolated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """How effects declare a parameter: its default, its unit, its range and what it is, in one line."""
 
-from __future__ import annotations
-
 from dataclasses import field
 from typing import Any
 

@@ -5,8 +5,6 @@ with deviation 1 / length (random Fourier features; Rahimi and Recht, NIPS 2007)
 of place, so that another mesh samples the same field.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

@@ -5,8 +5,6 @@ A scene depends on (seed, role, its number) only: the first 20 scenes of a set o
 20, and the training set of a seed is independent of its test set.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,7 +43,7 @@ class TrueTouch:
     y_mm: float
     radius_mm: float
     contrast: float
-    shape: TouchShape | None = None
+    shape: "TouchShape | None" = None
 
     def covers(self, x_mm: FloatArray, y_mm: FloatArray) -> npt.NDArray[np.bool_]:
         """Whether places so far from its centre, (...), lie in it."""
@@ -188,7 +186,7 @@ def rim_distance_mm(outline: Outline, points_mm: npt.ArrayLike) -> FloatArray:
 
 def _shapes(
     rules: TouchRules, number: int, shape_generator: Callable[[], np.random.Generator]
-) -> list[TouchShape | None]:
+) -> "list[TouchShape | None]":
     """The touches' shapes; of discs nothing is drawn."""
     if rules.shape == "disc":
         return [None] * number

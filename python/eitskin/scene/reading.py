@@ -6,8 +6,6 @@ factorisation: with the potentials Z D of the bridges' own current patterns D an
 = U - Z D (R + D' Z D)^-1 D' U.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

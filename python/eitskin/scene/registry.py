@@ -6,8 +6,6 @@ and not before; listing effects reads their source without running it. A built-i
 taken by an entry point.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib
 import importlib.metadata

@@ -1,8 +1,6 @@
 """Running a compiled scene: every distinct state is solved once, every frame goes through the named
 steps."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace

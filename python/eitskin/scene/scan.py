@@ -1,8 +1,6 @@
 """The scan as the front end lives it: when a row is read, on which channel, and what the
 multiplexers do before."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,8 +1,6 @@
 """A scene's session: its named effects imported and made, and the meshes and models that scenes
 share."""
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import dataclass
 from typing import Any
@@ -63,7 +61,7 @@ class MeshCache:
         for before."""
         return self._untouched.get((scene.skin, scene.elements, scene.protocol))
 
-    def v0_v(self, scene: Scene, work: SessionWork) -> FloatArray:
+    def v0_v(self, scene: Scene, work: "SessionWork") -> FloatArray:
         """The reference frame (m,) of ``scene``'s skin without any effect; a factorisation when
         first asked for."""
         model = self.model(

@@ -7,8 +7,6 @@ random stream (``eitskin.scene.streams``): turning one off leaves the samples of
 were.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 """Random streams keyed by (seed, name): each source of randomness has its own, so that adding one
 changes no other."""
 
-from __future__ import annotations
-
 import hashlib
 
 import numpy as np

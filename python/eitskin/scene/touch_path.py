@@ -1,7 +1,5 @@
 """Where a touch is at any time, and how hard: straight lines between keyframes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -46,7 +44,7 @@ class TouchTrack:
     keyframes: tuple[Keyframe, ...]
     law: Law = field(default_factory=ShortCircuit)
     hold: bool = False
-    shape: TouchShape | None = None
+    shape: "TouchShape | None" = None
 
     @property
     def moves(self) -> bool:
@@ -67,7 +65,7 @@ class TrackSamples:
     y_mm: FloatArray
     radius_mm: FloatArray
     contrast: FloatArray
-    shape: TouchShape | None = None
+    shape: "TouchShape | None" = None
 
 
 def always(

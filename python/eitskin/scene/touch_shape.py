@@ -6,8 +6,6 @@ Math. 92, 1882; Johnson, Contact Mechanics, Cambridge 1985, ch. 4), a fingertip 
 follow the pressure. Imported only where a touch names a shape.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 """What was truly there: each frame's touches, the mask of them, and the conductivity that was
 solved."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

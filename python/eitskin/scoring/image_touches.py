@@ -4,8 +4,6 @@ Pixels with x > t max(x) are grouped into connected components (pixels that shar
 corner); each component is one touch, at the centroid of its pixels weighted by their values.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """Which found touch is which true one: optimal matching within a gate, and what it leaves over."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

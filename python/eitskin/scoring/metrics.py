@@ -11,8 +11,6 @@ Nothing here knows a reconstruction method or a mesh: images come as (frames, pi
 discs or as a mask.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

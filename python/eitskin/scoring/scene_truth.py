@@ -1,7 +1,5 @@
 """Where a simulated or emulated board's touches truly are, and how far off the found ones were."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

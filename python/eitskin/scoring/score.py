@@ -1,7 +1,5 @@
 """How well a reconstruction agrees with the truth that its frames carry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 """What a board's frames show, compared with the truth where there is one: touches, places in
 images, raw rows in brief."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

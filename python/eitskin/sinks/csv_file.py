@@ -2,8 +2,6 @@
 drive, without touches. Each line is written whole as it comes, so that a killed program leaves a
 readable file."""
 
-from __future__ import annotations
-
 import csv
 from io import StringIO
 from pathlib import Path

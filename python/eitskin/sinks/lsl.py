@@ -6,8 +6,6 @@ stream, NAME-drives, from the first report on: double64 channels time_s and the 
 then id, confirmed, x_mm, y_mm, vx_mm_per_s, vy_mm_per_s and strength of each. Both are irregular.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from typing import Any

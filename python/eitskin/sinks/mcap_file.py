@@ -6,8 +6,6 @@ diagnostic_msgs/msg/DiagnosticArray when they change. The file is written in chu
 second: a killed program loses the last. The list of chunks stays in memory until the end.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from eitskin.errors import missing_extra

@@ -1,8 +1,6 @@
 """``mqtt://[USER:PASSWORD@]HOST[:1883][/topic]``: each message to topic/frame, topic/notice or
 topic/summary of a broker; the topic is eitskin where none is named."""
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 from urllib.parse import unquote

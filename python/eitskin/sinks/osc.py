@@ -6,8 +6,6 @@ direction_deg value zone touch_ids...; /eitskin/notice kind text. After a drive 
 drive time_s touches, then for each /eitskin/moving id x_mm y_mm vx_mm_per_s vy_mm_per_s strength.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from typing import Any
 

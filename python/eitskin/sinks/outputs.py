@@ -2,8 +2,6 @@
 gone drops and counts, and holds up nobody.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import deque
@@ -80,7 +78,7 @@ class Outputs:
             self.close()
             raise
 
-    def __enter__(self) -> Outputs:
+    def __enter__(self) -> "Outputs":
         return self
 
     def __exit__(self, *error: object) -> None:

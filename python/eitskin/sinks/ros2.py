@@ -5,8 +5,6 @@ sensor_msgs/Image and diagnostic_msgs/DiagnosticArray.
 ROS.
 """
 
-from __future__ import annotations
-
 import math
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
@@ -102,7 +100,7 @@ def report(message: Table, time_ns: int, frame_id: str) -> Table:
     return {"header": header(time_ns, frame_id)} | head
 
 
-def image(grid: Grid, values: npt.ArrayLike, time_ns: int, frame_id: str) -> Table:
+def image(grid: "Grid", values: "npt.ArrayLike", time_ns: int, frame_id: str) -> Table:
     """sensor_msgs/Image, 32FC1 in S/m: row 0 is the highest y, NaN outside the skin."""
     picture = np.ascontiguousarray(grid.image(values)[::-1], dtype="<f4")
     height, width = picture.shape

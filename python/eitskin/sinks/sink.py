@@ -1,7 +1,5 @@
 """What a sink is, what it is given, and how its address is read."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

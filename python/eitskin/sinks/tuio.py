@@ -6,8 +6,6 @@ squared), fseq. Of ``--report drive`` a bundle a drive, with its ids and speeds;
 reports, and after the last, one with no touch.
 """
 
-from __future__ import annotations
-
 import math
 import socket
 from typing import Any

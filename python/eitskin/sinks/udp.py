@@ -1,7 +1,5 @@
 """``udp://HOST:PORT``: each message as a datagram of JSON."""
 
-from __future__ import annotations
-
 import socket
 
 from eitskin.errors import SinkError

@@ -4,8 +4,6 @@ message as a text of JSON.
 Pages of this machine and programs may connect; a page that another host served may not.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import re

@@ -4,8 +4,6 @@ skin's rim.
 A skin keeps the polygon and the places only: nothing depends on the drawing once it is read.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence

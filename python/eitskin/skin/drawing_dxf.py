@@ -1,8 +1,6 @@
 """DXF by ezdxf: lines, polylines, arcs, circles, ellipses, splines and points of the model space,
 in mm."""
 
-from __future__ import annotations
-
 import io
 import logging
 import math

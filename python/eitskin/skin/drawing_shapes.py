@@ -1,7 +1,5 @@
 """The shapes of a drawing, in mm with y up, and how its curves become straight pieces."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """SVG by svgelements: shapes with their transforms, in mm, y up. (0, 0) is the page's lower left
 corner."""
 
-from __future__ import annotations
-
 import io
 import math
 import re

@@ -7,8 +7,6 @@ taken for metres. A model of triangles conducts in its plane: its elem_data are 
 thickness, in S, and z_contact is in ohm m.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

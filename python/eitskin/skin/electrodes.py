@@ -1,7 +1,5 @@
 """The electrodes at a skin's rim: how many, how wide, where, and how well they touch."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import isfinite
 

@@ -1,7 +1,5 @@
 """The rim, which no current crosses, mirrors the dipoles that touches are."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

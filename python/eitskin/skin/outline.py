@@ -4,8 +4,6 @@ counterclockwise along the rim.
 A disk's arc length starts at angle 0 (the point furthest right), a polygon's at its first vertex.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

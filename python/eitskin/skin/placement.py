@@ -1,8 +1,6 @@
 """Electrodes where the user says: by fractions of the rim, by points near it, by marks in a
 drawing."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

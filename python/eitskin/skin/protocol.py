@@ -9,8 +9,6 @@ Rows of one drive that stand together are a drive. Drives are measured in the or
 a frame.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A skin: outline, electrodes, sheet. Read from TOML and written back as a table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite

@@ -3,8 +3,6 @@
 Lengths are in parts of the skin's radius R, the radius of the disk of equal area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from math import isfinite

@@ -1,8 +1,6 @@
 """Many frames that have nothing to do with each other, over threads: one context each, and C runs
 without Python's lock."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor

@@ -1,8 +1,6 @@
 """Frames to images and touches with one signature, whichever engine does it: the C core or the
 numpy reference."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
@@ -67,7 +65,7 @@ class Reconstructor:
     @classmethod
     def from_file(
         cls, path: str | Path, *, engine: str = "c", options: Options | None = None
-    ) -> Reconstructor:
+    ) -> "Reconstructor":
         """With the model in the file ``path``; raises what ``load_model`` raises besides."""
         model, blob = load_model(path)
         return cls(model, engine=engine, options=options, blob=blob)
@@ -168,7 +166,7 @@ class Reconstructor:
         self._engine.forget()
 
 
-def _reference_engine(model: Model) -> ReferenceEngine:
+def _reference_engine(model: Model) -> "ReferenceEngine":
     """Of a package that the wheel does not have."""
     try:
         from eitskin_reference.engine import ReferenceEngine

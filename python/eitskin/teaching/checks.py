@@ -1,7 +1,5 @@
 """Presses that cannot teach are refused before any work; a line says which, and what to do."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

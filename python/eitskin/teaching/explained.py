@@ -1,8 +1,6 @@
 """What presses teach by the likelihood, whether their places are mirrored or shifted by some
 presses, and whether they explain the voltages at all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,8 +1,6 @@
 """From presses to what a skin answers to a press anywhere: geometry and hyperparameters by marginal
 likelihood, amplitudes and noise from presses left out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from math import exp, log

@@ -11,8 +11,6 @@ presses too early, and the guide waits: else lifting would count as the press, a
 next one's.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -269,7 +267,7 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def scan_of_presses(board: BoardInfo, replays: bool) -> ScanSettings:
+def scan_of_presses(board: "BoardInfo", replays: bool) -> ScanSettings:
     """Every row of every frame, no faster than a person presses; a board that is given its frames,
     or a recording, sends what it has."""
     if board.frames_given or replays:

@@ -10,8 +10,6 @@ does not. So the answer s_c of row c over the skin is a Gaussian process with th
 The first term leaves a turn by one electrode open; the second, the row's own, fixes it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import cos, radians, sin

@@ -2,8 +2,6 @@
 and the noise. P = U'W / s_1 and S = diag(s / s_1) V' of W s D = U s V' with R = W'W / s_1^2 stored
 give s = R^-1 P' S / D up to what lies beyond the model's rank."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

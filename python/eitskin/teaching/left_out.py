@@ -1,8 +1,6 @@
 """What the presses say of each other: where the others alone would put each, how surely, and
 whether it fits them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What was learned as an ordinary model, and what its presses say of it when they are left out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,8 +1,6 @@
 """Where a skin went when it was remounted, and what goes with it: outline and electrodes, grid, the
 law of force."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -11,8 +11,6 @@ presses 4.0 and 10.5 where random places have 7.0 and 28, with 20 presses 2.8 an
 9.0.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """A scene in which a finger presses where a plan says, one press after another, at the pace of a
 quick person: to try teaching without a skin."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

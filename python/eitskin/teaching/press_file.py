@@ -1,7 +1,5 @@
 """The presses of a session on disk, as they come."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Presses at known places, and the .npz file that holds them (docs/reference/presses-format.md)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
@@ -75,7 +73,7 @@ class Presses:
         """Pressed less untouched, (n, m) V."""
         return np.asarray(self.pressed - self.untouched)
 
-    def take(self, which: npt.ArrayLike) -> Presses:
+    def take(self, which: npt.ArrayLike) -> "Presses":
         """Some of them, by number or by a mask (n,)."""
         k = np.asarray(which)
         parts: dict[str, Any] = {}

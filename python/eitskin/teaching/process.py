@@ -7,8 +7,6 @@ factored once; each row's own term is of rank one (Sherman and Morrison). Leavin
 nothing more: its residual is A^-1 (y - a o mean) / diag(A^-1).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

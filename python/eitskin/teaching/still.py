@@ -8,8 +8,6 @@ and .93, 9.5 mm, which an update mends; another skin of the same make 0. Places 
 shifted do not change an untouched frame, and remain unseen.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Presses in, a model and an honest report out."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 from typing import Any

@@ -11,8 +11,6 @@ the full one, is tried on presses that it did not know, solved by the C core, an
 taken only where it is better by more than chance.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import exp, log
 from typing import Any

@@ -1,8 +1,6 @@
 """A configuration: every choice between a skin and its touches that trades accuracy for cost, as
 one frozen value."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
@@ -175,8 +173,8 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
 
 
 def build_settings(
-    one: Configuration, skin: Skin, mask_threshold: float | None = None
-) -> BuildSettings:
+    one: Configuration, skin: "Skin", mask_threshold: float | None = None
+) -> "BuildSettings":
     """How the model of a configuration is built; its solver's settings and t become the model's
     defaults, as far as a model has them: not the gap, a limit of MACs, the warm start and the
     sweeps."""

@@ -1,8 +1,6 @@
 """A budget or an accuracy where a model is given already: the solver's settings of a measured point
 that it can take."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from eitskin.core.results import Options

@@ -1,8 +1,6 @@
 """From a chosen point to what a user does with it: a model with the settings inside, and the
 options for the rest."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -140,7 +138,7 @@ def _time_line(board: str, solve_us: float, most_us: float, point: Point) -> str
 
 
 def write_model(
-    path: Path, point: Point, skin: Skin, protocol: Protocol, progress: Progress | None = None
+    path: Path, point: Point, skin: Skin, protocol: Protocol, progress: "Progress | None" = None
 ) -> int:
     """Build and write the model of a point for ``skin``, the solver's settings and t as its
     defaults; returns its bytes. ``progress`` as ``build_model``.

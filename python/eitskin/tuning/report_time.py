@@ -7,8 +7,6 @@ later on average; the period from frame to frame is the longer of scan and solve
 touches; a host is sent rows.
 """
 
-from __future__ import annotations
-
 from eitskin.device.bandwidth import (
     BITS_A_BYTE,
     PACKET_BYTES,

@@ -1,7 +1,5 @@
 """The demo as a picture."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eitskin.demo.demo import TOUCHES, Demo

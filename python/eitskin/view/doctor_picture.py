@@ -1,8 +1,6 @@
 """The doctor's picture: reference against expectation, gains by pair, reciprocity, noise. Needs
 matplotlib."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

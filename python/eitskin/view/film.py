@@ -1,8 +1,6 @@
 """A short film of frames: the skin with its image and touches, one scale of colours throughout, in
 the frames' own time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,7 +88,7 @@ def thinned(count: int) -> list[int]:
     return [int(k) for k in np.unique(np.linspace(0, count - 1, most).round())]
 
 
-def _image(model: Model, panel: Panel, limit: float) -> Image:
+def _image(model: Model, panel: Panel, limit: float) -> "Image":
     """One frame; 256 colours, which take a third of the memory."""
     figure = panels_figure(model.skin, model.grid, [panel], limit=limit, large=False)
     figure.set_dpi(DPI)

@@ -1,7 +1,5 @@
 """Pictures of reconstructed frames, with the truth that they carry."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Texts of pictures: wrapped to a width in inches, and what marks mean."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache
@@ -86,7 +84,7 @@ class Key:
         rows = math.ceil(len(self.handles) / self._columns)
         self.height = 0.08 + 0.19 * rows if self.handles else 0.0
 
-    def draw(self, figure: Figure, top: float, middle: float = 0.5) -> None:
+    def draw(self, figure: "Figure", top: float, middle: float = 0.5) -> None:
         """With its upper edge at ``top`` of the figure's height, from above, around ``middle``."""
         if self.handles:
             figure.legend(

@@ -1,8 +1,6 @@
 """A scene at a glance: the touches' paths on the skin, and what the electrodes see of them over
 time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,7 +49,7 @@ def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
         save_picture(figure, path)
 
 
-def _draw_touches(axes: Axes, scene: Scene) -> None:
+def _draw_touches(axes: "Axes", scene: Scene) -> None:
     """Each touch's path, and its outline at up to twelve times, stronger where it presses
     harder."""
     from matplotlib import colormaps
@@ -76,7 +74,7 @@ def _draw_touches(axes: Axes, scene: Scene) -> None:
             axes.add_patch(Circle((one.x_mm[k], one.y_mm[k]), one.radius_mm[k], zorder=4, **style))
 
 
-def _draw_voltages(figure: Any, axes: Axes, scene: Scene, frames: Frames) -> None:
+def _draw_voltages(figure: Any, axes: "Axes", scene: Scene, frames: Frames) -> None:
     reference = frames.reference_v
     change = 100 * (frames.voltage_v - reference) / np.sqrt(np.mean(reference**2))
     limit = float(np.abs(change).max()) or 1.0

@@ -1,7 +1,5 @@
 """A board's frames as a picture: one frame at large, or a panel a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """A picture of what was taught: presses with where the others put them, error by number of presses,
 what each row explains. Needs matplotlib."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +14,7 @@ if TYPE_CHECKING:
 GIVEN, FOUND, STRANGE = "#1f5f99", "#b0b7bd", "#c2410c"
 
 
-def draw_taught(path: str | Path, taught: Taught) -> None:
+def draw_taught(path: str | Path, taught: "Taught") -> None:
     """Write the picture to ``path`` (.png, .pdf, .svg).
 
     Raises:

@@ -1,7 +1,5 @@
 """A template in true size to lay on the skin: its outline, its electrodes, and where to press."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,7 +74,7 @@ def _page_for(size_mm: FloatArray) -> FloatArray:
     return min(pages, key=lambda page: float(np.prod(np.ceil(size_mm / (page - 2 * MARGIN_MM)))))
 
 
-def _draw(axes: Axes, skin: Skin, place_mm: FloatArray, corner: FloatArray, page: str) -> None:
+def _draw(axes: "Axes", skin: Skin, place_mm: FloatArray, corner: FloatArray, page: str) -> None:
     axes.set_xticks([])
     axes.set_yticks([])
     for spine in axes.spines.values():

@@ -1,7 +1,5 @@
 """One skin with its image and touches on matplotlib axes, for notebooks and figures of your own."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from io import BytesIO
 from typing import TYPE_CHECKING
@@ -27,8 +25,8 @@ def draw_touches(
     *,
     true: Sequence[TrueTouch] = (),
     title: str = "",
-    ax: Axes | None = None,
-) -> Axes:
+    ax: "Axes | None" = None,
+) -> "Axes":
     """The skin of ``model`` with an ``image`` (n,) in S/m, touches found (crosses) and ``true``
     (circles), on ``ax``, or on axes of a new figure. Returns the axes.
 

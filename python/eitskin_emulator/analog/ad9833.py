@@ -14,8 +14,6 @@ hold what no program may rely on: here RESET clear and a frequency of 1 kHz. Wha
 linear.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

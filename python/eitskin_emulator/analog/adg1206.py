@@ -7,8 +7,6 @@ address that changes while its enable is high, or sooner after it went low than 
 takes to open (tOFF(EN)), may join two electrodes: both are recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ The converter's transfer is ideal: code k from k - 1/2 to k + 1/2 steps of VREF 
 beyond. No noise: that is the scene's.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

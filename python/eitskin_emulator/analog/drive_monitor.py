@@ -9,8 +9,6 @@ sentence:
   allowed it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.analog.ad9833 import B28, RESET, Ad9833

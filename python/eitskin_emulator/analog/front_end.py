@@ -4,8 +4,6 @@ The amplitude goes from one row's to the next one's as exp(-t / tau), tau = 1.5 
 skin and amplifier as one first-order lag. Sixteen microseconds leave 2e-5 of a step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -12,8 +12,6 @@ Electrodes that are no row of the scene's protocol, nor one with pairs exchanged
 give 0 V (counted in ``unknown_rows``); so does a pair that is not joined.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Protocol as TypingProtocol
 

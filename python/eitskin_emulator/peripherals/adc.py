@@ -9,8 +9,6 @@ reads a register of ADC or DMA, or when the multiplexers switch; a program that 
 sees them late.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,8 +1,6 @@
 """ADC2, one conversion at a time, started by the program and waited for (RM0410 chapter 15); its
 registers lie behind ADC1's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.clocktime import BoardClock, period_ticks

@@ -8,8 +8,6 @@ flags stand is not enabled (8.3.18 asks to clear them first). Transfers take no 
 FIFO, bursts and memory to memory are not modelled.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.memory import Memories
@@ -35,7 +33,7 @@ REQUESTS = {
 class DmaStream:
     """One stream of a DMA."""
 
-    def __init__(self, dma: Dma, number: int) -> None:
+    def __init__(self, dma: "Dma", number: int) -> None:
         self.dma, self.number = dma, number
         self.control = self.left = self.whole = self.peripheral = self.memory0 = self.memory1 = 0
         self.fifo = 0x21

@@ -4,8 +4,6 @@ DWT_LAR, and TRCENA turns it on.
 It counts the processor's cycles as the board's clock does, sleep included.
 """
 
-from __future__ import annotations
-
 from eitskin_emulator.clocktime import BoardClock
 from eitskin_emulator.record import Record
 

@@ -1,7 +1,5 @@
 """External interrupts (RM0410 chapter 11): line 16 alone, the supply's detector, on its rise."""
 
-from __future__ import annotations
-
 from eitskin_emulator.peripherals.nvic import Nvic
 from eitskin_emulator.peripherals.registers import Registers
 from eitskin_emulator.record import Record

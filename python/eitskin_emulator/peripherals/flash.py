@@ -9,8 +9,6 @@ that holds a bank is registers to the processor; the program's own 256 KB cannot
 resets; OPTCR1 is read only. A loss of power never falls into an erase: that is one step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.clocktime import TICKS_PER_US

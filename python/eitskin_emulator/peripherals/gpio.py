@@ -5,8 +5,6 @@ Levels change at once. Not modelled: open drain (recorded), speeds, and the anal
 pin in a wrong mode.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.clocktime import BoardClock

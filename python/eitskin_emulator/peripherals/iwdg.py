@@ -1,8 +1,6 @@
 """The independent watchdog (RM0410 chapter 30), from the 32 kHz LSI; a written PR or RLR is busy
 for five of its periods."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.clocktime import BoardClock, period_ticks

@@ -8,8 +8,6 @@ is not found. Attributes (cached or not) serve ``cached``; execute-never and unp
 not enforced.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from eitskin_emulator.memory import ITCM_BYTES, RAM, RAM_BYTES, Memories

@@ -6,8 +6,6 @@ high: a flag that a handler forgets brings it back for ever. The STM32F7 has 110
 levels (the upper four bits of a priority).
 """
 
-from __future__ import annotations
-
 from eitskin_emulator.cpu import RegisterSet
 
 NMI, HARD_FAULT, MEMORY_FAULT, BUS_FAULT, USAGE_FAULT = 2, 3, 4, 5, 6

@@ -7,8 +7,6 @@ NMI (5.2.7). Not modelled: PLLSAI, PLLI2S, low-power modes.
 Peripheral clocks come from the buses (DCKCFGR2 = 0).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US, BoardClock

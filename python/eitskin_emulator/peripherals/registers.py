@@ -1,7 +1,5 @@
 """A peripheral of plain 32-bit registers: what is written is kept, what is unknown is recorded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from eitskin_emulator.record import Record

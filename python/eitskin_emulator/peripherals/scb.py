@@ -5,8 +5,6 @@ Faults go to their own handlers where SHCSR enables them, else to HardFault; one
 the processor up. Cache maintenance does nothing, for there are no caches.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.memory import FLASH_ITCM

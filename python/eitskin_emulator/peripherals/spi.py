@@ -5,8 +5,6 @@ The FIFO holds 32 bits. Modelled: CPOL, CPHA, BR, DS, LSBFIRST, SPE, TXE, FTLVL,
 reads 0, and interrupts, DMA and CRC are not modelled. NSS is the program's own pin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """SysTick (ARMv7-M manual B3.3), from the processor's clock or an eighth of it."""
 
-from __future__ import annotations
-
 from eitskin_emulator.clocktime import BoardClock
 from eitskin_emulator.peripherals.nvic import SYSTICK, Nvic
 from eitskin_emulator.schedule import Event, Schedule

@@ -8,8 +8,6 @@ modes reset, gated and trigger by an internal trigger. A trigger arrives without
 synchronisation takes on silicon.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -181,7 +179,7 @@ class Timer(Registers):
     def _slave_mode(self) -> int:
         return self.values[SMCR] & 7 | (self.values[SMCR] >> 16 & 1) << 3
 
-    def _listens_to(self) -> Timer | None:
+    def _listens_to(self) -> "Timer | None":
         if not self._slave_mode:
             return None
         master = self.masters.get(self.values[SMCR] >> 4 & 7)

@@ -8,8 +8,6 @@ until the shifter takes it. Not modelled: oversampling by 8, parity, 7 or 9 bits
 control, noise detection.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from eitskin_emulator.clocktime import BoardClock, period_ticks

@@ -5,8 +5,6 @@ Each drive has a strength of its own, since a touch that lands grows from drive 
 place is common (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

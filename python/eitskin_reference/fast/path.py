@@ -6,8 +6,6 @@ gain, or a new touch. The whole-frame solver stays as it is: frames are brought 
 before it sees them (``aligned``), and its touches confirm, seed and correct these (``confirm``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -1,8 +1,6 @@
 """What a touch does to one drive's rows, from the model's fields: the numpy reference of
 csrc/src/fast/rows.c."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

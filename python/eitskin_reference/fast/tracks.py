@@ -6,8 +6,6 @@ touches share rows (Bar-Shalom, Li and Kirubarajan, Estimation with Applications
 Navigation, Wiley 2001, ch. 10).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

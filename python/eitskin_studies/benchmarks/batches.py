@@ -1,8 +1,6 @@
 """Batches of frames over threads beside one frame after another: frames a second, in turns in one
 run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial

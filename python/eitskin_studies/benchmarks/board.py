@@ -5,8 +5,6 @@ Instructions are exact. Times on silicon are an estimate from them: one a cycle 
 Cortex-M7 issues up to two a cycle and waits for flash and memory; nobody has measured it here.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -5,8 +5,6 @@ Every frame is compared with the same one without the fault: same scene, contact
 reference. Rules and thresholds were chosen under other seeds (docs/reference/diagnostics.md).
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass

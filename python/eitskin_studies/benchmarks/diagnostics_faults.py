@@ -1,7 +1,5 @@
 """What can be wrong with a frame, and by which name it ought to be called."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The results of ``eitskin bench diagnostics`` as text, and for docs/results/diagnostics.md."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from eitskin_studies.benchmarks.diagnostics import (

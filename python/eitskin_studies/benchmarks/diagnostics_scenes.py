@@ -5,8 +5,6 @@ Scene k has the contacts of its own session, +-20 %, and its fault at electrode 
 used alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache

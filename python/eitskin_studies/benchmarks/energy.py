@@ -7,8 +7,6 @@ wait are compared: as the firmware does, with processor and generator stopped, a
 supply switched off too.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,8 +1,6 @@
 """One frame through cffi: how long, how much of it outside C, beside the numpy reference and, where
 installed, pyEIT. Interleaved runs, ratios."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 from collections.abc import Callable

@@ -7,8 +7,6 @@ run in turns on one thread, whose own time is taken, so that other work on the m
 little.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -7,8 +7,6 @@ respect to pixels. Runs are interleaved, and medians compared. The cosine betwee
 the pixels, shows that they compute the same thing.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.metadata
 import importlib.util

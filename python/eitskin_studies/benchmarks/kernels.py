@@ -7,8 +7,6 @@ each sum is fixed. Each of the three is measured in the same run, in turns; the 
 of the three.
 """
 
-from __future__ import annotations
-
 import subprocess
 import tempfile
 from dataclasses import asdict, dataclass

@@ -6,8 +6,6 @@ is the simulated board's, update, solve and link the emulated one's, host this m
 drawn from the parts at random.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterator, Sequence

@@ -1,8 +1,6 @@
 """What the live page costs: the server's share of a core, and the time from a frame to its pixels
 in a browser, with no page, one, and several."""
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

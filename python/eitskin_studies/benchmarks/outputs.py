@@ -7,8 +7,6 @@ packet takes at the port's rate. Host is what this machine takes from bytes to a
 the frame to another process that has read it; both by the clock of this machine.
 """
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

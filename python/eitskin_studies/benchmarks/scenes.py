@@ -6,8 +6,6 @@ of its own, once, before timing. The dataset's scenes are drawn, solved, measure
 ``eitskin dataset`` does it.
 """
 
-from __future__ import annotations
-
 import statistics
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace

@@ -6,8 +6,6 @@ judged in float64; only that is timed, in processor time of the one thread. So n
 stopping rule that is too careful.
 """
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext

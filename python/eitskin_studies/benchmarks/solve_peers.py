@@ -5,8 +5,6 @@ A solver has a ladder of settings, from the least effort to the most; the benchm
 that is exact enough.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

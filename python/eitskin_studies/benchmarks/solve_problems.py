@@ -6,8 +6,6 @@ Each is  minimise |y - S x|^2 / 2 + lambda sum(x)  over x >= 0, S (r, n) as the 
 problem.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

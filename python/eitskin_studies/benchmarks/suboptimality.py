@@ -6,8 +6,6 @@ training scenes, and the mean MIoU and the mean suboptimality are those of test 
 model.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any

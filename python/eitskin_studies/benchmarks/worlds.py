@@ -1,11 +1,9 @@
 """``eitskin bench worlds``: touches counted in sets of other worlds by the C core."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from eitskin.config import nearest
 from eitskin.core.results import Options
@@ -84,7 +82,7 @@ def option_values(changes: tuple[str, ...]) -> dict[str, Any]:
     Raises:
         UsageError: one is not such a pair, or its name is unknown.
     """
-    kinds = {one.name: str(one.type) for one in fields(Options)}
+    kinds = get_type_hints(Options)
     values: dict[str, Any] = {}
     for change in changes:
         name, equals, text = change.partition("=")
@@ -93,13 +91,13 @@ def option_values(changes: tuple[str, ...]) -> dict[str, Any]:
         try:
             values[name] = _value(text, kinds[name])
         except ValueError:
-            raise UsageError(f"--option {change}: {text!r} is no {kinds[name]}") from None
+            raise UsageError(f"--option {change}: {text!r} is no {kinds[name].__name__}") from None
     return values
 
 
-def _value(text: str, kind: str) -> Any:
-    if kind == "bool":
+def _value(text: str, kind: type[Any]) -> Any:
+    if kind is bool:
         if text.lower() not in ("true", "false", "1", "0"):
             raise ValueError(text)
         return text.lower() in ("true", "1")
-    return {"int": int, "float": float}.get(kind, str)(text)
+    return kind(text)

@@ -1,7 +1,5 @@
 """``eitskin bench``: the emulated board, the live page and the sinks behind them."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

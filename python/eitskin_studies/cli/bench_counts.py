@@ -1,7 +1,5 @@
 """``eitskin bench``: what is counted rightly: diagnostics, gestures, touches in other worlds."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

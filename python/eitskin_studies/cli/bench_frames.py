@@ -1,7 +1,5 @@
 """``eitskin bench``: a frame, the solve, batches, kernels and growth on this computer."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

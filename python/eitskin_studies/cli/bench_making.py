@@ -1,7 +1,5 @@
 """``eitskin bench``: building models and simulating scenes on this computer."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Any

@@ -1,7 +1,5 @@
 """What the files of ``eitskin bench`` share: a page to fill, limits of numbers, a bar."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -31,7 +29,7 @@ def show(
     options: argparse.Namespace,
     result: Any,
     text: str,
-    filling: Filling | None = None,
+    filling: "Filling | None" = None,
     page: str = "benchmarks",
 ) -> int:
     """Fill the page that ``options.page`` names, if any, then print ``result`` as text or JSON."""

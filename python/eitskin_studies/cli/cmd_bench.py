@@ -1,8 +1,6 @@
 """``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes,
 boards, energy, kernels, growth, batches; what diagnostics are worth, and gestures."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from eitskin_studies.cli import bench_boards, bench_counts, bench_frames, bench_making

@@ -1,7 +1,5 @@
 """``eitskin compare``: reconstructions side by side on the same simulated scenes."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """``eitskin dataset``: many scenes drawn from one."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """``eitskin draw effect | touch | wiring | live | examples``: the documentation's pictures."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """``eitskin study NAME``: the paper's experiments, and past them."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

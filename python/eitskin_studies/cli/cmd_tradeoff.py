@@ -1,7 +1,5 @@
 """``eitskin tradeoff run``: what accuracy costs in time."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

@@ -14,8 +14,6 @@ matrix products, all of J's rows taken; what is made once for a skin is not coun
     plain FISTA              min 1/2 |J x - dv|^2 + lambda |x|_1, signed or x >= 0, K iterations
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 """This project's own reconstruction under comparison: the C core that the board runs, on the
 host."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

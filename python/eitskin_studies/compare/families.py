@@ -6,8 +6,6 @@ frames of a session before its difference frames, and ``touches`` finds position
 others have theirs read off the image.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable

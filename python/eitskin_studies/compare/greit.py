@@ -12,8 +12,6 @@ Jacobian of the sheet instead of a solved model, the noise is white, and w is ch
 instead of for a noise figure.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

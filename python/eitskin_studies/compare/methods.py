@@ -1,7 +1,5 @@
 """The methods that are compared: baselines, the C core, and those of other packages."""
 
-from __future__ import annotations
-
 from importlib.metadata import entry_points
 
 from eitskin.errors import UsageError

@@ -4,8 +4,6 @@ pyEIT makes images on the triangles of a mesh: a pixel has the value of the tria
 middle lies.
 """
 
-from __future__ import annotations
-
 import importlib
 
 import numpy as np

@@ -7,8 +7,6 @@ threshold; with it goes the threshold. Positions come from the image by one rule
 itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any

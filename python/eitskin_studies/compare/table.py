@@ -1,8 +1,6 @@
 """A comparison as text, as JSON values and as CSV: always with the conditions that the numbers
 depend on."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -7,8 +7,6 @@ however many jobs make it and in which order. ``dataset.json`` says what the fol
 with other settings refuses to continue it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -7,8 +7,6 @@ of a dataset depends on (its description, the dataset's seed, k) only. Every ran
 its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any

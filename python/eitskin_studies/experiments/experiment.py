@@ -1,8 +1,6 @@
 """What an experiment is, and the workspace that it works at: seeded, resumable, every result kept
 as it comes."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Callable, Iterable, Mapping

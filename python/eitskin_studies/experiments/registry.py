@@ -1,7 +1,5 @@
 """The experiments by name; each is imported when it is run."""
 
-from __future__ import annotations
-
 import importlib
 from typing import cast
 

@@ -1,8 +1,6 @@
 """Sets solved in parts, and models judged scene by scene: what experiments on skins and scans
 share."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

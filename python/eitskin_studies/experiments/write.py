@@ -1,7 +1,5 @@
 """What an experiment leaves: data, tables, pictures, and the marked places of its page."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

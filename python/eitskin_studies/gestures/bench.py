@@ -1,7 +1,5 @@
 """``eitskin bench gestures``: gestures of simulated fingers, told by the C core and judged."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A session is a list of gestures with quiet time between them. Timing, place, spe
 radius of every finger are drawn; a gesture depends on (seed, role, session, its number) only.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Told events against what was done: right, invented, and how late."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -63,7 +61,7 @@ class GestureCount:
         """Of them."""
         return sum(n for kind, n in self.right.items() if EXPECTED[kind])
 
-    def add(self, other: GestureCount) -> None:
+    def add(self, other: "GestureCount") -> None:
         """Count ``other`` in."""
         self.done += other.done
         self.right += other.right

@@ -5,8 +5,6 @@ takes the whole frame: row after row is read, and each row's voltage is interpol
 the two solved states around its moment.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

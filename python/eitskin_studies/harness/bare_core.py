@@ -1,7 +1,5 @@
 """Calls of the C core with nothing of Python around them, for clocks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

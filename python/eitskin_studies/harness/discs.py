@@ -1,7 +1,5 @@
 """Equal discs at least so far apart, and the perfect image of discs on pixels."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

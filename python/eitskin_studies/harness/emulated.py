@@ -5,8 +5,6 @@ instructions counted exactly.
 module.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """What ``tests/emulated/frames_m7.c`` can be told to do, and the files that tell it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The live page served by a process of its own, and a browser that shows it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The line that says where numbers were measured."""
 
-from __future__ import annotations
-
 import platform
 
 import numpy as np

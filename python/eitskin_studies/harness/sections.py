@@ -4,8 +4,6 @@ A mark is ``<!-- NAME -->``; its place ends at ``<!-- end NAME -->``. ``pages.to
 of a table a page shows.
 """
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Mapping, Sequence

@@ -5,8 +5,6 @@ Contacts, noise and drift depend on the seed and the role of the touches only, a
 ``eitskin.scene.simulate``: a set of the same name has the same frames wherever it is used.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -1,7 +1,5 @@
 """What an SNR means in every study: 20 log10(rms(V0) / sigma), of measurements of 80 samples."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Results as they come, a JSON line each: a run that is cut, even by kill -9, goes on from its last
 whole line."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Many numbers to a few: mean, worst tenth, median, 95th percentile, and how sure the mean is."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ The fraction t of touches is not the one that MIoU uses; it is that of the highe
 counted scenes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

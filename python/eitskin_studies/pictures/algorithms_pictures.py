@@ -1,8 +1,6 @@
 """The experiment ``algorithms`` as pictures: images, what a threshold makes of them, curves, bars
 beside the paper's."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -227,7 +225,7 @@ def _panels(matplotlib: Any, rows: int, columns: int) -> tuple[Any, Any]:
 
 
 def _show_cells(
-    axes: Axes, raster: metrics.Raster, truth: npt.NDArray[np.bool_], mask: npt.NDArray[np.bool_]
+    axes: "Axes", raster: metrics.Raster, truth: npt.NDArray[np.bool_], mask: npt.NDArray[np.bool_]
 ) -> None:
     """Hits, false and missed cells in their colours, the truth's edge drawn in."""
     from matplotlib.colors import ListedColormap

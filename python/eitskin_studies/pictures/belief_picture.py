@@ -1,7 +1,5 @@
 """Belief: the calibration curve of ``confidence``, and how many places lie in their ellipses."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eitskin.view.panels import save_picture

@@ -1,7 +1,5 @@
 """A comparison as pictures: test scenes as each method shows them, and MIoU over the threshold."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

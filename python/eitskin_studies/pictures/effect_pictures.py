@@ -6,8 +6,6 @@ docs/reference/effects/README.md shows all. ``eitskin draw effect NAME -o PNG`` 
 picture.
 """
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -137,7 +135,7 @@ def press_frames(
     return simulate_frames(compiled).voltage_v, compiled.parameters, session
 
 
-def draw_difference(axes: Axes, change_v: FloatArray, frame_v: FloatArray) -> None:
+def draw_difference(axes: "Axes", change_v: FloatArray, frame_v: FloatArray) -> None:
     rows = np.arange(len(change_v))
     axes.axhline(0, color=LIGHT, linewidth=0.8)
     axes.plot(rows, 1e3 * change_v, color=STRONG, linewidth=0.9)
@@ -146,7 +144,7 @@ def draw_difference(axes: Axes, change_v: FloatArray, frame_v: FloatArray) -> No
     axes.set_title(f"in a frame: rms {rms:.3g} mV of {whole:.3g} mV")
 
 
-def save_small_png(figure: Figure, path: str | Path) -> None:
+def save_small_png(figure: "Figure", path: str | Path) -> None:
     """With a palette, which takes a third of the bytes (Pillow comes with matplotlib)."""
     from PIL import Image
 

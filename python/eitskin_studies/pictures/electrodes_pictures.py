@@ -1,7 +1,5 @@
 """How well touches are found over the number of electrodes, and by pattern."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

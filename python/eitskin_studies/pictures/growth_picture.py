@@ -1,7 +1,5 @@
 """How a frame's cost grows, as a picture: a panel for each thing that is varied."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eitskin.view.panels import save_picture

@@ -1,8 +1,6 @@
 """The experiment ``homogeneous`` as pictures: untouched skins' waveforms, and each value's distance
 from the mean over drives."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """When presses are reported: how many of them by what time after the contact."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The live page before the emulated board, as a moving picture."""
 
-from __future__ import annotations
-
 import base64
 import io
 import time

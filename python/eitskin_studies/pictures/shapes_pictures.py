@@ -1,8 +1,6 @@
 """Skins of several shapes: how sensitive they are where, one reconstruction, and which touches were
 found."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

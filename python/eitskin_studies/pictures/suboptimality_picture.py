@@ -1,7 +1,5 @@
 """Suboptimality of the objective against MIoU of the image, a line a solver."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from eitskin.view.panels import save_picture

@@ -1,8 +1,6 @@
 """Measured tank frames as each method shows them, and MIoU over the threshold, simulated and
 measured."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

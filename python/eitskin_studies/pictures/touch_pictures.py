@@ -4,8 +4,6 @@ On the right stands the frame of a press on the paper's skin: of a law minus the
 shape minus that of the disc. ``eitskin draw touch NAME -o PNG`` makes one picture.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,7 +52,7 @@ def draw_touch(path: str | Path, name: str) -> None:
         save_small_png(figure, path)
 
 
-def _draw_law(axes: Axes, name: str) -> None:
+def _draw_law(axes: "Axes", name: str) -> None:
     """Contrast over what drives it."""
     most = GRAMS if DRIVING_KEY[name] == "grams" else 1.0
     drive = np.linspace(0, most, 200)
@@ -64,7 +62,7 @@ def _draw_law(axes: Axes, name: str) -> None:
     axes.set_ylim(bottom=0)
 
 
-def _draw_shape(axes: Axes, name: str) -> None:
+def _draw_shape(axes: "Axes", name: str) -> None:
     """The change from above, for a radius of 1."""
     shape = named_shape(name)
     at = np.linspace(-2.5, 2.5, 201)

@@ -1,8 +1,6 @@
 """Pictures of touches in time: what is reported a stream without and with tracking, and what
 tracking is worth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,7 +20,7 @@ TRUE = "#c8c8c8"
 
 
 def draw_stream_told(
-    path: Path, stream: TouchStream, told: Mapping[str, Sequence[Sequence[Touch]]], note: str
+    path: Path, stream: "TouchStream", told: Mapping[str, Sequence[Sequence[Touch]]], note: str
 ) -> None:
     """x and y of every touch by frame, a colour an id, over the true places; a row of panels for
     each way in ``told``.
@@ -73,7 +71,7 @@ def draw_stream_told(
 
 def draw_worth(
     path: Path,
-    counts: Mapping[tuple[int, int, str], TrackCount],
+    counts: "Mapping[tuple[int, int, str], TrackCount]",
     snrs_db: Sequence[int],
     speeds: Sequence[int],
 ) -> None:

@@ -5,8 +5,6 @@ Connectors and pins after ST's UM1974, tables 18 and 25: the Zio connectors CN7 
 the morpho ones CN11 and CN12 are holes in the board, with every pin of the processor.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 MULTIPLEXERS = ("I+", "I-", "V+", "V-")

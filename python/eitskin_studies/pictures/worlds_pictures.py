@@ -1,7 +1,5 @@
 """Other worlds: how many scenes are counted exactly in each set, and what goes wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """How good a configuration is on a session: images and discs against the truth, counts, positions,
 forces, and their cost."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

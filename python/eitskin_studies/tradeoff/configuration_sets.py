@@ -1,7 +1,5 @@
 """Sets of configurations: from a TOML file, and checked."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

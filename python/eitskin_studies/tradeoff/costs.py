@@ -1,7 +1,5 @@
 """What a configuration costs without running it: flash, RAM, and the time to measure a frame."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from eitskin.core.engine import CoreEngine

@@ -1,8 +1,6 @@
 """The configurations that ``eitskin tradeoff run`` measures: points over the scale, and one knob
 turned at a time around two."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from typing import Any
 

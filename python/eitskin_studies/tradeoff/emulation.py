@@ -1,8 +1,6 @@
 """Instructions of a frame on a Cortex-M7, counted exactly by QEMU (mps2-an500, -icount), where
 toolchain and sources are."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,8 +1,6 @@
 """A configuration's model and core: each model is made once, from one Jacobian a grid on one
 mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

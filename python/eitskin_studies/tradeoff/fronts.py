@@ -1,7 +1,5 @@
 """Fronts as ``tradeoff run`` makes them: what nothing beats, estimates, files of results."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path

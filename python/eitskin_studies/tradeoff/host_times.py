@@ -1,8 +1,6 @@
 """Microseconds of a frame on this host: solve and touches in C, all configurations interleaved,
 medians."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from time import perf_counter_ns
 from typing import Any

@@ -1,7 +1,5 @@
 """The tables of docs/results/tradeoff.md, written by the command between the page's marks."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The scenes "train" and "random" are those of ``eitskin compare`` under the same 
 numbers stand beside those of configurations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from time import perf_counter_ns
 from typing import Any

@@ -1,8 +1,6 @@
 """The whole measurement: train, score, count and time every configuration; each result is kept as
 it comes."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

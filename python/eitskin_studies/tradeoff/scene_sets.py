@@ -5,8 +5,6 @@ The sets "train" and "random" are those of ``eitskin compare``: the same scenes,
 under the same seed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

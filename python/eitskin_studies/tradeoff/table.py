@@ -1,7 +1,5 @@
 """A front as text and CSV."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence

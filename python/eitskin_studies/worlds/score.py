@@ -5,8 +5,6 @@ many as possible, then the nearest; a scene is exact where nothing is left over 
 Without touches a scene is exact where none is reported.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

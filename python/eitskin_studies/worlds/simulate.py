@@ -6,8 +6,6 @@ and outlines out of round move its nodes. Each part is drawn from a stream of it
 the family, the set and the part: "tuning" and "judging" share nothing under any seed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace

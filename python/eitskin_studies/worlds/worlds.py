@@ -1,7 +1,5 @@
 """What a set of another world says: which touches there are, and what is wrong with the skin."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 Range = tuple[float, float]

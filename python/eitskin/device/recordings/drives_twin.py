@@ -1,8 +1,6 @@
 """This host's touches after each drive, from recorded frames: kept in step with a board's, and
 compared with what it sent, bit for bit."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """Whether a board computes what this host does: its raw frames through the same core, image bits
 and touches compared with what it sent."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path

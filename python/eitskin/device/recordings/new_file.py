@@ -1,8 +1,6 @@
 """The file of a recording or of a sink: begun whole, locked against other recorders, brought to the
 disk every second."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 import threading

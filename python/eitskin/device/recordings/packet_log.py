@@ -1,8 +1,6 @@
 """Every packet of a session kept in memory, the tare's included, for whoever looks at them
 afterwards."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 

@@ -1,7 +1,5 @@
 """Raw frames off a board, and frames for everything that reads frames files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -1,8 +1,6 @@
 """The C codec through cffi: packets to bytes and bytes to packets, with every byte that is no
 packet counted."""
 
-from __future__ import annotations
-
 import zlib
 from collections import deque
 from dataclasses import asdict, dataclass, replace

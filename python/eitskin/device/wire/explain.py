@@ -1,8 +1,6 @@
 """A board's numbers in words: replies, faults, statuses; each says what to do where something can
 be done."""
 
-from __future__ import annotations
-
 from eitskin.core.engine import load_core
 from eitskin.device.wire.layout import Command
 from eitskin.device.wire.link_table import FaultCode, PacketType, Quality, ReplyStatus

@@ -2,8 +2,6 @@
 tables/make_tables.py from tables/link.toml.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from typing import Annotated

@@ -2,8 +2,6 @@
 ``link_table``. Their bytes are in ``payloads``; commands, the other way, in ``commands``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -1,8 +1,6 @@
 """Payloads from a board as bytes: fields by their layouts in ``link_table``, then what follows
 them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from typing import Any, NamedTuple, TypeVar

@@ -5,8 +5,6 @@ its number. A board's numbers begin again when it restarts, which it says by an 
 since that INFO may itself be a duplicate, the packet after it decides.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from typing import Protocol
 

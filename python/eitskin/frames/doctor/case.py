@@ -1,8 +1,6 @@
 """The case before the checks: frames in one order, the prediction to hold them against, which
 channels to trust."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any

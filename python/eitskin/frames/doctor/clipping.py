@@ -1,8 +1,6 @@
 """Saturated channels (many readings exactly at the greatest value) and stuck ones (quiet frames
 that never change)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

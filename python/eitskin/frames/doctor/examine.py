@@ -1,8 +1,6 @@
 """The examination: every check in its turn, each relying only on channels that the earlier ones
 left trusted."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Are all voltages numbers, and is there a signal at all?"""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

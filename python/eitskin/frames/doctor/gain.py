@@ -1,8 +1,6 @@
 """The gain of each channel: how the reference compares with the homogeneous frame, by channel and
 by pair."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How badly a predicted frame explains the reference, and which short circuit explains it best."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 

@@ -6,8 +6,6 @@ noise over all channels. Drift: by how much the common gain of the frame, <V, V0
 changes along a straight line through all quiet frames.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from eitskin.frames.doctor.case import (

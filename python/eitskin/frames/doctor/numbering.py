@@ -6,8 +6,6 @@ quiet frame is the same for every rotation and for both directions; there this c
 only a touch tells (orientation.py).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

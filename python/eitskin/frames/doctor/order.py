@@ -1,8 +1,6 @@
 """In which order do the channels stand, and with which sign? Each hypothesis is compared with the
 homogeneous frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -4,8 +4,6 @@ One touch alone leaves a mirror image about its own diameter; two that are no mi
 other leave nothing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from eitskin.frames.doctor.case import Case, FloatArray, cosine, rms

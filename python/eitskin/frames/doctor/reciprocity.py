@@ -1,8 +1,6 @@
 """Reciprocity: exchanging the drive and the measuring pair must not change the voltage, whatever is
 inside the skin."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from eitskin.frames.doctor.case import Case, rms, short_list

@@ -1,8 +1,6 @@
 """Which options of ``eitskin import`` repair bad channels, and how the remedies of several findings
 become one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,8 +1,6 @@
 """What the doctor says: findings with evidence and remedy, what could not be told, and the numbers
 measured."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite

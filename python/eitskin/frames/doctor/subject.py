@@ -1,8 +1,6 @@
 """What the doctor examines: a frames file, or a source read under each order that its channels
 could stand in."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

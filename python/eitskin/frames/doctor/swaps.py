@@ -6,8 +6,6 @@ short circuit leaves. Three electrodes in a ring (each in the place of the next)
 the start for this search.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import combinations
 

@@ -6,8 +6,6 @@ that drive by it, or that measure by it, stand out or are silent, and all channe
 if nothing had happened.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any

@@ -7,8 +7,6 @@ the signal moves over many steps (Bennett, Bell Syst. Tech. J. 27, 1948). What g
 times LSB, in V.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

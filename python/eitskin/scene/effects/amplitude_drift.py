@@ -6,8 +6,6 @@ root of time; Allan, Proc. IEEE 54, 1966) on top. All voltages scale alike. I(t)
 + walk), t from the session's first frame, where it is 0.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import sqrt
 

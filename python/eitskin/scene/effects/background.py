@@ -6,8 +6,6 @@ of ``spread``, so always above 0; dividing by its mean over the area makes the m
 skin's description says.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import log, sqrt
 

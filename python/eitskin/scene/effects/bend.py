@@ -9,8 +9,6 @@ over R is left; one on a base that does not give has its neutral layer there (0)
 the outer face for R above 0; the curved way is measured along the sheet.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import sqrt
 

@@ -5,8 +5,6 @@ term in the electrodes' balance: it adds [[1, -1], [-1, 1]] / R to their block o
 stays symmetric, so that reciprocity holds. R = 0 makes them one electrode.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 

@@ -8,8 +8,6 @@ different channels, so their difference tells the mismatch; a difference image r
 reference (dv / v) cancels it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

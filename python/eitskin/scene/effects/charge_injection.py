@@ -13,8 +13,6 @@ for a window T (an elementary integral); at frequency 0 the window's plain mean.
 electrode stays the same from row to row gets no charge. The voltage does not depend on the signal.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import exp, expm1, isclose, pi
 

@@ -9,8 +9,6 @@ voltage, often far above the difference that is measured; a balanced source keep
 ground.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

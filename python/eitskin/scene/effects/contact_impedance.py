@@ -12,8 +12,6 @@ Contacts may change after the tare, suddenly, as by a knock, or slowly, as by dr
 multiplied by exp(change p(t) n) with its own normal number n, p rising from 0 to 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -11,8 +11,6 @@ strain does to sheet and electrodes is as of ``stretch``, with free sides. A tar
 release is wrong for some tau.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import exp
 

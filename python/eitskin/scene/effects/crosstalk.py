@@ -9,8 +9,6 @@ number to a driven one gets 10^(dB / 20) of its potential, against the mean of a
 first and the last wire are not neighbours.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ and an input on it floats; both are taken to read 0 V in every row that uses the
 wobbling plug is off during a part of the time only.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -11,8 +11,6 @@ The whole sheet dries alike; time counts from the session's first frame, at whic
 described.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import exp
 

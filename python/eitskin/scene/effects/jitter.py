@@ -14,8 +14,6 @@ converter's SNR by its clock (Shinagawa, Akazawa and Wakimoto, IEEE J. Solid-Sta
 1990). Small signals get small errors.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import exp, expm1, pi, sqrt
 

@@ -7,8 +7,6 @@ the same, and rows of one number sample it at the frame rate r, where it shows a
 frequency |f - r round(f / r)|.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi, radians
 

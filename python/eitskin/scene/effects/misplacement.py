@@ -5,8 +5,6 @@ spread, drawn once; a reconstruction that assumes the described places then has 
 classical modelling error of absolute EIT; difference imaging cancels most of it).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

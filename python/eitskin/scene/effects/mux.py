@@ -10,8 +10,6 @@ exp(-dwell / tau) is left. The order of the scan therefore matters. The row befo
 last one of the same frame: the scan is taken as periodic.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import exp
 

@@ -6,8 +6,6 @@ exact frame V0 of the untouched skin with ideal electrodes: SNR_dB = 20 log10(rm
 over the protocol's rows.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ spread normal(), drawn once, in parts of the rms of the untouched frame V0. A di
 cancels it; behind a rectifier it decides which rows grow and which shrink when a finger presses.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

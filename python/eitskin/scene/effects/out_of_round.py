@@ -6,8 +6,6 @@ so that the area stays. Electrodes keep their parts of the rim. What a wrong out
 Kolehmainen, Lassas and Ola, SIAM J. Appl. Math. 66, 2005; difference imaging cancels most of it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import pi, sqrt
 

@@ -10,8 +10,6 @@ ideal shunts, and only the sheet has a phase. The demodulator gives the part in 
 current, or the magnitude with the sign of that part.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 

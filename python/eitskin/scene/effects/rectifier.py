@@ -6,8 +6,6 @@ acts on what the amplifier puts out, offset, common mode and noise included. A r
 far from 0 keeps its change, or gives the negative of it; one near 0 is folded.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ of the untouched skin with ideal electrodes. The characteristic is the same for 
 memory: equal rows stay equal.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ place (``scene/random_field.py``): the conductivity is multiplied by exp(spread 
 from 0 to 1. A difference image shows all of it, for the reference knows nothing of it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

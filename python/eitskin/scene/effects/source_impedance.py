@@ -8,8 +8,6 @@ driven pair, and what lies in series (two multiplexers' on-resistance). Where no
 the part in phase with the current is taken, in real arithmetic.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 

@@ -7,8 +7,6 @@ of its length. Touches stay on the material that they are on. To tare the stretc
 begin before the quiet frames (``at_s`` of -1000).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from eitskin.scene.change import part_at

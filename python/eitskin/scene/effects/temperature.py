@@ -6,8 +6,6 @@ because water becomes less viscous and ions move faster. T_0 is the temperature 
 has the conductivity in its description. Time counts from the session's first frame.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Single, double and triple touch by every method (the paper's Figs. 7 and 8), at fixed parameters
 and at each one's best."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from eitskin.fem.grid import grid_for

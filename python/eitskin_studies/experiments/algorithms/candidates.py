@@ -1,8 +1,6 @@
 """What is compared: each method with the parameters that it may have, and the one that it has where
 parameters are fixed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

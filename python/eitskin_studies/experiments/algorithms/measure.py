@@ -1,8 +1,6 @@
 """What is measured: curves of MIoU over the threshold, positions, counts and MACs, in parts that
 are kept as they come."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

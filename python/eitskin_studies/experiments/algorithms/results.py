@@ -1,7 +1,5 @@
 """Every method's numbers: at fixed parameters and threshold, and at its best."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

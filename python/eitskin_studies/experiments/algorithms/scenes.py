@@ -1,8 +1,6 @@
 """The scenes of this experiment: random touches, a set for each number of them, and one scene for
 each that is drawn by hand."""
 
-from __future__ import annotations
-
 from eitskin.scene.random_touches import TouchRules, TouchScene, TouchSet, TrueTouch, random_touches
 from eitskin.skin.outline import Outline
 

@@ -1,7 +1,5 @@
 """The results as tables, as sentences, and as plain values."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,8 +1,6 @@
 """Whether what the core says of its touches is true: how sure it is of each, where each is, and
 when the count is uncertain."""
 
-from __future__ import annotations
-
 import hashlib
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The tables of the study "belief"."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Touches on a skin that is stretched or bent, found by the model of the flat one."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 """More electrodes and other patterns on the paper's disk, at equal noise of a row and at equal time
 of a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial

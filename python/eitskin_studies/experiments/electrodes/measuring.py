@@ -1,8 +1,6 @@
 """Scans measured: frames of any pattern out of the scenes' transfer matrices, their models, and
 what is found with them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property

@@ -6,8 +6,6 @@ sum of its neighbours' pairs from a to b - 1, in drive and in measurement alike,
 of every neighbours' pair serves every pattern.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

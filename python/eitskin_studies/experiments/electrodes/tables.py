@@ -1,7 +1,5 @@
 """What was measured of electrodes and patterns, as tables."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

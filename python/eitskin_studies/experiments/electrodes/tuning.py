@@ -2,8 +2,6 @@
 scenes:
 patterns differ in how fast their singular values fall, and what suits one starves another."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product

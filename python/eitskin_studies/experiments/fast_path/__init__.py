@@ -1,8 +1,6 @@
 """Touches that land, move and lift while rows are measured: what the fast path says after each
 drive."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """Scenes beyond presses, swipes and pairs on the prebuilt skin: what else fingers do, and other
 scans and skins."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial

@@ -1,7 +1,5 @@
 """Scans in time: each row at its own instant, given to the fast path drive by drive."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -32,7 +30,7 @@ class Scan:
     frames: int
 
     @classmethod
-    def of(cls, fast: FastCore, lasts_s: float, drives: Sequence[int] = ()) -> Scan:
+    def of(cls, fast: FastCore, lasts_s: float, drives: Sequence[int] = ()) -> "Scan":
         """Whole frames for at least ``lasts_s``, of ``drives`` or all."""
         once = np.concatenate([fast.rows[d] for d in drives or order(fast)])
         frames = int(np.ceil(lasts_s / (ROW_S * len(once))))

@@ -1,8 +1,6 @@
 """Skins whose contacts were drawn, with drawn places on them, and what a scan measures there while
 touches land, move and lift: scenes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path

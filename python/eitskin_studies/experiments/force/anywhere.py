@@ -1,8 +1,6 @@
 """One load, anywhere: how readings of a load scatter over the skin, raw and after the calibration
 of ``eitskin calibrate``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,7 +41,7 @@ class Anywhere:
     macs: float
 
     @classmethod
-    def from_dict(cls, facts: dict[str, Any]) -> Anywhere:
+    def from_dict(cls, facts: dict[str, Any]) -> "Anywhere":
         """From the store."""
         raw, calibrated = (
             np.array(facts[name], dtype=np.float64) for name in ("raw", "calibrated")

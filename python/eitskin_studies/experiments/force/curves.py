@@ -1,8 +1,6 @@
 """Readings over load at four radii: slopes, how straight they are, and how far the law's
 uncertainty moves them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The smallest load that is detected, over SNR and radius; and how often a quiet frame shows a
 touch that is none."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +37,7 @@ class Detection:
     quiet: int
 
     @classmethod
-    def from_dict(cls, facts: dict[str, Any]) -> Detection:
+    def from_dict(cls, facts: dict[str, Any]) -> "Detection":
         """From the store."""
         loads, hits, tries = (
             np.array(facts[name], dtype=np.float64) for name in ("loads_g", "hits", "tries")

@@ -13,8 +13,6 @@ Parameters are uncertain by relative standard deviations (log-normal), which say
 and tips may be from this one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 """What is read off a frame as the strength of its press: an image's peak or integral, or the
 touch's strength off the grid."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,8 +1,6 @@
 """The sets of single presses: along four radii, over laws, all over the skin to tune and to report,
 and light ones."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

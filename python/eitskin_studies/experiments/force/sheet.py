@@ -2,8 +2,6 @@
 from the centre to the boundary; the smallest one over the whole skin, of single frames and of
 means."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,8 +1,6 @@
 """The waveform of an untouched skin (the paper's Fig. 4b): how even it is, what makes it uneven,
 what the doctor says of it."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Untouched skins, each with something that makes it uneven, and what the doctor says of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """A measured tank's reference frame, where a folder of data has one."""
 
-from __future__ import annotations
-
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path

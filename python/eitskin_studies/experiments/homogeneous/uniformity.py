@@ -1,8 +1,6 @@
 """How even an untouched skin's frame is: adjacent frames folded to drives by relative positions,
 and what that shows."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

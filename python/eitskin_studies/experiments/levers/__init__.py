@@ -1,8 +1,6 @@
 """What was tried to do better than discs fitted to an image's peaks, each ablation for itself, with
 what it costs."""
 
-from __future__ import annotations
-
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
 from eitskin_studies.experiments.levers.measure import AblationRuns

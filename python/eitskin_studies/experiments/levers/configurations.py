@@ -1,7 +1,5 @@
 """What is compared: ways of searching for touches, and ways of making the image."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Searches and images on sets that nothing was chosen on; thresholds from tuning sets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, partial

@@ -1,8 +1,6 @@
 """Two to twelve touches: counts, positions, and when the core says that it cannot tell (the paper's
 Fig. 12 and Table 1)."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

@@ -6,8 +6,6 @@ exponential; it is fitted as a logistic regression (Cox 1958) on tuning scenes t
 *exact* (every touch within 10 mm, and nothing else).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Tables of the ambiguity: the present signal, the linear score, the numbers of each touch."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

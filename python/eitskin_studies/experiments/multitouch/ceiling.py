@@ -6,8 +6,6 @@ finite-element solution of another mesh, with nominal contacts and the true cont
 exact where the core's fit is not, linearising is at fault; if it is not either, the data are.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,8 +1,6 @@
 """What is touched: rings as the paper's, random places, uneven touches, and mixed scenes for
 judging the doubt."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 """How well touches are counted and placed: shares with their Wilson intervals, errors with
 bootstrap ones."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

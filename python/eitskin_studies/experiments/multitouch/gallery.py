@@ -1,8 +1,6 @@
 """Example scenes for the picture: truth, the core's image and touches, Gauss-Newton's image and the
 touches read off it."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 

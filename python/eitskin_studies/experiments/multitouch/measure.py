@@ -1,7 +1,5 @@
 """Everything that the experiment measures, in the order of its page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 

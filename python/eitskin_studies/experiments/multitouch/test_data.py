@@ -1,8 +1,6 @@
 """Scenes, frames and methods of the experiment; every result through the workspace, a part of some
 seconds each."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Sentences with numbers in them, for the page's marks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from eitskin_studies.experiments.experiment import Workspace

@@ -1,8 +1,6 @@
 """The methods that count: this project's core in some variants, and two usual ones whose images are
 read by one rule."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """How the default reconstruction counts touches in worlds that its model knows nothing of."""
 
-from __future__ import annotations
-
 import hashlib
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How well touches are told to be ellipses: which are said to be, and how far off these are."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """The tables of the study "other worlds": what fails first."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,8 +1,6 @@
 """The paper's many touches: weights placed one after another from the most sensitive place near the
 boundary, one to twelve."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

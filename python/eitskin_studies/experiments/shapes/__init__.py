@@ -1,8 +1,6 @@
 """Skins of other shapes: a rounded rectangle, a forearm, a hand from a drawing; where they see, and
 where touches are lost."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -4,8 +4,6 @@ examples' drawings of them.
 ``eitskin draw examples -o examples`` writes hand.svg and forearm.dxf there.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One shape measured: its model, random touches on it, what was found of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

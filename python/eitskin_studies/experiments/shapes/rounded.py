@@ -1,8 +1,6 @@
 """Outlines of straight sides and rounded corners, as a polygon, as an SVG path and as a DXF
 polyline."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What was measured of the shapes, as tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

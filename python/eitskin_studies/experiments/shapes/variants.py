@@ -1,8 +1,6 @@
 """The skins of the experiment: shapes with electrodes evenly along the rim or where somebody would
 put them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """Measured frames of water tanks: every method, three kinds of data, and what makes images of large
 objects better."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable
 from functools import partial

@@ -1,8 +1,6 @@
 """What touches as discs depend on besides the data: the radius's prior, the model's electrodes, the
 signs looked for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial

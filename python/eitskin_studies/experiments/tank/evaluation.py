@@ -1,8 +1,6 @@
 """One entry at a time: its parameter and thresholds from simulated scenes, then the measured
 frames."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,8 +1,6 @@
 """What makes images of the tank's frames: every baseline on every kind of data, and the core with
 its levers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol

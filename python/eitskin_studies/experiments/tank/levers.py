@@ -1,8 +1,6 @@
 """What makes images of large objects better, each lever for itself and all together, chosen on
 simulated tank scenes only."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import asdict, replace
 from functools import partial

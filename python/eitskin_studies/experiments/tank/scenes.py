@@ -1,8 +1,6 @@
 """Simulated touches in a tank of that geometry: all parameters and thresholds are chosen on
 these."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MIoU of images with both signs, places read off them, and how well the truth itself is known."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the tank study found, as tables, pictures and sentences."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -6,8 +6,6 @@ hand. Two raw exports of another tank with rods (MIT licence, CBZ199671/PyEIDORS
 places are stated. Neither is part of this project.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 presses, in order of time, with hand-given places, with rows out, and every baseline on the same
 splits."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from functools import cache, partial

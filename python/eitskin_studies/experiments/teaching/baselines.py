@@ -2,8 +2,6 @@
 five-fold cross-validation on them. All see each press divided by its norm, since depths differ:
 that takes a third to a half off their errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,8 +1,6 @@
 """Taught models updated by a few presses: the first 200 measured presses teach, the last 300 are
 the later session, as they are and changed as remounting and drying change a skin."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The same presses by a model from physics, untaught: its instrument is far from the model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

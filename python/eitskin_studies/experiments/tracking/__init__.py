@@ -1,8 +1,6 @@
 """What following touches in time is worth: starts confirmed, ids held, places smoothed; on streams
 of moving fingers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

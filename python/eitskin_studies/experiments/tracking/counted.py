@@ -1,8 +1,6 @@
 """What a stream's touches are worth against the truth: counts, places, ids, and how late births and
 deaths are told."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
@@ -43,7 +41,7 @@ class TrackCount:
     errors_mm: list[float] = field(default_factory=list)
     macs: int = 0
 
-    def __add__(self, other: TrackCount) -> TrackCount:
+    def __add__(self, other: "TrackCount") -> "TrackCount":
         return TrackCount(
             *(getattr(self, one.name) + getattr(other, one.name) for one in fields(TrackCount))
         )

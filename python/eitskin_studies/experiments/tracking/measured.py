@@ -1,8 +1,6 @@
 """Streams measured with noise and reconstructed by the core: what is told in each frame, by each
 way of tracking."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Streams of frames with fingers that come, press, move and lift, and what was truly there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
