@@ -176,11 +176,7 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
 
 
 def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
-    """The sinks of ``--to``, open.
-
-    Raises:
-        EitskinError: one cannot be opened.
-    """
+    """The sinks of ``--to``, open."""
     from eitskin.sinks.outputs import Outputs
     from eitskin.sinks.sink import Source
 
@@ -198,11 +194,7 @@ def add_zones(parser: argparse.ArgumentParser) -> None:
 
 
 def read_zones(path: Path | None) -> tuple[Zone, ...]:
-    """The zones of ``--zones``.
-
-    Raises:
-        FileError, ConfigError: as ``load_zones``.
-    """
+    """The zones of ``--zones``."""
     if path is None:
         return ()
     from eitskin.live.zones import load_zones
@@ -211,11 +203,7 @@ def read_zones(path: Path | None) -> tuple[Zone, ...]:
 
 
 def read_mode(text: str) -> Stream:
-    """The kinds in "raw,touches".
-
-    Raises:
-        UsageError: one is unknown.
-    """
+    """The kinds in "raw,touches"."""
     from eitskin.live.settings import kinds_of
 
     return kinds_of(text, "--mode")
@@ -245,11 +233,7 @@ def read_scan(options: argparse.Namespace) -> ScanSettings:
 
 
 def read_solver(options: argparse.Namespace) -> SolverSettings:
-    """What is named of the solver.
-
-    Raises:
-        UsageError: a diagnostic is unknown.
-    """
+    """What is named of the solver."""
     from eitskin.device.settings import SolverSettings
 
     return SolverSettings(
@@ -298,11 +282,7 @@ def check_recording(path: Path | None, overwrite: bool) -> None:
 
 
 def open_named(options: argparse.Namespace) -> Device:
-    """The device of ``--device``, with ``--model`` and ``--firmware`` where the command has them.
-
-    Raises:
-        EitskinError: as ``eitskin.device.open.open_with_files``.
-    """
+    """The device of ``--device``, with the command's ``--model`` and ``--firmware``, if any."""
     from eitskin.device.open import open_with_files
 
     files = (getattr(options, name, None) for name in ("model", "firmware"))

@@ -73,11 +73,7 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
 
 
 def read_options(options: argparse.Namespace) -> ImportOptions:
-    """The import options of a command line.
-
-    Raises:
-        UsageError: a list or pair cannot be read.
-    """
+    """The import options of a command line."""
     from eitskin.frames.import_options import ImportOptions
     from eitskin.frames.source import SourceOptions
     from eitskin.frames.truth import TruthOptions
@@ -120,22 +116,14 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
 
 
 def read_layout(options: argparse.Namespace) -> Layout | None:
-    """The layout that ``--layout`` names; None without it.
-
-    Raises:
-        EitskinError: it cannot be read.
-    """
+    """The layout that ``--layout`` names; None without it."""
     from eitskin.frames.layout import load_layout
 
     return None if options.layout is None else load_layout(options.layout)
 
 
 def write_layout(path: Path, source: Path, named: ImportOptions, protocol: Protocol | None) -> None:
-    """Write how ``source`` is read by the options ``named`` as a layout.
-
-    Raises:
-        EitskinError: the source is no text with frames in rows, or it cannot be written.
-    """
+    """Write how ``source`` is read by the options ``named`` as a layout."""
     from eitskin.frames.importer import accepted_counts
     from eitskin.frames.layout import layout_of, save_layout
     from eitskin.frames.source import read_source

@@ -66,11 +66,7 @@ class Demo:
 
 def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
     """Simulate on another, finer mesh with noise and contacts drawn under ``seed``, and reconstruct
-    with the prebuilt model; ``step`` gets a line for each step as it starts.
-
-    Raises:
-        MissingExtraError: scipy or netgen is not installed.
-    """
+    with the prebuilt model; ``step`` gets a line for each step as it starts."""
     step("simulating three touches: mesh, electrodes, forward model, noise")
     touches = TouchSet("demo", seed, (TouchScene("demo", TOUCHES),))
     frames = simulate(

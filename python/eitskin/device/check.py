@@ -99,12 +99,7 @@ def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
 
 def model_of(info: BoardInfo, path: str | Path | None, name: str) -> tuple[Model, bytes]:
     """The board's own model on the host: the file ``path``, or the prebuilt one where that is what
-    the board has.
-
-    Raises:
-        FileError, ModelError: the file cannot be read.
-        DeviceError: the board has another model.
-    """
+    the board has."""
     from eitskin.model.eitm import load_model
     from eitskin.model.prebuilt import load_prebuilt
 

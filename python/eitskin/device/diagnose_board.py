@@ -42,11 +42,7 @@ def measure(
     device: Device, frames: int, *, touched: bool, before_touches: Callable[[], None]
 ) -> MeasuredBoard:
     """``frames`` raw frames of the untouched skin, and where ``touched`` as many after
-    ``before_touches`` was called. A recording gives its own quiet frames, where it has some.
-
-    Raises:
-        DeviceError: none came.
-    """
+    ``before_touches`` was called. A recording gives its own quiet frames, where it has some."""
     first = collect(device, 0 if device.transport.replays else frames)
     if device.transport.replays:
         quiet = _with_frames(first, first.quiet or first.frames[:frames])
@@ -66,11 +62,7 @@ def measure(
 def board_subject(
     device: Device, measured: MeasuredBoard, known: KnownModel | None, skin: Skin | None
 ) -> Subject:
-    """For the doctor's checks; the skin is the model's own unless another is given.
-
-    Raises:
-        DeviceError: the protocol that is scanned is not known here.
-    """
+    """For the doctor's checks; the skin is the model's own unless another is given."""
     protocol = scanned_protocol(measured.info, known, device.transport.name)
     if skin is None and known is not None:
         skin = known.model.skin

@@ -72,13 +72,7 @@ def plan_flash(
     its first bank; the record of the second bank is then erased, so that the first one counts. What
     the commands read beside ``image`` is written into ``folder``.
     ``serial``: the ST-LINK's, where several boards are plugged in. ``installed``: the tool must be
-    there; not to show only what would be run.
-
-    Raises:
-        FileError: the image cannot be read.
-        DeviceError: no tool, an image that is none, or a model that does not fit.
-        UsageError: an unknown tool.
-    """
+    there; not to show only what would be run."""
     path = Path(image)
     check_image(path, read_bytes(path, "firmware image"))
     name = find_tool(tool, installed=installed)

@@ -31,12 +31,7 @@ class KnownModel:
 
 def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | None:
     """The board's model: the file ``path``, or the prebuilt one where that is what the board has;
-    None where it has another.
-
-    Raises:
-        FileError, ModelError: the file cannot be read.
-        DeviceError: ``path`` is another model than the board's.
-    """
+    None where it has another."""
     from eitskin.model.prebuilt import load_prebuilt
 
     if path is not None:

@@ -154,11 +154,7 @@ def follow(
     device: Device, what: Stream, *, every: int = 1, frames: int = 0
 ) -> Generator[Item, None, None]:
     """``Device.stream``, the packets of each frame put together. A frame is complete when its last
-    kind came or another frame begins.
-
-    Raises:
-        UsageError, DeviceError: as ``Device.stream``.
-    """
+    kind came or another frame begins."""
     return put_together(device.stream(what, every=every, frames=frames), what)
 
 

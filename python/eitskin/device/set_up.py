@@ -37,11 +37,7 @@ def set_up(
 
 
 def take_reference(device: Device, frames: int, *, streamed: bool = False) -> None:
-    """Tare; where ``streamed``, the quiet frames are sent as raw frames too, for whoever records.
-
-    Raises:
-        UsageError, DeviceError: as ``Device.tare``.
-    """
+    """Tare; where ``streamed``, the quiet frames are sent as raw frames too, for recordings."""
     if not streamed:
         device.tare(frames)
         return

@@ -70,11 +70,6 @@ def check_tare_frames(frames: int) -> int:
 
 
 def apply_scan(device: Device, scan: ScanSettings) -> None:
-    """Change the scan where something is named; the board forgets its reference then.
-
-    Raises:
-        UsageError: a number is out of its range.
-        DeviceError: the board cannot do it; it keeps what it had.
-    """
+    """Change the scan where something is named; the board forgets its reference then."""
     if scan.named:
         device.scan(**scan.named)

@@ -76,12 +76,7 @@ def _refuse_inflating(archive: Any, where: str, most_bytes: int) -> None:
 
 def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
     """All arrays of a file by name: of an .npz, of an .npy its one array as "array", of a .mat a
-    struct's fields as "struct.field".
-
-    Raises:
-        FileError: it cannot be read.
-        MissingExtraError: a .mat file without scipy.
-    """
+    struct's fields as "struct.field"."""
     suffix = Path(path).suffix.lower()
     if suffix == ".npz":
         return read_npz(path, "file of arrays")

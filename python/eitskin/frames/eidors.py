@@ -39,13 +39,7 @@ def save_eidors(
     """Write ``fmdl`` (the skin on a mesh of about ``elements``), ``img_bkgnd`` (its conductivity),
     ``J`` (m, E) in V/S, and ``c2f`` (E, n), the part of each element in each pixel of ``grid``;
     with frames ``vh`` (the mean quiet frame) and ``vi``, with ``images_s_per_m`` (frames, n) on the
-    grid also ``img``. Returns the numbers of nodes and elements.
-
-    Raises:
-        FileError: it cannot be written.
-        GeometryError, ProtocolError: the skin cannot be meshed, or has another protocol.
-        MissingExtraError: scipy or netgen is not installed.
-    """
+    grid also ``img``. Returns the numbers of nodes and elements."""
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.mesh import mesh_for_elements
     from eitskin.fem.sensitivity import element_sensitivity, element_to_pixel
@@ -75,9 +69,6 @@ def with_eidors_defaults(
 ) -> tuple[ImportOptions, int | None]:
     """``options`` for a .mat file with an EIDORS model: its table, current and gain, and the frames
     ``vi`` with the reference ``vh``, each unless the user says otherwise; the number of electrodes.
-
-    Raises:
-        EitskinError: the model in the file cannot be read.
     """
     content = read_mat(path)
     if find_model(content) is None:

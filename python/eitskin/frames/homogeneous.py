@@ -114,11 +114,7 @@ def touch_transfer(
     skin: Skin, xy_mm: FloatArray, radius_mm: FloatArray, sign: NDArray[np.int8]
 ) -> FloatArray:
     """How touches change the transfer matrix (n, n), up to a positive factor: as
-    ``disk_touch_transfer``, in mm.
-
-    Raises:
-        MissingExtraError: the outline is no disk and the extra ``model`` is not installed.
-    """
+    ``disk_touch_transfer``, in mm."""
     if skin.outline.diameter_mm is None:
         from eitskin.frames.homogeneous_fem import fem_prediction
 

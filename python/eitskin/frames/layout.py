@@ -101,11 +101,7 @@ def load_layout(path: str | Path) -> Layout:
 
 
 def save_layout(path: str | Path, layout: Layout) -> None:
-    """Write ``layout``; what is at its default is left out.
-
-    Raises:
-        FileError: it cannot be written.
-    """
+    """Write ``layout``; what is at its default is left out."""
     options, port = layout.options, {}
     lines = _changed(options.source, LINES)
     channels = _changed(options, CHANNELS)

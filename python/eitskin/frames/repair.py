@@ -32,11 +32,7 @@ def signed(values: FloatArray, sign: str, prediction: FloatArray | None) -> Floa
 
 
 def flipped(values: FloatArray, channels: Sequence[int]) -> FloatArray:
-    """``values`` (n, m) with the sign of ``channels`` changed.
-
-    Raises:
-        UsageError: a channel is out of range.
-    """
+    """``values`` (n, m) with the sign of ``channels`` changed."""
     check_range(channels, values.shape[1], "--flip-channels")
     sign = np.ones(values.shape[1])
     sign[list(channels)] = -1.0

@@ -19,11 +19,7 @@ VERSION = 2
 def save_results(
     path: str | Path, model: Model, frames: Frames, results: dict[int, Reconstruction]
 ) -> None:
-    """Write the ``results`` by frame number to ``path`` (.npz), whole or not at all.
-
-    Raises:
-        FileError: the folder does not exist or cannot be written.
-    """
+    """Write the ``results`` by frame number to ``path`` (.npz), whole or not at all."""
     numbers = sorted(results)
     touches = [(number, touch) for number in numbers for touch in results[number].touches]
     grid = model.grid

@@ -41,12 +41,7 @@ def truth_fields(
     where: str,
 ) -> dict[str, Any]:
     """The truth fields of ``Frames`` that ``options`` ask for; ``names`` of the frames, ``box_mm``
-    of the skin.
-
-    Raises:
-        UsageError: options that need another option.
-        FrameError: an array is absent or unusable.
-    """
+    of the skin."""
     return _touches(arrays, options, names, where) | _mask(arrays, options, box_mm, where)
 
 

@@ -141,12 +141,7 @@ class Session:
         return self.timed and not self.pacer.speed
 
     def start(self) -> None:
-        """Set up, take the reference, begin the scene; once.
-
-        Raises:
-            EitskinError: a setting cannot be, the board refuses it, or the recording cannot be
-                written.
-        """
+        """Set up, take the reference, begin the scene; once."""
         if not self._started:
             self._started = True
             if self.known is not None:
@@ -333,11 +328,7 @@ class Session:
             self._say("touch it")
 
     def scan_and_solver(self) -> tuple[ScanSettings, SolverSettings]:
-        """As named; with a target those of the measured point that it chooses.
-
-        Raises:
-            UsageError: no measured point of the board's model does what the target asks for.
-        """
+        """As named; with a target those of the measured point that it chooses."""
         return self.settings.scan_and_solver(self.device.board, self.known, self.name, self._say)
 
     def _carried(self) -> int:

@@ -73,11 +73,7 @@ class SessionSettings:
         self, board: BoardInfo, known: KnownModel | None, name: str, say: Say
     ) -> tuple[ScanSettings, SolverSettings]:
         """As named; with a target those of the measured point that it chooses for the board's
-        ``known`` model; ``name`` is the board's.
-
-        Raises:
-            UsageError: no measured point of the board's model does what the target asks for.
-        """
+        ``known`` model; ``name`` is the board's."""
         scan, named, target = self.scan, self.solver, self.target
         if target is None:
             return scan, named

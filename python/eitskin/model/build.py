@@ -81,13 +81,7 @@ class Linearisation:
 def linearise(
     skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elements: int = 3000
 ) -> Linearisation:
-    """Mesh ``skin`` and take the Jacobian of its boundary voltages at its own conductivity.
-
-    Raises:
-        GeometryError: the skin cannot be meshed.
-        ProtocolError: skin and protocol have different numbers of electrodes.
-        MissingExtraError: scipy or netgen is not installed.
-    """
+    """Mesh ``skin`` and take the Jacobian of its boundary voltages at its own conductivity."""
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.fields import electrode_fields
     from eitskin.fem.mesh import mesh_for_elements
@@ -104,11 +98,7 @@ def linearise(
 def make_model(
     skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings
 ) -> Model:
-    """Reduce and store a linearisation; the golden image comes from the float32 C core.
-
-    Raises:
-        UsageError: a setting is out of range, or the C core is not built.
-    """
+    """Reduce and store a linearisation; the golden image comes from the float32 C core."""
     _refuse_settings(settings, linear.grid)
     fold = protocol.reciprocal_pairs()
     v_ref, jacobian = fold_rows(linear.v0_v, fold), fold_rows(linear.jacobian, fold)
@@ -203,11 +193,7 @@ def build_model(
 ) -> Model:
     """The whole way from ``skin`` to a model, with the model errors that its uncertainty asks for;
     ``progress`` and errors as ``linearise``, ``make_model`` and ``with_model_errors``. ``jacobian``
-    (m, n) V per S/m on the settings' grid stands in place of our own.
-
-    Raises:
-        UsageError: a setting is out of range.
-    """
+    (m, n) V per S/m on the settings' grid stands in place of our own."""
     chosen = settings or BuildSettings()
     asked = skin.uncertainty
     if chosen.samples == 0:
@@ -239,13 +225,7 @@ def with_model_errors(
     (None: one a core) on a mesh of twice ``elements``, at
     most 6000.
 
-    ``progress`` wraps the samples as they are done, and is told how many there are.
-
-    Raises:
-        GeometryError: the skin cannot be meshed.
-        ModelError: a process failed.
-        MissingExtraError: scipy or netgen is not installed.
-    """
+    ``progress`` wraps the samples as they are done, and is told how many there are."""
     from eitskin.fem.mesh import mesh_for_elements
     from eitskin.model.monte_carlo import draw_model_errors
     from eitskin.model.random_skins import Request

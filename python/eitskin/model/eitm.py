@@ -23,11 +23,7 @@ MAX_SECTIONS = 256
 
 
 def encode_model(model: Model, sums: bytes = b"") -> bytes:
-    """The file's bytes, with ``sums`` as the section SUMS.
-
-    Raises:
-        ModelError: a number does not fit float32.
-    """
+    """The file's bytes, with ``sums`` as the section SUMS."""
     sections = encode_sections(model)
     if sums:
         sections["SUMS"] = sums
@@ -140,12 +136,7 @@ def load_model(path: str | Path) -> tuple[Model, bytes]:
 
 
 def encode_tested(model: Model) -> bytes:
-    """The file's bytes with checksums of what the float32 core makes of the set of golden frames.
-
-    Raises:
-        ModelError: a number does not fit float32, or the core refuses the model.
-        FrameError: the golden reference is none.
-    """
+    """The file's bytes, with checksums of what the float32 core makes of the golden frames."""
     return encode_model(model, CoreEngine(encode_model(model), "float32").self_test_sums())
 
 

@@ -48,11 +48,7 @@ Sections = dict[str, bytes]
 
 
 def encode_sections(model: Model) -> Sections:
-    """What the sections of ``model`` hold, by tag, but for SUMS.
-
-    Raises:
-        ModelError: a number does not fit float32.
-    """
+    """What the sections of ``model`` hold, by tag, but for SUMS."""
     _check_floats(model)
     stored, stride = model.stored, stride_for(model.rank)
     projection = np.zeros((model.projection.shape[1], stride), dtype="<f4")
@@ -345,12 +341,7 @@ def _read_meta(content: bytes, where: str) -> dict[str, Any]:
 
 
 def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model:
-    """The model of these sections; ``where`` names it in errors.
-
-    Raises:
-        ModelError: a section is of a wrong size, or a number in it cannot be.
-        EitskinError: the protocol cannot be.
-    """
+    """The model of these sections; ``where`` names it in errors."""
     d = _read_dims(sections["DIMS"], where)
     _check_sizes(sections, d, where)
     table = np.frombuffer(sections["PROT"], dtype="u1").reshape(d.n_rows, 4)

@@ -68,11 +68,7 @@ class LoadLaw:
 
 
 def encode_load(law: LoadLaw) -> bytes:
-    """The section's bytes.
-
-    Raises:
-        ModelError: it is none that a reader would take.
-    """
+    """The section's bytes."""
     head = HEAD.pack(len(law.strength), law.order, law.radius_mm, law.reach, law.uncertainty)
     content = head + b"".join(
         part.astype("<f4").tobytes() for part in (law.strength, law.force_n, law.gain)

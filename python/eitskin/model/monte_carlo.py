@@ -34,11 +34,7 @@ def draw_model_errors(
 ) -> ModelErrors:
     """The model errors of ``request``, drawn by ``jobs`` processes (None: one a core).
 
-    ``progress`` wraps the samples as they are done, and is told how many there are.
-
-    Raises:
-        ModelError: a process failed.
-    """
+    ``progress`` wraps the samples as they are done, and is told how many there are."""
     samples = request.uncertainty.samples
     count = max(1, min(jobs or os.cpu_count() or 1, samples))
     idle: SimpleQueue[_Process] = SimpleQueue()

@@ -32,11 +32,7 @@ def load_prebuilt() -> tuple[Model, bytes]:
 
 def load_or_prebuilt(path: Path | None) -> tuple[Model, bytes, str]:
     """The model in the file ``path``, or without one the prebuilt, with its bytes and its name for
-    messages.
-
-    Raises:
-        FileError, ModelError: as ``load_model``.
-    """
+    messages."""
     if path is None:
         return *load_prebuilt(), "prebuilt paper skin"
     return *load_model(path), str(path)

@@ -278,11 +278,7 @@ class Follower:
         return self._changed(session, action)
 
     def upload(self, blob: bytes) -> Future[str]:
-        """Another model, and the reference for it.
-
-        Raises:
-            ModelError: it is none.
-        """
+        """Another model, and the reference for it."""
         from eitskin.device.known_model import KnownModel
         from eitskin.model.eitm import decode_model
 

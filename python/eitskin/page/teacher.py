@@ -35,12 +35,7 @@ class Teacher:
         self._lock = threading.Lock()
 
     def begin(self, session: Session) -> None:
-        """Set the scan of a session that has not started, and go on where the file ends.
-
-        Raises:
-            FrameError: the file is of another protocol or plan.
-            DeviceError: which rows the board scans is not known.
-        """
+        """Set the scan of a session that has not started, and go on where the file ends."""
         board = session.device.board
         session.settings = replace(session.settings, scan=scan_of_presses(board, session.replays))
         protocol = scanned_protocol(board, session.known, session.name)

@@ -110,13 +110,7 @@ def reconstruct_frames(
 ) -> ReconstructOutcome:
     """Reconstruct the frames of the file ``path``; those that cannot be used are named in
     ``refused``, and the others are still done. Images, touches and info go into the file ``output``
-    (.npz), a ``picture`` shows the frames, a ``film`` one after another.
-
-    Raises:
-        FileError, FrameError, ModelError, ProtocolError, UsageError: a file, an option or the
-            reference cannot be used.
-        MissingExtraError: picture and film need matplotlib.
-    """
+    (.npz), a ``picture`` shows the frames, a ``film`` one after another."""
     how = settings or ReconstructSettings()
     check(how, output, picture, film)
     notes: list[str] = []

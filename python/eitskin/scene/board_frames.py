@@ -27,12 +27,7 @@ class BoardFrames:
         self._rows: dict[tuple[int, tuple[int, ...]], SceneRows] = {}
 
     def rows(self, protocol: Protocol) -> "SceneRows":
-        """The frames in the rows of ``protocol``. Electrodes that it does not name stay unused.
-
-        Raises:
-            ProtocolError: the scene's skin has fewer electrodes than the protocol names.
-            ConfigError, MissingExtraError: the scene cannot be simulated.
-        """
+        """The frames in the rows of ``protocol``. Electrodes that it does not name stay unused."""
         key, own = (protocol.hash, protocol.drive_order), self.scene.protocol
         if key not in self._rows:
             scene = self.scene

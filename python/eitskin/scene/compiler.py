@@ -183,14 +183,7 @@ class Prepared:
 def compile_scene(
     scene: Scene, *, registry: Registry | None = None, mesh_cache: MeshCache | None = None
 ) -> Compiled:
-    """Compile ``scene``; ``mesh_cache`` lends the meshes and untouched skins of scenes before.
-
-    Raises:
-        ConfigError: an effect or a parameter is unknown or impossible, or effects contradict each
-            other.
-        GeometryError, ProtocolError, UsageError, MissingExtraError: from effects, meshing and the
-            forward model.
-    """
+    """Compile ``scene``; ``mesh_cache`` lends the meshes and untouched skins of scenes before."""
     prepared = prepare_scene(scene, registry=registry, mesh_cache=mesh_cache)
     return compile_frames(prepared, range(scene.n_frames))
 

@@ -41,9 +41,5 @@ def scene_path(name: str) -> Path:
 
 
 def find_scene(name: str) -> Scene:
-    """The scene ``name``: a file, or one of the library.
-
-    Raises:
-        FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
-    """
+    """The scene ``name``: a file, or one of the library."""
     return load_scene(scene_path(name))

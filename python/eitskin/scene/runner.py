@@ -89,11 +89,7 @@ class FrameMaker:
 
     def frame(self, frame: int, row_times_s: FloatArray | None = None) -> FloatArray:
         """Frame number ``frame`` of all frames, quiet ones first: (m,) in V. Its rows are those of
-        its scan, or of the instants ``row_times_s`` (m,); its effects are the frame's.
-
-        Raises:
-            ConfigError: a voltage is not finite.
-        """
+        its scan, or of the instants ``row_times_s`` (m,); its effects are the frame's."""
         mix = None if row_times_s is None else self.compiled.table.mix(frame, row_times_s)
         if mix is None or not mix.still:
             return self._made(frame, self._true(frame, mix))
@@ -161,11 +157,7 @@ def simulate_frames(
     compiled: Compiled, progress: Callable[[range], Iterable[int]] | None = None
 ) -> SceneRun:
     """Solve every state, then take every frame through the steps; ``progress`` wraps the states'
-    numbers.
-
-    Raises:
-        ConfigError: an effect makes a conductivity that cannot be, or a voltage that is not finite.
-    """
+    numbers."""
     scene, maker = compiled.scene, FrameMaker(compiled)
     states = compiled.states
     unknown = [k for k in range(len(states)) if k not in compiled.known]
@@ -201,12 +193,7 @@ def run(
     side (0: no rasters).
 
     ``meta`` says how they were made: the scene's text, its plan, its effects' parameters, and the
-    work counted.
-
-    Raises:
-        ConfigError: as ``simulate_frames``.
-        UsageError: ``truth_pixels`` is out of range, or the rasters would be enormous.
-    """
+    work counted."""
     scene = compiled.scene
     truth = truth_of(compiled, truth_pixels)
     done = simulate_frames(compiled, progress)

@@ -42,12 +42,7 @@ class Truth:
 
 def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
     """The truth of the recorded frames, rastered with ``pixels`` along the longer side, or 0 for no
-    rasters.
-
-    Raises:
-        UsageError: ``pixels`` is neither 0 nor 4 to 512, or the rasters would hold over 500 million
-            cells.
-    """
+    rasters."""
     numbers, states = _states_at_truth(compiled)
     flat = [(frame, t) for frame, k in enumerate(numbers) for t in states[k].touches]
     contrast = np.array([t.contrast for _, t in flat], dtype=np.float64)

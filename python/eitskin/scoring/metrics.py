@@ -275,10 +275,6 @@ def _miou_of_passed(passed: IntArray, truth: BoolArray, count: int) -> FloatArra
 def judge_for(
     region: Region, grid: Grid, spacing_mm: float = RASTER_MM, lookup: str = LOOKUP
 ) -> ImageScorer:
-    """The scorer for images on ``grid`` of the skin ``region``.
-
-    Raises:
-        UsageError: as :func:`raster_inside` and :func:`lookup_for`.
-    """
+    """The scorer for images on ``grid`` of the skin ``region``."""
     raster = raster_inside(region, spacing_mm)
     return ImageScorer(raster, lookup_for(raster.points_mm, grid, lookup), grid.n_pixels)

@@ -103,11 +103,7 @@ def truth_of(url: str, sign: str = "increase") -> SceneTruth | None:
 
 
 def scene_of(url: str) -> Scene | None:
-    """The scene that a device URL names; None for boards and recordings.
-
-    Raises:
-        FileError, ConfigError, GeometryError, ProtocolError: it cannot be read.
-    """
+    """The scene that a device URL names; None for boards and recordings."""
     scheme, _, rest = split_timing(url)[0].partition(":")
     return find_scene(rest) if scheme in ("sim", "emu") else None
 

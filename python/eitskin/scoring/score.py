@@ -105,11 +105,7 @@ def _sign_of(frames: Frames, touch: int) -> int:
 
 def scorer_for(model: Model) -> Scorer:
     """The scorer on the model's own skin: a raster of 1.5 mm and a gate of 10 mm on the paper's
-    skin, in proportion elsewhere.
-
-    Raises:
-        ConfigError: the model does not say which skin it is for.
-    """
+    skin, in proportion elsewhere."""
     outline = model.skin.outline
     scale = size_to_paper(outline)
     image_scorer = metrics.judge_for(outline, model.grid, metrics.RASTER_MM * scale)

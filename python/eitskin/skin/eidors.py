@@ -68,11 +68,7 @@ class EidorsModel:
         return np.array(rim)
 
     def outline(self) -> tuple[Outline, FloatArray]:
-        """The rim as an outline, and where its origin lies among ``nodes_mm``, (2,).
-
-        Raises:
-            GeometryError: as ``rim`` and ``polygon``.
-        """
+        """The rim as an outline, and where its origin lies among ``nodes_mm``, (2,)."""
         rim = self.nodes_mm[self.rim()]
         centre = (rim.min(axis=0) + rim.max(axis=0)) / 2
         radii = np.linalg.norm(rim - centre, axis=1)

@@ -185,11 +185,7 @@ def load_skin(path: str | Path) -> tuple[Skin, Protocol]:
 
 
 def skin_of_eidors(model: EidorsModel) -> tuple[Skin, Protocol]:
-    """The sheet, electrodes and scan of an EIDORS ``model``; widths and contacts are their means.
-
-    Raises:
-        GeometryError, ProtocolError: eitskin has no such skin or protocol.
-    """
+    """Sheet, electrodes and scan of an EIDORS ``model``; widths and contacts are their means."""
     outline, origin_mm = model.outline()
     middles, width_mm = model.contacts()
     default, thickness_m = Electrodes(), 1e-3 * model.thickness_mm

@@ -258,12 +258,7 @@ def learn(
     amplitude: FloatArray | None = None,
     progress: Progress = iter,
 ) -> Learned:
-    """Learn from presses; ``choose`` False keeps the kernel's numbers, as for presses held out.
-
-    Raises:
-        FrameError: no row changes.
-        MissingExtraError: scipy is not installed.
-    """
+    """Learn from presses; ``choose`` False keeps the kernel's numbers, as for presses held out."""
     data, unit = differences(difference)
     if amplitude is None:
         amplitude = first_amplitudes(place_mm, data, given, NEAR * width_mm)

@@ -75,12 +75,7 @@ def rotation(turn_deg: float) -> FloatArray:
 
 def field_sensitivity(skin: Skin, protocol: Protocol) -> Sensitivity:
     """J of ``skin`` as described: products of its electrodes' fields, between pixels linear,
-    outside the outline as at its nearest pixel; of rms 1.
-
-    Raises:
-        GeometryError, MissingExtraError: as ``fem.mesh``.
-        ProtocolError: skin and protocol have different numbers of electrodes.
-    """
+    outside the outline as at its nearest pixel; of rms 1."""
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.fields import electrode_fields
     from eitskin.fem.mesh import mesh_for_elements

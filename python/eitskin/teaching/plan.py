@@ -88,11 +88,7 @@ def candidates(skin: Skin) -> FloatArray:
 
 
 def save_plan(path: str | Path, plan: Plan) -> None:
-    """Write it as CSV, one place a line.
-
-    Raises:
-        FileError: it cannot be written.
-    """
+    """Write it as CSV, one place a line."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)

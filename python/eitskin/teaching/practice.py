@@ -50,11 +50,7 @@ def practice_scene(skin: Skin, path: Path, plan: Plan) -> str:
 
 def plan_of_scene(name: str) -> tuple[Plan, str]:
     """Where the touches of a scene, a file or one of the library, press, and the text of its skin's
-    description; empty for the paper's.
-
-    Raises:
-        FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
-    """
+    description; empty for the paper's."""
     path = scene_path(name)
     scene = load_scene(path)
     first = sorted((track.keyframes[0] for track in scene.touches), key=lambda one: one.t_s)

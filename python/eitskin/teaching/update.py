@@ -275,11 +275,7 @@ def likeliest(
     session: Session, presses: Presses, how: str, white: FloatArray, start: Deviation | None
 ) -> Deviation:
     """The kernel with turn, shift, gain's and noise's variances (over delta's) of the greatest
-    likelihood; ``MOVED`` has noise alone.
-
-    Raises:
-        MissingExtraError: scipy is not installed.
-    """
+    likelihood; ``MOVED`` has noise alone."""
     from scipy.optimize import minimize
 
     data, given, place = presses.difference / session.unit, known_size(presses), presses.place_mm

@@ -141,12 +141,7 @@ def write_model(
     path: Path, point: Point, skin: Skin, protocol: Protocol, progress: "Progress | None" = None
 ) -> int:
     """Build and write the model of a point for ``skin``, the solver's settings and t as its
-    defaults; returns its bytes. ``progress`` as ``build_model``.
-
-    Raises:
-        GeometryError, ProtocolError, MissingExtraError, UsageError, FileError: from building and
-            writing.
-    """
+    defaults; returns its bytes. ``progress`` as ``build_model``."""
     from eitskin.model.build import build_model
     from eitskin.model.eitm import save_model
 

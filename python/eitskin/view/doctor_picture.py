@@ -18,13 +18,7 @@ GAIN_SPAN = 0.3
 
 
 def draw_report(path: str | Path, report: Report, case: Case) -> None:
-    """Write the picture of an examined ``case`` to ``path`` (.png, .pdf, .svg).
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        UsageError: its suffix is no picture's.
-        FileError: the file cannot be written.
-    """
+    """Write the picture of an examined ``case`` to ``path`` (.png, .pdf, .svg)."""
     check_picture(path)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -24,12 +24,7 @@ COLOURS = 256
 
 
 def check_film(path: str | Path | None) -> None:
-    """Refuse a film that cannot be made, before anything is done for it.
-
-    Raises:
-        UsageError: its suffix is none of a film.
-        MissingExtraError: matplotlib or pillow is not installed.
-    """
+    """Refuse a film that cannot be made, before anything is done for it."""
     if path is None:
         return
     check_path(path, FORMATS, "film")
@@ -58,13 +53,7 @@ def draw_film(
     progress: Callable[..., Iterable[Any]] = lambda items, _: items,
 ) -> None:
     """``panels``, at ``times_s`` that ascend, as an animated WebP or GIF; of more than 240 evenly
-    spaced ones. A frame is seen 40 ms to 2 s.
-
-    Raises:
-        UsageError: another suffix.
-        MissingExtraError: matplotlib or pillow is not installed.
-        FileError: the file cannot be written.
-    """
+    spaced ones. A frame is seen 40 ms to 2 s."""
     check_film(path)
     chosen = thinned(len(panels))
     limit = max((largest(p.values) for p in panels if p.values is not None), default=1.0)

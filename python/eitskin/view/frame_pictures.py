@@ -45,12 +45,7 @@ def draw_results(
     title: str = "",
 ) -> None:
     """A panel a frame, the first 36: image, true touches as circles, found ones as crosses and
-    dashed circles.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written.
-    """
+    dashed circles."""
     panels = []
     for number, result in list(results.items())[:MAX_PANELS]:
         heading = frames.frame_name[number]
@@ -73,12 +68,7 @@ def film_results(
     progress: Callable[..., Iterable[Any]] = lambda items, _: items,
 ) -> None:
     """Image, true and found touches frame by frame, in the frames' time, or ten a second where they
-    have none.
-
-    Raises:
-        MissingExtraError: matplotlib or pillow is not installed.
-        FileError: the file cannot be written.
-    """
+    have none."""
     from eitskin.view.film import draw_film, thinned
 
     kept = [list(results)[k] for k in thinned(len(results))]

@@ -92,12 +92,7 @@ def check_path(
 
 
 def check_picture(path: str | Path | None) -> None:
-    """Refuse a picture that cannot be drawn, before anything is done for it.
-
-    Raises:
-        UsageError: its name says no format.
-        MissingExtraError: matplotlib is not installed.
-    """
+    """Refuse a picture that cannot be drawn, before anything is done for it."""
     if path is not None:
         check_path(path)
         load_matplotlib()
@@ -105,12 +100,7 @@ def check_picture(path: str | Path | None) -> None:
 
 def save_picture(figure: Figure, path: str | Path) -> None:
     """Write a PNG, SVG or PDF, as the suffix says, whole or not at all, without dates and versions
-    that would make two runs differ.
-
-    Raises:
-        UsageError: another suffix.
-        FileError: it cannot be written.
-    """
+    that would make two runs differ."""
     check_path(path)
     kind = Path(path).suffix[1:].lower()
     nothing = {"png": ("Software",), "svg": ("Date",), "pdf": ("CreationDate", "Producer")}[kind]
@@ -130,12 +120,7 @@ def draw_panels(
     note: str = "",
     legend: bool = False,
 ) -> None:
-    """``panels_figure`` as a picture.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written.
-    """
+    """``panels_figure`` as a picture."""
     figure = panels_figure(skin, grid, panels, columns, title=title, note=note, legend=legend)
     save_picture(figure, path)
 
@@ -151,12 +136,7 @@ def draw_frame(
     title: str = "",
     unit: str = "S/m",
 ) -> None:
-    """``frame_figure`` as a picture.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written.
-    """
+    """``frame_figure`` as a picture."""
     image = np.asarray(values, dtype=np.float64)
     figure = frame_figure(skin, grid, image, truth=truth, found=found, title=title, unit=unit)
     save_picture(figure, path)
@@ -176,11 +156,7 @@ def panels_figure(
 ) -> Figure:
     """Panels row by row, each coloured by its own largest change, or from -``limit`` to ``limit``
     S/m; one or two (or as ``large`` says) are large and have axes in mm. ``columns``: None as fits
-    best; ``legend`` says what marks mean; ``note`` stands below.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-    """
+    best; ``legend`` says what marks mean; ``note`` stands below."""
     small = len(panels) > 2 if large is None else not large
     cell = _cell(skin, small)
     size = 8.0 if small else 10.0
@@ -240,11 +216,7 @@ def frame_figure(
     unit: str = "S/m",
 ) -> Figure:
     """One frame at large: truth (where given), image, touches, beside each other or, of a long
-    skin, below each other, with axes in mm and a colour bar in ``unit`` each.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-    """
+    skin, below each other, with axes in mm and a colour bar in ``unit`` each."""
     panels = [Panel("image", image), Panel("touches", None, tuple(truth), tuple(found))]
     if truth:
         panels.insert(0, Panel("truth", None, tuple(truth), fill_truth=True))

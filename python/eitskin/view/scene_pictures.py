@@ -21,12 +21,7 @@ MAX_OUTLINES = 12
 
 def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
     """The picture of ``scene`` and its ``frames`` as a PNG: touches by time | voltage changes by
-    row and time.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written.
-    """
+    row and time."""
     matplotlib = load_matplotlib()
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(9.6, 4.9), layout="constrained")

@@ -55,13 +55,7 @@ class Album:
 
 def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> None:
     """The album as a PNG: circles are true touches, crosses what was found, dashed circles the
-    found touches' sizes.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written.
-        ConfigError: the model does not say which skin it is for.
-    """
+    found touches' sizes."""
     frames = album.frames
     if len(frames) == 1:
         seen = frames[0]

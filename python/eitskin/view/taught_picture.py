@@ -15,13 +15,7 @@ GIVEN, FOUND, STRANGE = "#1f5f99", "#b0b7bd", "#c2410c"
 
 
 def draw_taught(path: str | Path, taught: "Taught") -> None:
-    """Write the picture to ``path`` (.png, .pdf, .svg).
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        UsageError: its suffix is no picture's.
-        FileError: the file cannot be written.
-    """
+    """Write the picture to ``path`` (.png, .pdf, .svg)."""
     check_picture(path)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -24,23 +24,14 @@ SUFFIXES = (".pdf", ".svg")
 
 
 def check_template(path: Path) -> None:
-    """Refuse a template that cannot be drawn, before anything is done for it.
-
-    Raises:
-        UsageError: another kind of file.
-        MissingExtraError: matplotlib is not installed.
-    """
+    """Refuse a template that cannot be drawn, before anything is done for it."""
     check_path(path, SUFFIXES, "template in true size")
     load_matplotlib()
 
 
 def draw_template(path: Path, skin: Skin, place_mm: FloatArray) -> int:
     """Draw places (n, 2) on ``skin`` in true size: as PDF on as many A4 pages as it takes, to be
-    laid edge to edge, as SVG on one page of its own size. Returns the number of pages.
-
-    Raises:
-        UsageError, MissingExtraError: as ``check_template``.
-    """
+    laid edge to edge, as SVG on one page of its own size. Returns the number of pages."""
     check_template(path)
     from matplotlib import rc_context
     from matplotlib.figure import Figure

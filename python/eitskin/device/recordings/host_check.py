@@ -222,12 +222,7 @@ class HostTwin:
 
 def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
     """The recording ``path`` compared with this host's core; also whether it notes the solver's
-    options (else the model's own are taken).
-
-    Raises:
-        FileError, DeviceError, ModelError: the recording or the model cannot be read, or do not
-            belong together.
-    """
+    options (else the model's own are taken)."""
     from eitskin.device.client import Device
     from eitskin.device.recordings.recording import FileTransport, recorded_kinds, recorded_options
 

@@ -31,12 +31,7 @@ RENUMBER_FIRST = (
 
 def examine(subject: Subject) -> Report:
     """What is wrong with ``subject``, with evidence and remedy; see docs/guide/import-and-doctor.md
-    for every check.
-
-    Raises:
-        UsageError: the skin has another number of electrodes than the frames.
-        MissingExtraError: the skin is no disk and the extra ``model`` is not installed.
-    """
+    for every check."""
     return examine_case(subject)[0]
 
 

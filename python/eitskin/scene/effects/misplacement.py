@@ -36,11 +36,7 @@ class Parameters:
 
 def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
     """``skin`` with each electrode moved by ``shift_mm`` (L,) along the rim, in the direction of
-    numbering.
-
-    Raises:
-        GeometryError: electrodes overlap or change their order.
-    """
+    numbering."""
     electrodes = skin.electrodes
     along = np.arange(electrodes.count) * (skin.outline.perimeter_mm / electrodes.count)
     if electrodes.positions_mm is not None:
