@@ -4,11 +4,14 @@ one."""
 import difflib
 import re
 import sys
+import types
+import typing
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, field, fields
 from pathlib import Path
 from typing import Any
 
-from eitskin.errors import ConfigError
+from eitskin.errors import ConfigError, EitskinError
 from eitskin.fileio import read_bytes
 
 if sys.version_info >= (3, 11):
@@ -92,9 +95,10 @@ def number(
     low: float = float("-inf"),
     high: float = float("inf"),
     open_low: bool = False,
+    unit: str = "",
 ) -> float:
     """The number at ``key``, or ``default`` (None: required), within [low, high] ((low, high] with
-    ``open_low``).
+    ``open_low``); ``unit`` is said with the range.
 
     Raises:
         ConfigError: it is absent and required, no number, not finite, or out of range.
@@ -104,10 +108,13 @@ def number(
         raise ConfigError(f"{where}: the key {key!r} is required")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ConfigError(f"{where}: {key} must be a number, not {value!r}")
-    if not (low <= value <= high) or (open_low and value == low):
-        bracket = "above" if open_low else "at least"
-        bound = f"{bracket} {low:g}" + (f" and at most {high:g}" if high != float("inf") else "")
-        raise ConfigError(f"{where}: {key} = {value!r} is out of range; it must be {bound}")
+    finite = float("-inf") < value < float("inf")
+    if not (finite and low <= value <= high) or (open_low and value == low):
+        bounds = [f"{'above' if open_low else 'at least'} {low:g}"] if low > float("-inf") else []
+        bounds += [f"at most {high:g}"] if high < float("inf") else []
+        said = " and ".join(bounds) or "finite"
+        said += f" {unit}" if unit not in ("", "1") else ""
+        raise ConfigError(f"{where}: {key} = {value!r} is out of range; it must be {said}")
     try:
         return float(value)
     except OverflowError:
@@ -130,6 +137,42 @@ def integer(
     return int(value)
 
 
+def flag(table: Mapping[str, Any], key: str, default: bool | None, where: str) -> bool:
+    """The truth value at ``key``, or ``default`` (None: required).
+
+    Raises:
+        ConfigError: it is something else.
+    """
+    value = table.get(key, default)
+    if not isinstance(value, bool):
+        raise ConfigError(f"{where}: {key} must be true or false, not {value!r}")
+    return value
+
+
+def word(table: Mapping[str, Any], key: str, default: str | None, where: str) -> str:
+    """The text at ``key``, or ``default`` (None: required).
+
+    Raises:
+        ConfigError: it is something else.
+    """
+    value = table.get(key, default)
+    if not isinstance(value, str):
+        raise ConfigError(f"{where}: {key} must be text in quotes, not {value!r}")
+    return value
+
+
+def subtable(table: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+    """The table at ``key``, empty where there is none.
+
+    Raises:
+        ConfigError: it is something else.
+    """
+    value = table.get(key, {})
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"{where}: {key} must be a table: write [{key}]")
+    return value
+
+
 def choice(
     table: Mapping[str, Any], key: str, default: str | None, known: Iterable[str], where: str
 ) -> str:
@@ -147,3 +190,80 @@ def choice(
             f"{where}: {key} = {value!r} is not known; {nearest(str(value), options)}"
         )
     return value
+
+
+def parameter(
+    default: Any,
+    unit: str = "1",
+    doc: str = "",
+    *,
+    low: float | None = None,
+    high: float | None = None,
+    open_low: bool = False,
+    choices: tuple[str, ...] = (),
+) -> Any:
+    """A dataclass field for ``from_table``: its default, its unit, what it is, and its range [low,
+    high], or (low, high]."""
+    limits = {"low": low, "high": high, "open_low": open_low or None, "choices": choices or None}
+    given = {name: limit for name, limit in limits.items() if limit is not None}
+    return field(default=default, metadata={"unit": unit, "doc": doc, **given})
+
+
+def from_table(kind: Any, table: Mapping[str, Any], where: str) -> Any:
+    """The dataclass ``kind`` filled from ``table``; its fields are float, int, bool, str, tuples of
+    these, or one of them ``| None``, within what ``parameter`` says. ``where`` says file and table.
+
+    Raises:
+        ConfigError: a key is unknown, missing, of the wrong type or out of range.
+        EitskinError: what ``kind`` itself refuses, with ``where`` before it.
+    """
+    known = {one.name: one for one in fields(kind)}
+    check_keys(table, known, where)
+    hints = typing.get_type_hints(kind)
+    values = {}
+    for name, one in known.items():
+        if name in table:
+            values[name] = _value(table[name], hints[name], one.metadata, name, where)
+        elif one.default is MISSING and one.default_factory is MISSING:
+            raise ConfigError(f"{where}: the key {name!r} is required")
+    try:
+        return kind(**values)
+    except EitskinError as error:
+        raise type(error)(f"{where}: {error}") from None
+
+
+def _value(value: Any, hint: Any, limits: Mapping[str, Any], key: str, where: str) -> Any:
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        other = next(one for one in inner if one is not type(None))
+        return _value(value, other, limits, key, where)
+    if origin is tuple:
+        return _items(value, inner, limits, key, where)
+    table = {key: value}
+    if hint is bool:
+        return flag(table, key, None, where)
+    if hint is str:
+        found = word(table, key, None, where)
+        return choice(table, key, None, limits["choices"], where) if "choices" in limits else found
+    if hint not in (int, float):
+        raise ConfigError(f"{where}: {key} is declared as {hint}, which tables do not have")
+    given = {name: limits[name] for name in ("low", "high", "open_low", "unit") if name in limits}
+    number(table, key, None, where, **given)
+    if hint is int and value != value // 1:
+        raise ConfigError(f"{where}: {key} = {value!r} must be a whole number")
+    return hint(value)
+
+
+def _items(
+    value: Any, kinds: tuple[Any, ...], limits: Mapping[str, Any], key: str, where: str
+) -> tuple[Any, ...]:
+    if not isinstance(value, list | tuple):
+        raise ConfigError(f"{where}: {key} must be a list, not {value!r}")
+    if len(kinds) == 2 and kinds[1] is Ellipsis:
+        kinds = (kinds[0],) * len(value)
+    elif len(value) != len(kinds):
+        raise ConfigError(f"{where}: {key} must be a list of {len(kinds)}, not {value!r}")
+    return tuple(
+        _value(one, kind, limits, f"{key} entry {k} (from 0)", where)
+        for k, (one, kind) in enumerate(zip(value, kinds, strict=True))
+    )

@@ -16,6 +16,7 @@ def above(low: float) -> float:
 
 
 RING_OHM = (above(0), 1e7)  # of --resistor-ring
+SCENE_HELP = "a scene file, or a scene of the library (eitskin scene list)"
 
 
 class Output(PosixPath):

@@ -1,15 +1,11 @@
 """``--preset``, ``--budget`` and ``--accuracy``."""
 
-from __future__ import annotations
-
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
-
-if TYPE_CHECKING:
-    from eitskin.tuning.front import Conditions, Target
+from eitskin.tuning.front import Conditions, Target, check_wish, preset, read_budget
 
 WISHES = ("preset", "budget", "accuracy")
 EXCLUDED = ("solver", "iterations", "gap", "mac_limit", "macs")
@@ -58,8 +54,6 @@ def read_target(
     Raises:
         UsageError: nothing, or what cannot be.
     """
-    from eitskin.tuning.front import Conditions, Target, check_wish, preset, read_budget
-
     if options.preset is not None:
         if options.budget is not None or options.accuracy is not None or period is not None:
             raise UsageError(

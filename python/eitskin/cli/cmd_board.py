@@ -1,11 +1,11 @@
 """``eitskin board``: what the board's owner may set: lock, current, limit."""
 
 import argparse
-import json
-from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import add_device, open_named, print_table
+from eitskin.cli.device_options import add_device, open_named
+from eitskin.cli.printing import print_json, print_table
+from eitskin.device.wire.link_table import Setting
 
 SETTINGS = (  # bits of eits_setting, each with what sets and what clears it
     (
@@ -26,15 +26,11 @@ SETTINGS = (  # bits of eits_setting, each with what sets and what clears it
 )
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``board``."""
-    parser = subparsers.add_parser(
-        "board",
-        help="the owner's settings of a board: lock, current, limit",
-        description=(
-            "Show or change what a board's owner has set; the board keeps it over a loss of power."
-            " A locked board takes changes only while its blue button is held."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``board``."""
+    parser.description = (
+        "Show or change what a board's owner has set; the board keeps it over a loss of power."
+        " A locked board takes changes only while its blue button is held."
     )
     add_device(parser)
     for name, (on, text), (off, contrary) in SETTINGS:
@@ -53,8 +49,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Change what is named, and show all."""
-    from eitskin.device.wire.link_table import Setting
-
     with open_named(options) as device:
         if options.clear_faults:
             device.clear_faults()
@@ -69,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
         url = device.transport.url
     facts = {"settings": info.setting_names, "current_limit_ua_rms": info.current_limit_ua_rms}
     if options.json:
-        print(json.dumps({"device": url, **facts}, indent=2))
+        print_json({"device": url, **facts})
     else:
         limit = f"{info.current_limit_ua_rms} uA rms" if info.current_limit_ua_rms else "none"
         print_table({"device": url, "settings": ", ".join(info.setting_names) or "none",

@@ -1,34 +1,36 @@
 """``eitskin calibrate RECORDING --weights LIST``: known weights on one's own skin, so that touches
 are given in grams."""
 
-from __future__ import annotations
-
 import argparse
-import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from eitskin.calibration.fit import FORMS, Calibration, calibrate
+from eitskin.calibration.presses import find_presses, joined
+from eitskin.calibration.weights import load_weights
 from eitskin.cli.arguments import Output, option
+from eitskin.cli.printing import print_json
+from eitskin.core.results import force_text
+from eitskin.device.recordings.raw_frames import finite_only
+from eitskin.device.recordings.recording import frames_of
 from eitskin.errors import EitskinError, FrameError, UsageError
+from eitskin.fileio import refuse_unwritable
+from eitskin.frames.frames import Frames, load_frames
+from eitskin.model.eitm import save_model
+from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.solve.reconstructor import Reconstructor
 
-if TYPE_CHECKING:
-    from eitskin.calibration.fit import Calibration
-    from eitskin.frames.frames import Frames
-    from eitskin.model.model import Model
 
-
-def add_parser(subparsers: Any) -> None:
-    """Add ``calibrate``."""
-    parser = subparsers.add_parser(
-        "calibrate",
-        help="known weights on a skin, so that its touches come in grams",
-        description=(
-            "Fit the law that turns a touch's strength and place into its load to recordings of"
-            " known weights, say how far it is to be trusted, and store it in a copy of the model."
-            " docs/guide/calibration.md shows how to record them."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``calibrate``."""
+    parser.description = (
+        "Fit the law that turns a touch's strength and place into its load to recordings of"
+        " known weights, say how far it is to be trusted, and store it in a copy of the model."
+        " docs/guide/calibration.md shows how to record them."
     )
     option(
         parser, "recordings RECORDING", "frames (.npz) or a run (.eits) of weights", Path, nargs="+"
@@ -53,16 +55,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Find the presses, fit, write, say."""
-    import numpy as np
-
-    from eitskin.calibration.fit import calibrate
-    from eitskin.calibration.presses import find_presses, joined
-    from eitskin.calibration.weights import load_weights
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.model.eitm import save_model
-    from eitskin.model.prebuilt import load_or_prebuilt
-    from eitskin.solve.reconstructor import Reconstructor
-
     if len(options.recordings) != len(options.weights):
         raise UsageError(
             f"calibrate: {len(options.recordings)} recordings and {len(options.weights)} lists of"
@@ -92,16 +84,13 @@ def run(options: argparse.Namespace) -> int:
     if options.output is not None:
         save_model(options.output, calibrated(model, found))
     if options.json:
-        print(
-            json.dumps(
-                {
-                    "model": name,
-                    "output": str(options.output or ""),
-                    "left_out": unseen,
-                    **found.as_dict(),
-                },
-                indent=2,
-            )
+        print_json(
+            {
+                "model": name,
+                "output": str(options.output or ""),
+                "left_out": unseen,
+                **found.as_dict(),
+            }
         )
     else:
         print("\n".join(_lines(found)))
@@ -121,12 +110,7 @@ def calibrated(model: Model, found: Calibration) -> Model:
 def _frames(path: Path, model: Path | None) -> tuple[Frames, list[int]]:
     """The frames of a file or run, and the numbers that a list of weights counts them by: a board's
     own, or from 0."""
-    from eitskin.frames.frames import load_frames
-
     if path.suffix == ".eits":
-        from eitskin.device.recordings.raw_frames import finite_only
-        from eitskin.device.recordings.recording import frames_of
-
         frames, _ = finite_only(frames_of(path, model), str(path))
         numbers = [int(one) for one in frames.frame_name]
     else:
@@ -138,9 +122,6 @@ def _frames(path: Path, model: Path | None) -> tuple[Frames, list[int]]:
 
 
 def _lines(found: Calibration) -> list[str]:
-    from eitskin.calibration.fit import FORMS
-    from eitskin.core.results import force_text
-
     facts, law = found.as_dict(), found.law
     names = {
         "s_max_s_per_m_mm2": "s_max, S/m mm2",

@@ -1,22 +1,17 @@
 """``eitskin completion SHELL``: commands and options completed by the shell."""
 
 import argparse
-from typing import Any
 
 from eitskin.cli.arguments import option
 from eitskin.errors import missing_extra
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``completion``."""
-    parser = subparsers.add_parser(
-        "completion",
-        help="a script with which your shell completes commands and options",
-        description=(
-            "Print the script for your shell, such as with  eitskin completion bash >"
-            " ~/.local/share/bash-completion/completions/eitskin ; zsh takes it as a file _eitskin"
-            " in a folder of $fpath."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``completion``."""
+    parser.description = (
+        "Print the script for your shell, such as with  eitskin completion bash >"
+        " ~/.local/share/bash-completion/completions/eitskin ; zsh takes it as a file _eitskin"
+        " in a folder of $fpath."
     )
     option(parser, "shell", None, choices=("bash", "zsh", "tcsh"))
     parser.set_defaults(run=run)

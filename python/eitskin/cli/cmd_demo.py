@@ -2,30 +2,27 @@
 the truth."""
 
 import argparse
-import json
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.cli.arguments import Output, option
+from eitskin.cli.printing import print_json
+from eitskin.demo import demo_board
 from eitskin.errors import FileError, MissingExtraError, UsageError
-
-if TYPE_CHECKING:
-    from eitskin.demo.demo_board import BoardDemo
+from eitskin.fileio import refuse_unwritable
+from eitskin.frames.frames import save_frames
+from eitskin.view.panels import check_picture
 
 BOARD = "emu:demo"
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``demo``."""
-    parser = subparsers.add_parser(
-        "demo",
-        help="three simulated touches, reconstructed in C, beside the truth",
-        description=(
-            "Simulate three touches on the paper's skin (nonlinear forward model on another, finer"
-            " mesh, noise), reconstruct them with the C core and the prebuilt model, and draw them;"
-            " then let the firmware find them on an emulated board, and compare what it sends with"
-            " this host's results bit by bit."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``demo``."""
+    parser.description = (
+        "Simulate three touches on the paper's skin (nonlinear forward model on another, finer"
+        " mesh, noise), reconstruct them with the C core and the prebuilt model, and draw them;"
+        " then let the firmware find them on an emulated board, and compare what it sends with"
+        " this host's results bit by bit."
     )
     option(parser, "--snr-db DB", "20 log10(rms(V0)/sigma)", default=60.0)
     option(parser, "--seed", "of noise and contacts", default=1)
@@ -39,10 +36,7 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Simulate, reconstruct, print, draw."""
     from eitskin.demo.demo import run_demo, to_json, to_text
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.frames.frames import save_frames
     from eitskin.view.demo_picture import draw_demo
-    from eitskin.view.panels import check_picture
 
     refuse_unwritable(options.picture, options.frames)
     if not -20 <= options.snr_db <= 200 or options.seed < 0:
@@ -58,16 +52,9 @@ def run(options: argparse.Namespace) -> int:
         print(f"{to_text(demo)}\npicture: {options.picture}", flush=True)
     board = None if options.no_board else _board(step)
     if options.json:
-        print(
-            json.dumps(
-                {**to_json(demo), "picture": str(options.picture), "board": _board_json(board)},
-                indent=2,
-            )
-        )
+        print_json({**to_json(demo), "picture": str(options.picture), "board": _board_json(board)})
     elif board is not None:
-        from eitskin.demo.demo_board import to_text as board_text
-
-        print(f"\n{board_text(board)}")
+        print(f"\n{demo_board.to_text(board)}")
     return 0
 
 
@@ -83,20 +70,16 @@ class _Steps:
         print(f"{self.count}/{self.total} {text}", file=sys.stderr, flush=True)
 
 
-def _board(step: _Steps) -> "BoardDemo | None":
+def _board(step: _Steps) -> demo_board.BoardDemo | None:
     """The same touches on the emulated board; None, with a word on stderr, where emulator or
     firmware are not installed."""
-    from eitskin.demo.demo_board import run_board_demo
-
     step("the same by the firmware, on an emulated board; ten to thirty seconds")
     try:
-        return run_board_demo(BOARD)
+        return demo_board.run_board_demo(BOARD)
     except (MissingExtraError, FileError) as error:
         print(f"eitskin: without the emulated board: {error}", file=sys.stderr)
         return None
 
 
-def _board_json(board: "BoardDemo | None") -> dict[str, Any] | None:
-    from eitskin.demo.demo_board import to_json
-
-    return None if board is None else to_json(board)
+def _board_json(board: demo_board.BoardDemo | None) -> dict[str, Any] | None:
+    return None if board is None else demo_board.to_json(board)

@@ -2,13 +2,11 @@
 named."""
 
 import argparse
-import json
-from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import option
-
-if TYPE_CHECKING:
-    from eitskin.device.discovery import FoundPort
+from eitskin.cli.printing import print_json
+from eitskin.device.discovery import FoundPort, discover
+from eitskin.device.source import source_schemes
 
 URLS = {
     "auto": "the one board that is plugged in",
@@ -20,16 +18,12 @@ URLS = {
 }
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``devices``."""
-    parser = subparsers.add_parser(
-        "devices",
-        help="serial ports, boards that answer, and how simulated ones are named",
-        description=(
-            "List the serial ports of this computer and ask those that look like a board's what"
-            " they are. Ports that do not are left alone: name one with  eitskin info --device"
-            " serial:PORT."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``devices``."""
+    parser.description = (
+        "List the serial ports of this computer and ask those that look like a board's what"
+        " they are. Ports that do not are left alone: name one with  eitskin info --device"
+        " serial:PORT."
     )
     option(parser, "--quiet", "ask no board")
     option(parser, "--json", "print for programs")
@@ -38,12 +32,9 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """List, ask, print."""
-    from eitskin.device.discovery import discover
-    from eitskin.device.source import source_schemes
-
     found = discover(ask=not options.quiet)
     if options.json:
-        print(json.dumps({"ports": [port.as_dict() for port in found], "urls": URLS}, indent=2))
+        print_json({"ports": [port.as_dict() for port in found], "urls": URLS})
         return 0
     if not found:
         print("no serial port; without a board, play with  --device sim:two_touch")
@@ -56,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _line(found: "FoundPort") -> str:
+def _line(found: FoundPort) -> str:
     port = found.port
     usb = "" if port.vendor is None else f", USB {port.vendor:04x}:{port.product or 0:04x}"
     described = "" if port.description in ("", "n/a") else f"  {port.description}"

@@ -1,16 +1,15 @@
 """``eitskin doctor``: what is wrong with frames or with a board, before any image is made."""
 
-from __future__ import annotations
-
 import argparse
 import copy
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from eitskin.cli.arguments import RING_OHM, Output, option
-from eitskin.cli.device_options import DEVICE_HELP
+from eitskin.cli.device_options import DEVICE_HELP, open_named
 from eitskin.cli.import_options import (
     add_import_options,
     floats,
@@ -18,30 +17,31 @@ from eitskin.cli.import_options import (
     read_protocol,
     write_layout,
 )
+from eitskin.cli.printing import say
+from eitskin.device.diagnose_board import board_findings, board_subject, measure
+from eitskin.device.known_model import find_model
 from eitskin.errors import UsageError
-
-if TYPE_CHECKING:
-    from eitskin.frames.doctor.case import Case
-    from eitskin.frames.doctor.report import Report
-    from eitskin.frames.doctor.subject import Subject
-    from eitskin.frames.frames import Frames
-    from eitskin.skin.skin import Skin
+from eitskin.frames.doctor.case import Case
+from eitskin.frames.doctor.examine import examine_case
+from eitskin.frames.doctor.report import Report
+from eitskin.frames.doctor.subject import Subject, subject_from_source
+from eitskin.frames.frames import Frames
+from eitskin.frames.homogeneous import resistor_ring
+from eitskin.skin.skin import Skin
+from eitskin.view.doctor_picture import draw_report
+from eitskin.view.panels import check_picture
 
 TOUCH_RADIUS_PER_SIZE = 0.05
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the command."""
-    parser = subparsers.add_parser(
-        "doctor",
-        help="say what is wrong with measured frames or a board: order, sign, wiring, noise, gains",
-        description=(
-            "Say what is wrong with measured frames before an image is made of them: channel order,"
-            " sign, numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains,"
-            " noise and drift. Takes a frames file, any source that import reads, or with --device"
-            " a board whose skin is not touched, and then also says which faults the board itself"
-            " reports. Exit code 0: nothing must be repaired; 11: something must."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``doctor``."""
+    parser.description = (
+        "Say what is wrong with measured frames before an image is made of them: channel order,"
+        " sign, numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains,"
+        " noise and drift. Takes a frames file, any source that import reads, or with --device"
+        " a board whose skin is not touched, and then also says which faults the board itself"
+        " reports. Exit code 0: nothing must be repaired; 11: something must."
     )
     option(parser, "source", "frames file, or CSV, NPZ, MAT as for import", Path, nargs="?")
     device = parser.add_argument_group("a board in place of a source")
@@ -74,9 +74,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, examine, say."""
-    from eitskin.frames.doctor.examine import examine_case
-    from eitskin.frames.doctor.subject import subject_from_source
-
     if (options.source is None) == (options.device is None):
         raise UsageError("doctor: name frames to examine, or a board: --device URL")
     ring_ohm = options.resistor_ring
@@ -85,8 +82,6 @@ def run(options: argparse.Namespace) -> int:
             "--resistor-ring: a ring stands in for the skin; leave --skin and --touch out"
         )
     if options.picture is not None:
-        from eitskin.view.panels import check_picture
-
         check_picture(options.picture)
     protocol, skin, n_electrodes = read_protocol(options)
     if options.device is not None:
@@ -115,11 +110,6 @@ def _repaired(options: argparse.Namespace, repair: str) -> argparse.Namespace:
 def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
     """Measure, examine, say; with ``--touch`` the second half of the frames is of the touched
     skin."""
-    from eitskin.cli.device_options import open_named, say
-    from eitskin.device.diagnose_board import board_findings, board_subject, measure
-    from eitskin.device.known_model import find_model
-    from eitskin.frames.doctor.examine import examine_case
-
     with open_named(options) as device:
         known = find_model(device.board, options.model, device.transport.name)
         simulated = device.transport.synchronous
@@ -142,8 +132,6 @@ def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
 
 def _tell(options: argparse.Namespace, report: Report, case: Case) -> int:
     if options.picture is not None:
-        from eitskin.view.doctor_picture import draw_report
-
         draw_report(options.picture, report, case)
     if options.json:
         print(json.dumps(report.as_table()))
@@ -155,7 +143,6 @@ def _tell(options: argparse.Namespace, report: Report, case: Case) -> int:
 def _with_ring(subject: Subject, ring_ohm: float | None) -> Subject:
     if ring_ohm is None:
         return subject
-    from eitskin.frames.homogeneous import resistor_ring
 
     n_electrodes = subject.readings[0][1].protocol.n_electrodes
     return replace(subject, skin=None, stand_in=resistor_ring(n_electrodes, ring_ohm))
@@ -185,8 +172,6 @@ def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subje
 
 
 def _touched(frames: Frames, touches: list[tuple[float, float, float]], name: str | None) -> Frames:
-    import numpy as np
-
     if not frames.n_frames:
         raise UsageError("--touch: there is no frame besides the quiet ones")
     if name is not None and name not in frames.frame_name:

@@ -3,21 +3,23 @@
 import argparse
 import json
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from eitskin.cli.arguments import Output, option
+from eitskin.fileio import refuse_unwritable
+from eitskin.frames.eidors import save_eidors
+from eitskin.frames.frames import load_frames
+from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.solve.reconstructor import Reconstructor
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``export``."""
-    parser = subparsers.add_parser(
-        "export",
-        help="a model, frames and their images as a .mat file for EIDORS",
-        description=(
-            "Write EIDORS structs that MATLAB and Octave load: fmdl with electrodes and patterns,"
-            " img_bkgnd, the Jacobian J of its elements, c2f from our pixels to them; with frames"
-            " also vh, vi and img, what our solver makes of them."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``export``."""
+    parser.description = (
+        "Write EIDORS structs that MATLAB and Octave load: fmdl with electrodes and patterns,"
+        " img_bkgnd, the Jacobian J of its elements, c2f from our pixels to them; with frames"
+        " also vh, vi and img, what our solver makes of them."
     )
     option(parser, "frames FRAMES.npz", "frames of the model's protocol", Path, nargs="?")
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
@@ -29,14 +31,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Reconstruct, mesh, write."""
-    import numpy as np
-
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.frames.eidors import save_eidors
-    from eitskin.frames.frames import load_frames
-    from eitskin.model.prebuilt import load_or_prebuilt
-    from eitskin.solve.reconstructor import Reconstructor
-
     refuse_unwritable(options.output)
     model, blob, _ = load_or_prebuilt(options.model)
     frames, images = None, None

@@ -5,25 +5,26 @@ import json
 import shutil
 import sys
 import tempfile
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from eitskin.cli.arguments import option
+from eitskin.device.flash import plan_flash, run_flash
 from eitskin.errors import UsageError
+from eitskin.fileio import write_bytes
+from eitskin.firmware.prebuilt import BOARD, load_image
+from eitskin.model.eitm import load_model
+from eitskin.model.prebuilt import load_prebuilt
 
 TOOLS = ("openocd", "st-flash", "pyocd")
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``flash``."""
-    parser = subparsers.add_parser(
-        "flash",
-        help="put firmware and a model on a NUCLEO-F767ZI",
-        description=(
-            "Put firmware on a NUCLEO-F767ZI through its ST-LINK, and a model into its first bank,"
-            " by whichever of openocd, st-flash and pyocd is installed. The exact commands are"
-            " printed first. What is not named is what ships with eitskin."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``flash``."""
+    parser.description = (
+        "Put firmware on a NUCLEO-F767ZI through its ST-LINK, and a model into its first bank,"
+        " by whichever of openocd, st-flash and pyocd is installed. The exact commands are"
+        " printed first. What is not named is what ships with eitskin."
     )
     option(parser, "--image BIN", "firmware (default: the prebuilt one)", Path)
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
@@ -37,12 +38,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, print, run."""
-    from hashlib import sha256
-
-    from eitskin.device.flash import plan_flash, run_flash
-    from eitskin.model.eitm import load_model
-    from eitskin.model.prebuilt import load_prebuilt
-
     if options.no_model and options.model is not None:
         raise UsageError("flash: --model and --no-model contradict each other; give one of them")
     if options.json and not options.dry_run:
@@ -74,9 +69,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _prebuilt_image(folder: Path) -> Path:
     """The image that ships with the package, as a file in ``folder`` that a tool can read."""
-    from eitskin.fileio import write_bytes
-    from eitskin.firmware.prebuilt import BOARD, load_image
-
     path = folder / f"{BOARD}.bin"
     write_bytes(path, load_image()[0])
     return path

@@ -8,18 +8,17 @@ from typing import Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.import_options import add_import_options, read_options, read_protocol, write_layout
+from eitskin.fileio import refuse_unwritable
+from eitskin.frames.frames import save_frames
+from eitskin.frames.importer import import_frames
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add the command."""
-    parser = subparsers.add_parser(
-        "import",
-        help="turn a text, NPY, NPZ or MAT file of measured voltages into a frames file",
-        description=(
-            "Turn a text, NPY, NPZ or MAT file of measured voltages into a frames file, in the"
-            " protocol's order, signed, in volts. Run  eitskin doctor SOURCE  first to learn which"
-            " options it needs."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``import``."""
+    parser.description = (
+        "Turn a text, NPY, NPZ or MAT file of measured voltages into a frames file, in the"
+        " protocol's order, signed, in volts. Run  eitskin doctor SOURCE  first to learn which"
+        " options it needs."
     )
     option(parser, "source", "CSV or other text, NPY, NPZ, MAT, or a frames file to repair", Path)
     option(parser, "-o --output OUT.npz", "frames file to write", Output, required=True)
@@ -30,10 +29,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, repair, write."""
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.frames.frames import save_frames
-    from eitskin.frames.importer import import_frames
-
     refuse_unwritable(options.output, options.save_layout)
     protocol, skin, n_electrodes = read_protocol(options)
     named = read_options(options)

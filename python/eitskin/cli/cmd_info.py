@@ -1,27 +1,20 @@
 """``eitskin info``: what a board is, which model it has, how it scans, and what it has counted."""
 
-from __future__ import annotations
-
 import argparse
-import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import add_device, open_named, print_table
+from eitskin.cli.device_options import add_device, open_named
+from eitskin.cli.printing import print_json, print_table
+from eitskin.device.wire.packets import BoardInfo, BoardStats
+from eitskin.model.storage import STORAGES
 
-if TYPE_CHECKING:
-    from eitskin.device.wire.packets import BoardInfo, BoardStats
 
-
-def add_parser(subparsers: Any) -> None:
-    """Add ``info``."""
-    parser = subparsers.add_parser(
-        "info",
-        help="what a board is, its model, its scan, its faults and statistics",
-        description=(
-            "Ask a board what it is, which model it has, how it scans, which faults it reports and"
-            " what it has counted."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``info``."""
+    parser.description = (
+        "Ask a board what it is, which model it has, how it scans, which faults it reports and"
+        " what it has counted."
     )
     add_device(parser)
     option(parser, "--reset-statistics", "count from zero after this")
@@ -37,11 +30,8 @@ def run(options: argparse.Namespace) -> int:
         hashes = device.hashes().as_dict()
     if options.json:
         counted = None if stats is None else stats.as_dict()
-        print(
-            json.dumps(
-                {"device": url, "board": info.as_dict(), "sha256": hashes, "statistics": counted},
-                indent=2,
-            )
+        print_json(
+            {"device": url, "board": info.as_dict(), "sha256": hashes, "statistics": counted}
         )
         return 0
     sums = {f"{name} SHA": one for name, one in hashes.items() if one}
@@ -54,8 +44,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
-    from eitskin.model.storage import STORAGES
-
     facts = {
         "device": url,
         "board": info.board,

@@ -1,28 +1,42 @@
 """``eitskin model build | voltages | info | verify | upload``."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
 
 from eitskin.cli.arguments import RING_OHM, Output, option
 from eitskin.cli.device_options import DEVICE_HELP
+from eitskin.cli.printing import print_json
+from eitskin.cli.progress import bar
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import force_text
+from eitskin.device.open import open_device
 from eitskin.errors import MissingExtraError, UsageError, VerificationError
-
-if TYPE_CHECKING:
-    from eitskin.model.model import Model
-    from eitskin.skin.protocol import Protocol
-    from eitskin.skin.skin import Skin
+from eitskin.fem.grid import grid_for
+from eitskin.fileio import refuse_unwritable
+from eitskin.frames.eidors import jacobian_on
+from eitskin.frames.front_end import advice, demand_of
+from eitskin.frames.homogeneous import resistor_ring, voltages_of
+from eitskin.model.build import BuildSettings, build_model
+from eitskin.model.eitm import load_model, save_model
+from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.skin.eidors import read_eidors
+from eitskin.skin.protocol import Protocol, adjacent
+from eitskin.skin.skin import Skin, load_skin, paper_skin, skin_of_eidors
+from eitskin.solve.reconstructor import Reconstructor
 
 NUMPY_BOUND = 1e-4
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``model`` and its own subcommands."""
-    parser = subparsers.add_parser("model", help="build, describe, verify or upload an .eitm model")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``model``."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
     option(
@@ -106,16 +120,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run_build(options: argparse.Namespace) -> int:
     """Build and write a model."""
-    from eitskin.cli.progress import bar
-    from eitskin.fem.grid import grid_for
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.frames.eidors import jacobian_on
-    from eitskin.frames.front_end import advice, demand_of
     from eitskin.frames.homogeneous_fem import transfer_by_elements
-    from eitskin.model.build import BuildSettings, build_model
-    from eitskin.model.eitm import save_model
-    from eitskin.skin.eidors import read_eidors
-    from eitskin.skin.skin import skin_of_eidors
 
     their = read_eidors(options.skin) if _is_eidors(options) else None
     skin, protocol = _skin_of(options) if their is None else skin_of_eidors(their)
@@ -144,9 +149,6 @@ def _is_eidors(options: argparse.Namespace) -> bool:
 
 
 def _skin_of(options: argparse.Namespace) -> tuple[Skin, Protocol]:
-    from eitskin.skin.protocol import adjacent
-    from eitskin.skin.skin import load_skin, paper_skin
-
     if (options.skin is None) == (not options.paper):
         raise UsageError(
             f"model {options.action}: name a SKIN.toml, or give --paper: one of the two"
@@ -156,8 +158,6 @@ def _skin_of(options: argparse.Namespace) -> tuple[Skin, Protocol]:
 
 def run_voltages(options: argparse.Namespace) -> int:
     """Predict what each row measures."""
-    from eitskin.frames.front_end import advice, demand_of
-    from eitskin.frames.homogeneous import resistor_ring, voltages_of
     from eitskin.frames.homogeneous_fem import transfer_by_elements
 
     skin, protocol = _skin_of(options)
@@ -184,16 +184,12 @@ def run_voltages(options: argparse.Namespace) -> int:
 
 def run_info(options: argparse.Namespace) -> int:
     """Print what is in a model."""
-    from eitskin.model.prebuilt import load_or_prebuilt
-
     model, blob, name = load_or_prebuilt(options.model)
     _print_info(model, len(blob), name, options.json)
     return 0
 
 
 def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
-    from dataclasses import asdict
-
     facts: dict[str, Any] = {
         "model": name,
         "bytes": size,
@@ -215,7 +211,7 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
         "defaults": asdict(model.defaults),
     }
     if as_json:
-        print(json.dumps(facts, indent=2))
+        print_json(facts)
         return
     defaults = facts.pop("defaults")
     for key, value in facts.items():
@@ -228,8 +224,6 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
 
 
 def _calibration_text(model: Model) -> str:
-    from eitskin.core.results import force_text
-
     if model.load is None:
         return "none; touches have no load"
     law = model.load
@@ -252,9 +246,6 @@ def _model_errors_text(model: Model) -> str:
 
 def run_verify(options: argparse.Namespace) -> int:
     """Run the golden frame; the float32 core must give the stored bits."""
-    from eitskin.core.engine import CoreEngine
-    from eitskin.model.prebuilt import load_or_prebuilt
-
     model, blob, name = load_or_prebuilt(options.model)
     differences = {
         "C float32": CoreEngine(blob, "float32").self_test(),
@@ -270,15 +261,12 @@ def run_verify(options: argparse.Namespace) -> int:
     same_bits = differences["C float32"] == 0 and differences["C float32, portable"] == 0
     within = max(differences.values()) <= NUMPY_BOUND
     if options.json:
-        print(
-            json.dumps(
-                {
-                    "model": name,
-                    "difference_to_golden_over_peak": differences,
-                    "ok": same_bits and within,
-                },
-                indent=2,
-            )
+        print_json(
+            {
+                "model": name,
+                "difference_to_golden_over_peak": differences,
+                "ok": same_bits and within,
+            }
         )
     else:
         print(f"{name}: golden frame, greatest difference to the stored image over its peak")
@@ -298,10 +286,6 @@ def run_verify(options: argparse.Namespace) -> int:
 
 def _numpy_difference(model: Model) -> float:
     """Of the golden frame's image by the numpy reference to the stored one, over its peak."""
-    import numpy as np
-
-    from eitskin.solve.reconstructor import Reconstructor
-
     reference = Reconstructor(model, engine="numpy")
     reference.tare(model.golden.reference_v)
     image = reference.reconstruct(model.golden.frame_v, touches=False).image
@@ -310,11 +294,6 @@ def _numpy_difference(model: Model) -> float:
 
 def run_upload(options: argparse.Namespace) -> int:
     """Send the model, with a bar on stderr where that is a terminal."""
-    from tqdm import tqdm
-
-    from eitskin.device.open import open_device
-    from eitskin.model.eitm import load_model
-
     _, blob = load_model(options.model)
     with open_device(options.device) as device:
         with tqdm(
@@ -333,9 +312,7 @@ def run_upload(options: argparse.Namespace) -> int:
         url = device.transport.url
     if options.json:
         facts = {"device": url, "model": str(options.model), "bytes": len(blob)}
-        print(
-            json.dumps(facts | {"model_crc": f"{info.model_crc:08x}", "bank": info.bank}, indent=2)
-        )
+        print_json(facts | {"model_crc": f"{info.model_crc:08x}", "bank": info.bank})
     else:
         print(
             f"{url}: {options.model} is in bank {info.bank}, {len(blob)} bytes, checksum"

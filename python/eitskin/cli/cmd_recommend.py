@@ -2,25 +2,26 @@
 model."""
 
 import argparse
-import json
 from pathlib import Path
-from typing import Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.budget_options import add_wish, read_target
+from eitskin.cli.printing import print_json
+from eitskin.cli.progress import bar
 from eitskin.errors import UsageError
+from eitskin.fileio import refuse_unwritable
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import load_skin, paper_skin
+from eitskin.tuning.front import Conditions, choose, load_front
+from eitskin.tuning.recommend import Recommendation, write_model
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``recommend``."""
-    parser = subparsers.add_parser(
-        "recommend",
-        help="what to choose for a time or an accuracy, and its model",
-        description=(
-            "Choose from measured results: the most accurate point within --budget, or the cheapest"
-            " that reaches --accuracy. The budget holds for solve and touches of the mean frame"
-            " (host: the median), with --worst of the costliest that was counted or timed."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``recommend``."""
+    parser.description = (
+        "Choose from measured results: the most accurate point within --budget, or the cheapest"
+        " that reaches --accuracy. The budget holds for solve and touches of the mean frame"
+        " (host: the median), with --worst of the costliest that was counted or timed."
     )
     add_wish(parser)
     option(parser, "--board", choices=("f767", "host"), default="f767")
@@ -39,13 +40,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Choose, say why, and write the model."""
-    from eitskin.cli.progress import bar
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.skin.protocol import adjacent
-    from eitskin.skin.skin import load_skin, paper_skin
-    from eitskin.tuning.front import Conditions, choose, load_front
-    from eitskin.tuning.recommend import Recommendation, write_model
-
     target = read_target(
         options,
         options.board,
@@ -69,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         model = None if options.output is None else str(options.output)
         facts = chosen.as_dict() | {"front": front.where_from, "model": model}
-        print(json.dumps(facts, indent=2))
+        print_json(facts)
         return 0
     print(chosen.text())
     if size is not None:

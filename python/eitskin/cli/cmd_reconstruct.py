@@ -11,17 +11,15 @@ from eitskin.cli.budget_options import add_wish, named_target
 from eitskin.cli.device_options import add_solver, named_solver
 from eitskin.cli.progress import bar
 from eitskin.errors import FrameError, UsageError
+from eitskin.reconstruct.report import to_json, to_text
+from eitskin.reconstruct.steps import ReconstructSettings, reconstruct_frames
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``reconstruct``."""
-    parser = subparsers.add_parser(
-        "reconstruct",
-        help="touches and images of the frames in a file",
-        description=(
-            "Turn frames into touches in millimetres and images. Where the frames carry the truth,"
-            " the touches are compared with it."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``reconstruct``."""
+    parser.description = (
+        "Turn frames into touches in millimetres and images. Where the frames carry the truth,"
+        " the touches are compared with it."
     )
     option(parser, "frames FRAMES.npz", "a frames file (eitskin import makes one)", Path)
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
@@ -73,9 +71,6 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Reconstruct all frames; those that cannot be used are named, and the others are still done
     and written."""
-    from eitskin.reconstruct.report import to_json, to_text
-    from eitskin.reconstruct.steps import ReconstructSettings, reconstruct_frames
-
     changes: dict[str, Any] = {"sign": options.sign, "warm_start": options.warm}
     if options.second_pass:
         changes["second_pass"] = True

@@ -1,40 +1,27 @@
 """``eitskin record``: every packet of a board into a file, for ``replay`` and for whoever has no
 board."""
 
-from __future__ import annotations
-
 import argparse
-import json
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+
+from tqdm import tqdm
 
 from eitskin.cli.arguments import Output, above, option
-from eitskin.cli.device_options import (
-    add_device,
-    add_scan,
-    add_stream,
-    read_mode,
-    say,
-    say_progress,
-    session_settings,
-)
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from eitskin.device.live_frames import Item, LiveSummary
+from eitskin.cli.device_options import add_device, add_scan, add_stream, read_mode, session_settings
+from eitskin.cli.printing import print_json, say, say_progress
+from eitskin.device.events import Events
+from eitskin.device.live_frames import Item, LiveDrive, LiveFrame, LiveSummary
+from eitskin.device.wire.packets import Fault
+from eitskin.live.session import Session
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``record``."""
-    parser = subparsers.add_parser(
-        "record",
-        help="write every packet of a board to a file",
-        description=(
-            "Take the reference, then write every packet of a board to a file as it comes, the"
-            " reference's raw frames included. A recording that is cut, even by kill -9, can be"
-            " read up to its last whole packet. Stop with Ctrl-C."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``record``."""
+    parser.description = (
+        "Take the reference, then write every packet of a board to a file as it comes, the"
+        " reference's raw frames included. A recording that is cut, even by kill -9, can be"
+        " read up to its last whole packet. Stop with Ctrl-C."
     )
     add_device(parser)
     option(parser, "-o --output RUN.eits", None, Output, required=True)
@@ -48,8 +35,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Record, then say how much."""
-    from eitskin.live.session import Session
-
     settings = session_settings(options, read_mode(options.mode), record=options.output)
     with Session(options.device, settings, say=say, progress=say_progress) as session:
         items = session.items()
@@ -67,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
             "packets": recorder.packets,
             "bytes": recorder.bytes,
         }
-        print(json.dumps(facts | summary.as_dict(), indent=2))
+        print_json(facts | summary.as_dict())
     else:
         print("\n".join(summary.lines()))
         print(f"{options.output}: {recorder.packets} packets, {recorder.bytes} bytes")
@@ -75,8 +60,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _until(items: Iterator[Item], seconds: float | None) -> Iterator[Item]:
-    from eitskin.device.live_frames import LiveFrame
-
     for item in items:
         yield item
         if seconds is not None and isinstance(item, LiveFrame) and item.time_us >= 1e6 * seconds:
@@ -84,12 +67,6 @@ def _until(items: Iterator[Item], seconds: float | None) -> Iterator[Item]:
 
 
 def _count(items: Iterable[Item], summary: LiveSummary, frames: int) -> None:
-    from tqdm import tqdm
-
-    from eitskin.device.events import Events
-    from eitskin.device.live_frames import LiveDrive, LiveFrame
-    from eitskin.device.wire.packets import Fault
-
     events = Events()
     with tqdm(
         desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()

@@ -4,23 +4,27 @@ core."""
 import argparse
 import json
 from pathlib import Path
-from typing import Any
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.device_options import add_verbose, add_zones, read_mode, read_zones, say
+from eitskin.cli.device_options import add_verbose, add_zones, read_mode, read_zones
+from eitskin.cli.live_output import check_drawn, show
+from eitskin.cli.printing import print_json, say
+from eitskin.device.recordings.host_check import check_recording
+from eitskin.device.recordings.raw_frames import finite_only
+from eitskin.device.recordings.recording import frames_of
 from eitskin.errors import FrameError, UsageError, VerificationError
+from eitskin.fileio import refuse_unwritable
+from eitskin.frames.frames import save_frames
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``replay``."""
-    parser = subparsers.add_parser(
-        "replay",
-        help="show a recording, export its frames, or check its images",
-        description=(
-            "Show a recording as  eitskin stream  showed it; write its raw frames as a frames file;"
-            " or put them through this host's core and compare every bit of the images and touches"
-            " with what the board sent."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``replay``."""
+    parser.description = (
+        "Show a recording as  eitskin stream  showed it; write its raw frames as a frames file;"
+        " or put them through this host's core and compare every bit of the images and touches"
+        " with what the board sent."
     )
     option(parser, "recording RUN.eits", None, Path)
     option(
@@ -40,8 +44,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Show, export or check."""
-    from eitskin.fileio import refuse_unwritable
-
     refuse_unwritable(options.picture, options.frames)
     if options.check or options.frames is not None:
         shown = (options.mode, options.picture, options.film, options.first)
@@ -60,10 +62,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _show(options: argparse.Namespace) -> None:
-    from eitskin.cli.live_output import check_drawn, show
-    from eitskin.live.session import Session
-    from eitskin.live.settings import SessionSettings
-
     mode = read_mode(options.mode or "touches")
     check_drawn(options, mode)
     settings = SessionSettings(
@@ -78,10 +76,6 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _export(options: argparse.Namespace) -> None:
-    from eitskin.device.recordings.raw_frames import finite_only
-    from eitskin.device.recordings.recording import frames_of
-    from eitskin.frames.frames import save_frames
-
     frames = frames_of(options.recording, options.model)
     kept, left_out = finite_only(frames, str(options.recording))
     save_frames(options.frames, kept)
@@ -101,8 +95,6 @@ def _export(options: argparse.Namespace) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    from eitskin.device.recordings.host_check import check_recording
-
     check, noted = check_recording(options.recording, options.model)
     if not check.compared:
         raise FrameError(
@@ -110,12 +102,7 @@ def _check(options: argparse.Namespace) -> None:
             " images or touches, from the tare on, as  eitskin record  makes by default"
         )
     if options.json:
-        print(
-            json.dumps(
-                {"recording": str(options.recording), "solver_noted": noted} | check.as_dict(),
-                indent=2,
-            )
-        )
+        print_json({"recording": str(options.recording), "solver_noted": noted} | check.as_dict())
     else:
         print(check.text())
     if check.different:

@@ -2,25 +2,23 @@
 
 import argparse
 import json
-from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import Output, option
+from eitskin.cli.arguments import SCENE_HELP, Output, option
+from eitskin.cli.printing import print_json
 from eitskin.cli.progress import bar
-from eitskin.errors import FileError
+from eitskin.fileio import refuse_unwritable
+from eitskin.frames.frames import save_frames
+from eitskin.scene.library_scenes import descriptions, find_scene
+from eitskin.view.panels import check_picture
+from eitskin.view.scene_pictures import draw_scene
 
-SCENE_HELP = "a scene file, or a scene of the library (eitskin scene list)"
 
-
-def add_parser(subparsers: Any) -> None:
-    """Add ``scene`` and its own subcommands."""
-    parser = subparsers.add_parser(
-        "scene",
-        help="simulate what happens on a skin, with the imperfections that a scene names",
-        description=(
-            "A scene file says what happens on a skin and which imperfections take part;"
-            " docs/guide/scenes.md."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``scene``."""
+    parser.description = (
+        "A scene file says what happens on a skin and which imperfections take part;"
+        " docs/guide/scenes.md."
     )
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     one = what.add_parser("run", help="simulate a scene: frames with their truth")
@@ -53,24 +51,12 @@ def add_parser(subparsers: Any) -> None:
     effects.set_defaults(run=run_effects)
 
 
-def check_folder(path: Path) -> None:
-    """Refuse a file in a folder that is not there.
-
-    Raises:
-        FileError: it is not.
-    """
-    if not path.parent.is_dir():
-        raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
-
-
 def run_scene(options: argparse.Namespace) -> int:
     """Simulate and write."""
-    from eitskin.frames.frames import save_frames
     from eitskin.scene.compiler import compile_scene
-    from eitskin.scene.library_scenes import find_scene
     from eitskin.scene.runner import run
 
-    check_folder(options.output)
+    refuse_unwritable(options.output)
     scene = find_scene(options.scene)
     frames = run(compile_scene(scene), truth_pixels=options.truth_pixels, progress=bar("solving"))
     save_frames(options.output, frames)
@@ -86,7 +72,7 @@ def run_scene(options: argparse.Namespace) -> int:
             "counters": counters,
             "output": str(options.output),
         }
-        print(json.dumps(facts, indent=2))
+        print_json(facts)
         return 0
     print(
         f"{scene.name}: {scene.frames} frames after {scene.quiet_frames} quiet ones ->"
@@ -102,7 +88,6 @@ def run_scene(options: argparse.Namespace) -> int:
 def run_plan(options: argparse.Namespace) -> int:
     """Print the plan."""
     from eitskin.scene.compiler import compile_scene
-    from eitskin.scene.library_scenes import find_scene
 
     plan = compile_scene(find_scene(options.scene)).plan
     print(json.dumps(plan.as_dict(), indent=2) if options.json else plan.text())
@@ -112,12 +97,9 @@ def run_plan(options: argparse.Namespace) -> int:
 def run_picture(options: argparse.Namespace) -> int:
     """Simulate and draw."""
     from eitskin.scene.compiler import compile_scene
-    from eitskin.scene.library_scenes import find_scene
     from eitskin.scene.runner import run
-    from eitskin.view.panels import check_picture
-    from eitskin.view.scene_pictures import draw_scene
 
-    check_folder(options.output)
+    refuse_unwritable(options.output)
     check_picture(options.output)
     scene = find_scene(options.scene)
     draw_scene(
@@ -129,11 +111,9 @@ def run_picture(options: argparse.Namespace) -> int:
 
 def run_list(options: argparse.Namespace) -> int:
     """Print the library."""
-    from eitskin.scene.library_scenes import descriptions
-
     found = descriptions()
     if options.json:
-        print(json.dumps(found, indent=2))
+        print_json(found)
         return 0
     for name, line in found.items():
         print(f"{name:<16} {line}")
@@ -150,7 +130,7 @@ def run_effects(options: argparse.Namespace) -> int:
     if options.name is None:
         rows = {name: summary_of(target) for name, target in registry.names().items()}
         if options.json:
-            print(json.dumps(rows, indent=2))
+            print_json(rows)
             return 0
         for name, line in rows.items():
             print(f"{name:<18} {line}")
@@ -165,7 +145,7 @@ def run_effects(options: argparse.Namespace) -> int:
             "summary": module.SUMMARY,
             "parameters": parameters,
         }
-        print(json.dumps(facts, indent=2))
+        print_json(facts)
         return 0
     print(f"[effects.{module.NAME}]   {module.SUMMARY}   (stage: {module.STAGE.name.lower()})")
     for one in parameters:

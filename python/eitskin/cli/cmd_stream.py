@@ -2,7 +2,6 @@
 to."""
 
 import argparse
-from typing import Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import (
@@ -14,24 +13,22 @@ from eitskin.cli.device_options import (
     add_zones,
     opened_outputs,
     read_mode,
-    say,
-    say_progress,
     session_settings,
 )
+from eitskin.cli.live_output import check_drawn, show
+from eitskin.cli.printing import say, say_progress
+from eitskin.device.wire.link_table import Stream
+from eitskin.live.session import Session
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``stream``."""
-    parser = subparsers.add_parser(
-        "stream",
-        help="touches, images or raw frames of a board as they come",
-        description=(
-            "Follow a board: its touches as a table on standard output, with a line a gesture,"
-            " faults and events of the"
-            " link on standard error, a summary at the end. What is seen on a simulated or emulated"
-            " board is compared with its scene's truth. With --json each line is a JSON object,"
-            " the last one the summary (docs/reference/message.md)."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``stream``."""
+    parser.description = (
+        "Follow a board: its touches as a table on standard output, with a line a gesture,"
+        " faults and events of the"
+        " link on standard error, a summary at the end. What is seen on a simulated or emulated"
+        " board is compared with its scene's truth. With --json each line is a JSON object,"
+        " the last one the summary (docs/reference/message.md)."
     )
     add_device(parser)
     add_stream(parser, "touches")
@@ -48,10 +45,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Set up, follow, sum up."""
-    from eitskin.cli.live_output import check_drawn, show
-    from eitskin.device.wire.link_table import Stream
-    from eitskin.live.session import Session
-
     mode = read_mode(options.mode)
     drawn = options.picture is not None or options.film is not None
     needs = "an image" if mode & Stream.IMAGE else "a picture" if drawn else ""

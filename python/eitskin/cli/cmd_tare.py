@@ -2,22 +2,19 @@
 
 import argparse
 import json
-from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import TARE_FRAMES, add_device, open_named, say
+from eitskin.cli.device_options import TARE_FRAMES, add_device, open_named
+from eitskin.cli.printing import say
+from eitskin.device.settings import check_tare_frames
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``tare``."""
-    parser = subparsers.add_parser(
-        "tare",
-        help="take a board's reference from its untouched skin",
-        description=(
-            "Take a board's reference frame from its untouched skin; four frames or more also tell"
-            " it the noise. It is kept until the board is reset, the scan is changed or another"
-            " model comes."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``tare``."""
+    parser.description = (
+        "Take a board's reference frame from its untouched skin; four frames or more also tell"
+        " it the noise. It is kept until the board is reset, the scan is changed or another"
+        " model comes."
     )
     add_device(parser)
     option(parser, "--frames N", "1, or 4 to 1024", int, default=TARE_FRAMES)
@@ -26,8 +23,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Tare and say so."""
-    from eitskin.device.settings import check_tare_frames
-
     check_tare_frames(options.frames)
     with open_named(options) as device:
         if not device.transport.synchronous:

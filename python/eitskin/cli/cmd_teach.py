@@ -1,19 +1,17 @@
 """``eitskin teach ACTION``: a model learned from presses at known places. One file an action beside
 this one, ``teach_ACTION``, with ``add_parser(actions)``."""
 
+import argparse
 import importlib
-from typing import Any
 
 ACTIONS = ("plan", "record", "fit", "update", "check")
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``teach`` and its actions."""
-    parser = subparsers.add_parser(
-        "teach",
-        help="a model learned from presses at known places",
-        description="Learn a skin's model from presses at known places: no sign, gain, order of"
-        " channels or exact geometry is needed. docs/guide/teaching.md shows how.",
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``teach``."""
+    parser.description = (
+        "Learn a skin's model from presses at known places: no sign, gain, order of"
+        " channels or exact geometry is needed. docs/guide/teaching.md shows how."
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     for name in ACTIONS:

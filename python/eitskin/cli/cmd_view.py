@@ -7,7 +7,6 @@ import webbrowser
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
@@ -19,27 +18,26 @@ from eitskin.cli.device_options import (
     add_zones,
     opened_outputs,
     read_mode,
-    say,
     session_settings,
 )
+from eitskin.cli.printing import say
+from eitskin.device.timing import TIMED
 from eitskin.errors import FileError, UsageError
-
-if TYPE_CHECKING:
-    from eitskin.page.teacher import Teacher
+from eitskin.fileio import read_bytes, refuse_unwritable
+from eitskin.page.server import MIN_TOKEN, PageServer, listen, load_server
+from eitskin.page.teacher import Teacher
+from eitskin.skin.skin import load_skin
+from eitskin.teaching.plan import load_plan
 
 PORT = 8470
 
 
-def add_parser(subparsers: Any) -> None:
-    """Add ``view``."""
-    parser = subparsers.add_parser(
-        "view",
-        help="the skin live in a browser: image, touches, electrodes, voltages",
-        description=(
-            "Serve a page that shows a board live, and say its address. Simulated and recorded"
-            " frames come at the speed that they were scanned at, or as ?speed=2 or ?speed=max"
-            " after the device says; ?loop=1 begins again at the end. Ctrl-C ends it."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options of ``view``."""
+    parser.description = (
+        "Serve a page that shows a board live, and say its address. Simulated and recorded"
+        " frames come at the speed that they were scanned at, or as ?speed=2 or ?speed=max"
+        " after the device says; ?loop=1 begins again at the end. Ctrl-C ends it."
     )
     add_device(parser, json=False)
     option(
@@ -80,9 +78,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Listen, follow, serve."""
-    from eitskin.device.timing import TIMED
-    from eitskin.page.server import MIN_TOKEN, PageServer, listen, load_server
-
     load_server()
     if options.token is not None and len(options.token) < MIN_TOKEN:
         raise UsageError(f"--token: a word of at least {MIN_TOKEN} characters")
@@ -120,13 +115,9 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _teacher(options: argparse.Namespace) -> "Teacher | None":
+def _teacher(options: argparse.Namespace) -> Teacher | None:
     if options.teach is None:
         return None
-    from eitskin.fileio import read_bytes, refuse_unwritable
-    from eitskin.page.teacher import Teacher
-    from eitskin.skin.skin import load_skin
-    from eitskin.teaching.plan import load_plan
 
     presses = options.presses or options.folder / "presses.npz"
     refuse_unwritable(presses)

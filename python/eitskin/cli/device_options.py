@@ -1,24 +1,26 @@
 """The options that commands for boards share, and what they are turned into."""
 
-from __future__ import annotations
-
 import argparse
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.cli.arguments import above, option
 from eitskin.cli.budget_options import add_wish, named_target
+from eitskin.cli.printing import say
+from eitskin.config import nearest
+from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
+from eitskin.core.gestures import Zone
+from eitskin.device.client import Device
+from eitskin.device.open import open_with_files
+from eitskin.device.settings import ScanSettings, SolverSettings, check_tare_frames
+from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FileError, UsageError
-
-if TYPE_CHECKING:
-    from eitskin.core.gestures import Zone
-    from eitskin.device.client import Device
-    from eitskin.device.settings import ScanSettings, SolverSettings
-    from eitskin.device.wire.link_table import Stream
-    from eitskin.live.session import Session
-    from eitskin.live.settings import SessionSettings
-    from eitskin.sinks.outputs import Outputs
+from eitskin.fileio import refuse_unwritable
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings, kinds_of
+from eitskin.live.zones import load_zones
+from eitskin.sinks.outputs import Outputs
+from eitskin.sinks.sink import Source
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in), serial:/dev/ttyACM0, text:PORT?layout=FILE (another"
@@ -177,9 +179,6 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
 
 def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
     """The sinks of ``--to``, open."""
-    from eitskin.sinks.outputs import Outputs
-    from eitskin.sinks.sink import Source
-
     transport, board = session.device.transport, session.device.board
     model = None if session.known is None else session.known.model
     source = Source(transport.url, board.board, model, getattr(options, "overwrite", False))
@@ -197,15 +196,12 @@ def read_zones(path: Path | None) -> tuple[Zone, ...]:
     """The zones of ``--zones``."""
     if path is None:
         return ()
-    from eitskin.live.zones import load_zones
 
     return load_zones(path)
 
 
 def read_mode(text: str) -> Stream:
     """The kinds in "raw,touches"."""
-    from eitskin.live.settings import kinds_of
-
     return kinds_of(text, "--mode")
 
 
@@ -215,8 +211,6 @@ def read_scan(options: argparse.Namespace) -> ScanSettings:
     Raises:
         UsageError: every frame would be checked.
     """
-    from eitskin.device.settings import ScanSettings
-
     if options.reciprocal == 1:
         raise UsageError(
             "--reciprocal 1 would check every frame, which is a full scan; use --full, or at least"
@@ -234,8 +228,6 @@ def read_scan(options: argparse.Namespace) -> ScanSettings:
 
 def read_solver(options: argparse.Namespace) -> SolverSettings:
     """What is named of the solver."""
-    from eitskin.device.settings import SolverSettings
-
     return SolverSettings(
         warm_start=True if options.warm else False if options.cold else None,
         sign=options.sign,
@@ -252,9 +244,6 @@ def read_ignored(text: str | None) -> int | None:
     Raises:
         UsageError: one is unknown.
     """
-    from eitskin.config import nearest
-    from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
-
     if text is None:
         return None
     names = [name.replace(" ", "-") for name in DIAGNOSTICS]
@@ -272,8 +261,6 @@ def check_recording(path: Path | None, overwrite: bool) -> None:
     Raises:
         FileError: its folder is not there, or it exists and may not be written over.
     """
-    from eitskin.fileio import refuse_unwritable
-
     refuse_unwritable(path)
     if path is not None and path.is_file() and not overwrite:
         raise FileError(
@@ -283,15 +270,8 @@ def check_recording(path: Path | None, overwrite: bool) -> None:
 
 def open_named(options: argparse.Namespace) -> Device:
     """The device of ``--device``, with the command's ``--model`` and ``--firmware``, if any."""
-    from eitskin.device.open import open_with_files
-
     files = (getattr(options, name, None) for name in ("model", "firmware"))
     return open_with_files(options.device, *files)
-
-
-def say(text: str) -> None:
-    """A line on stderr for whoever looks on."""
-    print(f"eitskin: {text}", file=sys.stderr, flush=True)
 
 
 def session_settings(
@@ -303,9 +283,6 @@ def session_settings(
         UsageError: a number is out of range.
         FileError: the recording could not be written.
     """
-    from eitskin.device.settings import check_tare_frames
-    from eitskin.live.settings import SessionSettings
-
     every = options.every or 0
     if options.report == "drive" and every > 1:
         raise UsageError(f"--report drive needs every frame; leave --every {every} out")
@@ -325,16 +302,3 @@ def session_settings(
         zones=read_zones(getattr(options, "zones", None)),
         record=record,
     )
-
-
-def say_progress(text: str) -> None:
-    """The same where somebody sits before a terminal."""
-    if sys.stderr.isatty():
-        say(text)
-
-
-def print_table(facts: dict[str, Any]) -> None:
-    """Names and values in two columns."""
-    width = max(len(name) for name in facts) + 2
-    for name, value in facts.items():
-        print(f"{name.replace('_', ' '):{width}}{value}")

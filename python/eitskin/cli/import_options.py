@@ -1,20 +1,19 @@
 """The options that say what somebody else's frames are; ``import`` and ``doctor`` share them."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.errors import UsageError
-
-if TYPE_CHECKING:
-    from eitskin.frames.import_options import ImportOptions
-    from eitskin.frames.layout import Layout
-    from eitskin.skin.protocol import Protocol
-    from eitskin.skin.skin import Skin
+from eitskin.frames.import_options import ImportOptions
+from eitskin.frames.importer import accepted_counts
+from eitskin.frames.layout import Layout, layout_of, load_layout, save_layout
+from eitskin.frames.source import SourceOptions, read_source
+from eitskin.frames.truth import TruthOptions
+from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
+from eitskin.skin.skin import Skin, load_skin
 
 PAIRS = ("real-imag", "magnitude-degrees", "magnitude-radians")
 ORDERS = ("fixed", "rotating", "fixed-all", "rotating-all", "table")
@@ -39,9 +38,6 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
         UsageError: options that contradict each other.
         EitskinError: the skin file cannot be read.
     """
-    from eitskin.skin.protocol import adjacent, opposite, skip
-    from eitskin.skin.skin import load_skin
-
     skin, protocol = load_skin(options.skin) if options.skin is not None else (None, None)
     count = options.electrodes if skin is None else skin.electrodes.count
     if skin is not None and options.electrodes not in (None, count):
@@ -74,10 +70,6 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
 
 def read_options(options: argparse.Namespace) -> ImportOptions:
     """The import options of a command line."""
-    from eitskin.frames.import_options import ImportOptions
-    from eitskin.frames.source import SourceOptions
-    from eitskin.frames.truth import TruthOptions
-
     named = vars(options)
     # what no option names (comments) is at its default
     said = {f.name: named[f.name] for f in fields(SourceOptions) if f.name in named}
@@ -117,17 +109,11 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
 
 def read_layout(options: argparse.Namespace) -> Layout | None:
     """The layout that ``--layout`` names; None without it."""
-    from eitskin.frames.layout import load_layout
-
     return None if options.layout is None else load_layout(options.layout)
 
 
 def write_layout(path: Path, source: Path, named: ImportOptions, protocol: Protocol | None) -> None:
     """Write how ``source`` is read by the options ``named`` as a layout."""
-    from eitskin.frames.importer import accepted_counts
-    from eitskin.frames.layout import layout_of, save_layout
-    from eitskin.frames.source import read_source
-
     raw = read_source(source, named.source, *accepted_counts(named, protocol))
     save_layout(path, layout_of(raw, named, protocol, str(source)))
 

@@ -1,20 +1,22 @@
 """Printing a board's frames as they come, and their summary; ``stream`` and ``replay`` share it."""
 
-from __future__ import annotations
-
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from eitskin.cli.device_options import say
+from eitskin.cli.printing import say
 from eitskin.cli.progress import bar
 from eitskin.core.results import NEWTONS_PER_GRAM
+from eitskin.device.wire.link_table import Stream
 from eitskin.errors import EitskinError, UsageError
-
-if TYPE_CHECKING:
-    from eitskin.device.wire.link_table import Stream
-    from eitskin.live.frame import Frame, Report
-    from eitskin.live.session import Session
-    from eitskin.sinks.outputs import Outputs
+from eitskin.fileio import refuse_unwritable
+from eitskin.live.frame import Frame, Notice, Report
+from eitskin.live.message import encoded, summary_message
+from eitskin.live.session import Session
+from eitskin.scoring.stream_check import line
+from eitskin.sinks.outputs import Outputs
+from eitskin.view.film import check_film
+from eitskin.view.panels import check_picture
+from eitskin.view.stream_picture import Album, draw_stream, film_stream
 
 HEADER = "  time s  touch    x mm    y mm  radius mm  force g"
 SCORED = "  off mm"
@@ -27,11 +29,6 @@ def check_drawn(options: argparse.Namespace, what: Stream) -> None:
         UsageError: neither images nor touches are asked for, or a name says no format.
         MissingExtraError: matplotlib is not installed.
     """
-    from eitskin.device.wire.link_table import Stream
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.view.film import check_film
-    from eitskin.view.panels import check_picture
-
     if options.picture is None and options.film is None:
         return
     refuse_unwritable(options.picture, options.film)
@@ -56,8 +53,6 @@ class Rows:
         return [*self._frame(frame), *_happened(frame)]
 
     def _frame(self, frame: Frame) -> list[str]:
-        from eitskin.scoring.stream_check import line
-
         live = frame.live
         if live.solved is None and live.raw is None:
             return []
@@ -106,10 +101,6 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
     Raises:
         EitskinError: what ended the stream, after everything up to then was summed up.
     """
-    from eitskin.live.frame import Notice, Report
-    from eitskin.live.message import encoded
-    from eitskin.view.stream_picture import Album, draw_stream, film_stream
-
     album, broken = Album(), None
     rows = Rows(options.verbose, session.truth is not None)
     frames = session.frames()
@@ -150,8 +141,6 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
 
 
 def _print_summary(options: argparse.Namespace, session: Session, outputs: Outputs | None) -> None:
-    from eitskin.live.message import encoded, summary_message
-
     summary, score = session.summary, session.score
     drawn = str(options.picture) if options.picture is not None and summary.frames else None
     facts: dict[str, Any] = summary.as_dict()

@@ -1,5 +1,5 @@
-"""The command line: ``eitskin COMMAND``. One file a command beside this one; each imports what it
-needs only when it runs."""
+"""The command line: ``eitskin COMMAND``. One file a command beside this one; only that of the
+command that is named is imported."""
 
 import argparse
 import importlib
@@ -17,11 +17,29 @@ from eitskin.cli.arguments import option, refuse_named_twice
 from eitskin.config import nearest
 from eitskin.errors import EitskinError, FileError, UsageError
 
-COMMANDS = (
-    "demo", "model", "reconstruct", "import", "export", "doctor", "scene", "calibrate", "teach",
-    "recommend", "devices", "info", "board", "tare", "view", "stream", "record", "replay", "flash",
-    "completion",
-)  # fmt: skip
+COMMANDS = {  # each with what it does
+    "demo": "three simulated touches, reconstructed in C, beside the truth",
+    "model": "build, describe, verify or upload an .eitm model",
+    "reconstruct": "touches and images of the frames in a file",
+    "import": "turn a text, NPY, NPZ or MAT file of measured voltages into a frames file",
+    "export": "a model, frames and their images as a .mat file for EIDORS",
+    "doctor": "say what is wrong with measured frames or a board: order, sign, wiring, noise,"
+    " gains",
+    "scene": "simulate what happens on a skin, with the imperfections that a scene names",
+    "calibrate": "known weights on a skin, so that its touches come in grams",
+    "teach": "a model learned from presses at known places",
+    "recommend": "what to choose for a time or an accuracy, and its model",
+    "devices": "serial ports, boards that answer, and how simulated ones are named",
+    "info": "what a board is, its model, its scan, its faults and statistics",
+    "board": "the owner's settings of a board: lock, current, limit",
+    "tare": "take a board's reference from its untouched skin",
+    "view": "the skin live in a browser: image, touches, electrodes, voltages",
+    "stream": "touches, images or raw frames of a board as they come",
+    "record": "write every packet of a board to a file",
+    "replay": "show a recording, export its frames, or check its images",
+    "flash": "put firmware and a model on a NUCLEO-F767ZI",
+    "completion": "a script with which your shell completes commands and options",
+}
 FIRST = "eitskin stream --device sim:swipe"
 INVALID_CHOICE = re.compile(  # as argparse words it, quoted before Python 3.12
     r"argument (?P<what>.*?): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)"
@@ -44,20 +62,28 @@ class Parser(argparse.ArgumentParser):
         raise UsageError(f"{message}{see}  {self.prog} --help")
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """The whole parser; each module ``cmd_NAME`` has ``add_parser(subparsers)``, which sets
-    ``run``."""
+def build_parser(only: str | None = None) -> argparse.ArgumentParser:
+    """The whole parser, or that in which of our commands ``only`` one has options; each module
+    ``cmd_NAME`` has ``add_options(parser)``, which sets ``run``."""
     parser = Parser(
         prog="eitskin", description="Electrical impedance tomography skins, from model to touches."
     )
     parser.add_argument("--version", action="version", version=f"eitskin {__version__}")
     option(parser, "--traceback", "on an error, show where in the code it arose")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND")
-    for name in COMMANDS:
-        importlib.import_module(f"eitskin.cli.cmd_{name}").add_parser(subparsers)
-    for command in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: one.name):
-        command.load().add_parser(subparsers)
+    for name, text in COMMANDS.items():
+        command = subparsers.add_parser(name, help=text)
+        if only in (None, name):
+            importlib.import_module(f"eitskin.cli.cmd_{name}").add_options(command)
+    if only not in COMMANDS:
+        for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: one.name):
+            entry.load().add_parser(subparsers)
     return parser
+
+
+def named_command(arguments: Sequence[str]) -> str:
+    """The word that names the command; "" where none does."""
+    return next((one for one in arguments if not one.startswith("-")), "")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -68,8 +94,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")  # names that the terminal cannot show
     try:
-        parser = build_parser()
-        options = parser.parse_args(arguments)
+        given = sys.argv[1:] if arguments is None else arguments
+        parser = build_parser(named_command(given))
+        options = parser.parse_args(given)
         traceback = options.traceback
         if options.command is None:
             print(f"{parser.format_help()}\nTo begin:  {FIRST}")

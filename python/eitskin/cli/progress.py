@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sized
 from typing import Any
 
+from tqdm import tqdm
+
 LINE_S = 10.0
 
 
@@ -13,8 +15,6 @@ def bar(what: str) -> Callable[..., Iterable[Any]]:
     """Wraps items, and where they have no length their number, with a bar of ``what``."""
 
     def shown(items: Iterable[Any], total: int | None = None) -> Iterable[Any]:
-        from tqdm import tqdm
-
         number = len(items) if total is None and isinstance(items, Sized) else total
         if not sys.stderr.isatty():
             return lines(items, what, number)
@@ -33,8 +33,6 @@ def lines(
 ) -> Iterator[Any]:
     """``items``; every ten seconds a line on stderr says how many are done, of ``total``, and how
     long the rest takes. ``weight``: how many an item counts for."""
-    from tqdm import tqdm
-
     start = said = clock()
     done = 0
     for item in items:

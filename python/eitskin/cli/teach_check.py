@@ -6,15 +6,21 @@ import json
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import TARE_FRAMES, add_device
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from eitskin.skin.protocol import Protocol
+from eitskin.cli.teach_record import raw_session
+from eitskin.device.known_model import scanned_protocol
+from eitskin.device.live_frames import LiveFrame
+from eitskin.errors import DeviceError
+from eitskin.frames.frames import load_frames
+from eitskin.model.eitm import load_model
+from eitskin.skin.protocol import Protocol
+from eitskin.teaching.presses import load_presses
+from eitskin.teaching.still import still_fits
 
 REMEDY = {
     "fits": "tare, and touch",
@@ -50,9 +56,6 @@ def add_parser(actions: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Look, say."""
-    from eitskin.model.eitm import load_model
-    from eitskin.teaching.still import still_fits
-
     model, _ = load_model(options.model)
     untouched, protocol = _of_board(options) if options.frames is None else _of_file(options.frames)
     found = still_fits(model, untouched, protocol, where=str(options.model))
@@ -67,10 +70,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _of_file(path: Path) -> "tuple[np.ndarray, Protocol]":
-    from eitskin.frames.frames import load_frames
-    from eitskin.teaching.presses import load_presses
-
+def _of_file(path: Path) -> tuple[np.ndarray, Protocol]:
     if _holds_presses(path):
         presses = load_presses(path)
         return presses.untouched, presses.protocol
@@ -86,14 +86,7 @@ def _holds_presses(path: Path) -> bool:
         return False
 
 
-def _of_board(options: argparse.Namespace) -> "tuple[np.ndarray, Protocol]":
-    import numpy as np
-
-    from eitskin.cli.teach_record import raw_session
-    from eitskin.device.known_model import scanned_protocol
-    from eitskin.device.live_frames import LiveFrame
-    from eitskin.errors import DeviceError
-
+def _of_board(options: argparse.Namespace) -> tuple[np.ndarray, Protocol]:
     with raw_session(options, options.model, TARE_FRAMES) as session:
         protocol = scanned_protocol(session.device.board, session.known, session.name)
         frames = [

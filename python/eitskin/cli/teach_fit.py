@@ -1,17 +1,22 @@
 """``eitskin teach fit PRESSES -o MODEL``: the model and its report."""
 
 import argparse
-import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.cli.arguments import Output, option
+from eitskin.cli.printing import print_json
+from eitskin.cli.progress import bar
+from eitskin.config import parse_toml
 from eitskin.errors import ConfigError, FrameError
-
-if TYPE_CHECKING:
-    from eitskin.skin.skin import Skin
-    from eitskin.teaching.presses import Presses
+from eitskin.fileio import refuse_unwritable
+from eitskin.model.eitm import save_model
+from eitskin.skin.skin import Skin, load_skin, skin_from_table
+from eitskin.teaching.presses import Presses, load_presses
+from eitskin.teaching.teach import teach
+from eitskin.view.panels import check_picture
+from eitskin.view.taught_picture import draw_taught
 
 
 def add_parser(actions: Any) -> None:
@@ -39,17 +44,8 @@ def add_parser(actions: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit, write, say."""
-    from eitskin.cli.progress import bar
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.model.eitm import save_model
-    from eitskin.teaching.presses import load_presses
-    from eitskin.teaching.teach import teach
-
     refuse_unwritable(options.output, options.picture)
     if options.picture is not None:
-        from eitskin.view.panels import check_picture
-        from eitskin.view.taught_picture import draw_taught
-
         check_picture(options.picture)
     presses = load_presses(options.presses)
     skin = described_skin(presses, options.skin)
@@ -71,19 +67,16 @@ def run(options: argparse.Namespace) -> int:
         draw_taught(options.picture, taught)
     save_model(options.output, taught.model)
     if options.json:
-        print(json.dumps({"output": str(options.output), **taught.report}, indent=2))
+        print_json({"output": str(options.output), **taught.report})
     else:
         print("\n".join(report_lines(taught.report)))
         print(f"{options.output}: tare, then touches; eitskin model upload sends it to a board")
     return 0
 
 
-def described_skin(presses: "Presses", path: Path | None) -> "Skin | None":
+def described_skin(presses: Presses, path: Path | None) -> Skin | None:
     """The skin of the file ``path``, else of the presses' own description, else None. Their own
     table of rows stands, whatever protocol the description has."""
-    from eitskin.config import parse_toml
-    from eitskin.skin.skin import load_skin, skin_from_table
-
     if path is not None:
         return load_skin(path)[0]
     if not presses.skin:

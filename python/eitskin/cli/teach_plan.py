@@ -6,6 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
+from eitskin.fileio import refuse_unwritable, write_beside
+from eitskin.skin.skin import load_skin
+from eitskin.teaching.plan import plan_places, save_plan
+from eitskin.teaching.practice import practice_scene
+from eitskin.view.template_picture import check_template, draw_template
 
 
 def add_parser(actions: Any) -> None:
@@ -34,15 +39,8 @@ def add_parser(actions: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Choose, draw, write, print."""
-    from eitskin.fileio import refuse_unwritable, write_beside
-    from eitskin.skin.skin import load_skin
-    from eitskin.teaching.plan import plan_places, save_plan
-    from eitskin.teaching.practice import practice_scene
-
     refuse_unwritable(options.output, options.picture, options.practice)
     if options.picture is not None:
-        from eitskin.view.template_picture import check_template, draw_template
-
         check_template(options.picture)
     skin, protocol = load_skin(options.skin)
     plan = plan_places(skin, protocol, options.presses)

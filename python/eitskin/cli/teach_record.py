@@ -1,29 +1,36 @@
 """``eitskin teach record --plan PLAN -o PRESSES``: guides a person press by press."""
 
-from __future__ import annotations
-
 import argparse
+import queue
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.device_options import add_device, say
+from eitskin.cli.device_options import add_device
+from eitskin.cli.printing import say
+from eitskin.device.known_model import scanned_protocol
+from eitskin.device.live_frames import LiveFrame
+from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FrameError, ProtocolError
+from eitskin.fileio import read_bytes, refuse_unwritable
+from eitskin.frames.frames import Frames, load_frames
+from eitskin.live.session import Session
+from eitskin.live.settings import SessionSettings
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin, load_skin
+from eitskin.teaching.guide import GuideEvent, PressGuide, guide_presses, scan_of_presses
+from eitskin.teaching.plan import Plan, load_plan
+from eitskin.teaching.practice import plan_of_scene
+from eitskin.teaching.press_file import PressFile
 
-if TYPE_CHECKING:
-    import numpy as np
-
-    from eitskin.frames.frames import Frames
-    from eitskin.live.session import Session
-    from eitskin.skin.protocol import Protocol
-    from eitskin.skin.skin import Skin
-    from eitskin.teaching.guide import GuideEvent
-    from eitskin.teaching.plan import Plan
-
-    TimedFrames = Iterator[tuple[np.ndarray, float]]
+TimedFrames = Iterator[tuple[np.ndarray, float]]
 
 
 def add_parser(actions: Any) -> None:
@@ -64,14 +71,7 @@ def add_parser(actions: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Guide; say what came of it."""
-    from eitskin.fileio import read_bytes, refuse_unwritable
-    from eitskin.frames.frames import load_frames
-    from eitskin.skin.skin import load_skin
-    from eitskin.teaching.plan import load_plan
-
     if options.plan.suffix == ".toml" or not (options.plan.suffix or options.plan.exists()):
-        from eitskin.teaching.practice import plan_of_scene
-
         plan, text = plan_of_scene(str(options.plan))
     else:
         plan, text = load_plan(options.plan), ""
@@ -88,10 +88,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _with_given(plan: Plan, options: argparse.Namespace) -> Plan:
-    from dataclasses import replace
-
-    import numpy as np
-
     given = {"depth_mm": options.depth_mm, "force_n": options.force_n}
     for name, value in given.items():
         if value is None:
@@ -114,8 +110,6 @@ def _in_time(frames: Frames) -> TimedFrames:
 
 
 def _before_a_board(options: argparse.Namespace, plan: Plan, skin: Skin | None, text: str) -> int:
-    from eitskin.device.known_model import scanned_protocol
-
     with raw_session(options, options.model) as session:
         protocol = scanned_protocol(session.device.board, session.known, session.name)
         if skin is not None and skin.electrodes.count != protocol.n_electrodes:
@@ -132,13 +126,6 @@ def raw_session(
     options: argparse.Namespace, model: Path | None, frames: int = 0
 ) -> Iterator[Session]:
     """A board that sends frames for the guide; ``frames`` of them, 0 for all."""
-    from dataclasses import replace
-
-    from eitskin.device.wire.link_table import Stream
-    from eitskin.live.session import Session
-    from eitskin.live.settings import SessionSettings
-    from eitskin.teaching.guide import scan_of_presses
-
     settings = SessionSettings(
         mode=Stream.RAW, every=1, frames=frames, model=model, firmware=options.firmware
     )
@@ -149,8 +136,6 @@ def raw_session(
 
 
 def _live(session: Session) -> TimedFrames:
-    from eitskin.device.live_frames import LiveFrame
-
     for item in session.items():
         if isinstance(item, LiveFrame) and item.raw is not None and not item.raw.quiet:
             yield item.raw.voltage_v, item.time_us / 1e6
@@ -159,9 +144,6 @@ def _live(session: Session) -> TimedFrames:
 def _guide(
     options: argparse.Namespace, plan: Plan, text: str, protocol: Protocol, frames: TimedFrames
 ) -> int:
-    from eitskin.teaching.guide import PressGuide, guide_presses
-    from eitskin.teaching.press_file import PressFile
-
     file = PressFile(options.output, plan, protocol, text, anew=options.overwrite)
     if file.numbers:
         say(f"{options.output}: {len(file.numbers)} presses are there; going on")
@@ -204,8 +186,6 @@ def _keys() -> Callable[[], str]:
     """The letter of the last line that was typed since; nothing where nobody can type."""
     if not sys.stdin or not sys.stdin.isatty():
         return lambda: ""
-    import queue
-    import threading
 
     typed: queue.SimpleQueue[str] = queue.SimpleQueue()
 

@@ -1,13 +1,18 @@
 """``eitskin teach update MODEL PRESSES -o NEW``: a taught model after remounting or drying."""
 
 import argparse
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
+from eitskin.cli.printing import print_json
+from eitskin.cli.progress import bar
 from eitskin.errors import FrameError
+from eitskin.fileio import refuse_unwritable
+from eitskin.model.eitm import load_model, save_model
+from eitskin.teaching.presses import load_presses
+from eitskin.teaching.update import update
 
 
 def add_parser(actions: Any) -> None:
@@ -31,12 +36,6 @@ def add_parser(actions: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Adapt, write, say."""
-    from eitskin.cli.progress import bar
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.model.eitm import load_model, save_model
-    from eitskin.teaching.presses import load_presses
-    from eitskin.teaching.update import update
-
     refuse_unwritable(options.output)
     model, _ = load_model(options.model)
     presses = load_presses(options.presses)
@@ -50,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
         raise FrameError(f"{options.presses}: {error}") from None
     save_model(options.output, updated.model)
     if options.json:
-        print(json.dumps({"output": str(options.output), **updated.report}, indent=2))
+        print_json({"output": str(options.output), **updated.report})
     else:
         print("\n".join(report_lines(updated.report)))
         print(f"{options.output}: tare, then touches; eitskin model upload sends it to a board")

@@ -2,7 +2,7 @@
 serves files and live lines alike."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eitskin.config import check_keys, choice, integer, load_toml, number
+from eitskin.config import check_keys, choice, flag, integer, load_toml, number, subtable
 from eitskin.errors import ConfigError, EitskinError, UsageError
 from eitskin.fileio import write_bytes
 from eitskin.frames.import_options import ImportOptions
@@ -73,7 +73,7 @@ def load_layout(path: str | Path) -> Layout:
     content, where = load_toml(path, "layout"), str(path)
     check_keys(content, ("lines", "channels", "protocol", "port"), where)
     lines, channels, protocol, port = (
-        _table(content, name, where) for name in ("lines", "channels", "protocol", "port")
+        subtable(content, name, where) for name in ("lines", "channels", "protocol", "port")
     )
     check_keys(lines, LINES, f"{where}: [lines]")
     check_keys(channels, (*CHANNELS, "table", "swaps"), f"{where}: [channels]")
@@ -282,7 +282,7 @@ def _changed(group: Any, keys: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value != getattr(default, key)}
 
 
-def _values(table: dict[str, Any], keys: dict[str, Any], where: str) -> dict[str, Any]:
+def _values(table: Mapping[str, Any], keys: dict[str, Any], where: str) -> dict[str, Any]:
     read: dict[str, Any] = {}
     for key in (key for key in keys if key in table):
         kind = keys[key]
@@ -291,9 +291,7 @@ def _values(table: dict[str, Any], keys: dict[str, Any], where: str) -> dict[str
         elif kind == "text":
             read[key] = _text(table, key, where)
         elif kind == "flag":
-            if not isinstance(table[key], bool):
-                raise ConfigError(f"{where}: {key} must be true or false, not {table[key]!r}")
-            read[key] = table[key]
+            read[key] = flag(table, key, None, where)
         elif kind == "number":
             read[key] = number(table, key, None, where)
         elif kind == "texts":
@@ -305,14 +303,7 @@ def _values(table: dict[str, Any], keys: dict[str, Any], where: str) -> dict[str
     return read
 
 
-def _table(content: dict[str, Any], name: str, where: str) -> dict[str, Any]:
-    value = content.get(name, {})
-    if not isinstance(value, dict):
-        raise ConfigError(f"{where}: {name} must be a table, [{name}]")
-    return value
-
-
-def _text(table: dict[str, Any], key: str, where: str) -> str:
+def _text(table: Mapping[str, Any], key: str, where: str) -> str:
     value = table[key]
     if isinstance(value, int) and not isinstance(value, bool):
         value = str(value)  # a single column
@@ -342,17 +333,17 @@ def _rows(value: Any, width: int, where: str) -> tuple[Any, ...]:
     return rows
 
 
-def _whole(table: dict[str, Any], key: str, where: str, high: int) -> int | None:
+def _whole(table: Mapping[str, Any], key: str, where: str, high: int) -> int | None:
     return integer(table, key, None, where, low=1, high=high) if key in table else None
 
 
-def _number(table: dict[str, Any], key: str, where: str, high: float) -> float | None:
+def _number(table: Mapping[str, Any], key: str, where: str, high: float) -> float | None:
     if key not in table:
         return None
     return number(table, key, None, where, low=0, high=high, open_low=True)
 
 
-def _protocol(table: dict[str, Any], where: str) -> Protocol | None:
+def _protocol(table: Mapping[str, Any], where: str) -> Protocol | None:
     if not table:
         return None
     count = integer(table, "electrodes", None, where, low=MIN_COUNT, high=MAX_COUNT)

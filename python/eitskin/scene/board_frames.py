@@ -119,28 +119,3 @@ class SceneRows:
             self._made[frame] = self._maker.frame(frame)
             self.solves += self._maker.work.solves - before
         return self._made[frame]
-
-
-class RecordedRows:
-    """The scene's own frames of ``rows`` as a sequence, without the quiet ones."""
-
-    def __init__(self, rows: SceneRows) -> None:
-        self._rows = rows
-
-    def __len__(self) -> int:
-        return self._rows.scene.frames
-
-    def at(self, frame: int, time_s: float) -> FloatArray:
-        """Frame number ``frame`` (m,) with all rows as they are ``time_s`` after time 0."""
-        rows = self._rows
-        instants_s = np.full(rows.scene.protocol.n_rows, time_s)
-        return rows.scan(rows.scene.quiet_frames + frame, instants_s)
-
-    @property
-    def moves(self) -> bool:
-        """Whether a row depends on when it is read, and not on its frame alone."""
-        return self._rows.moves
-
-    def __getitem__(self, frame: int) -> FloatArray:
-        number = self._rows.scene.quiet_frames + frame
-        return np.asarray(self._rows.part(range(number, number + 1))[0])

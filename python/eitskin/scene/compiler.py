@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.config import from_table
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.scene.cover import Cover
@@ -29,7 +30,6 @@ from eitskin.scene.effect import (
     Step,
     VoltageStep,
 )
-from eitskin.scene.effect_table import parse_parameters
 from eitskin.scene.forward_steps import Change, UpdateCost, count_costs, touched_unknowns
 from eitskin.scene.motion import Mix, Motion
 from eitskin.scene.plan import Plan, make_plan
@@ -195,7 +195,7 @@ def prepare_scene(
     mesh_cache, work = MeshCache() if mesh_cache is None else mesh_cache, SessionWork()
     modules = load_effects(scene, Registry() if registry is None else registry)
     parameters = {
-        name: parse_parameters(module, scene.effects[name], f"{scene.where} [effects.{name}]")
+        name: from_table(module.Parameters, scene.effects[name], f"{scene.where} [effects.{name}]")
         for name, module in modules.items()
     }
     check_shared(scene, modules, parameters)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.config import check_keys, choice, integer, load_toml, number
+from eitskin.config import check_keys, choice, flag, integer, load_toml, number, subtable, word
 from eitskin.errors import ConfigError
 from eitskin.scene.laws import DRIVING_KEY, LAW_KEYS, LAWS, law_from_table
 from eitskin.scene.random_touches import rim_distance_mm
@@ -176,13 +176,10 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
         FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
     """
     check_keys(table, ("scene", "scan", "touch", "effects", "dataset"), where)
-    head, place = _table(table, "scene", where), f"{where} [scene]"
+    head, place = subtable(table, "scene", where), f"{where} [scene]"
     check_keys(head, SCENE_KEYS, place)
-    scan = _table(table, "scan", where)
+    scan = subtable(table, "scan", where)
     check_keys(scan, SCAN_KEYS, f"{where} [scan]")
-    frozen = scan.get("frozen", False)
-    if not isinstance(frozen, bool):
-        raise ConfigError(f"{where} [scan]: frozen must be true or false, not {frozen!r}")
     skin, protocol = _skin(head, place, folder)
     given = {
         "frames": integer(head, "frames", 1, place, low=1, high=MAX_FRAMES),
@@ -193,15 +190,15 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
     touches = table.get("touch", [])
     if not isinstance(touches, list) or not all(isinstance(one, Mapping) for one in touches):
         raise ConfigError(f"{where}: touches are written as tables [[touch]], with two brackets")
-    effects = _table(table, "effects", where)
+    effects = subtable(table, "effects", where)
     for name, one in effects.items():
         if not isinstance(one, Mapping):
             raise ConfigError(
                 f"{where} [effects]: {name} = {one!r} must be a table: write [effects.{name}]"
             )
     return Scene(
-        name=_word(head, "name", Path(where).stem, place),
-        description=_word(head, "description", "", place),
+        name=word(head, "name", Path(where).stem, place),
+        description=word(head, "description", "", place),
         skin=skin,
         protocol=protocol,
         touches=tuple(
@@ -210,33 +207,19 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
         effects=effects,
         rate_hz=number(head, "rate_hz", 20.0, place, low=0, high=1e6, open_low=True),
         solver=choice(head, "solver", "auto", SOLVERS, place),
-        frozen=frozen,
+        frozen=flag(scan, "frozen", False, f"{where} [scan]"),
         row_us=number(scan, "row_us", None, f"{where} [scan]", low=0, high=1e6, open_low=True)
         if "row_us" in scan
         else None,
         where=where,
-        dataset=_table(table, "dataset", where),
+        dataset=subtable(table, "dataset", where),
         text=text,
         **given,
     )
 
 
-def _table(table: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
-    value = table.get(key, {})
-    if not isinstance(value, Mapping):
-        raise ConfigError(f"{where}: {key} must be a table: write [{key}]")
-    return value
-
-
-def _word(table: Mapping[str, Any], key: str, default: str, where: str) -> str:
-    value = table.get(key, default)
-    if not isinstance(value, str):
-        raise ConfigError(f"{where}: {key} must be text in quotes, not {value!r}")
-    return value
-
-
 def _skin(head: Mapping[str, Any], where: str, folder: Path) -> tuple[Skin, Protocol]:
-    name = _word(head, "skin", "paper", where)
+    name = word(head, "skin", "paper", where)
     if name == "paper":
         return paper_skin(), adjacent(16)
     path = folder / name
@@ -253,9 +236,7 @@ def _track(table: Mapping[str, Any], where: str) -> TouchTrack:
     own = {key for keys in LAW_KEYS.values() for key in keys} | set(DRIVING_KEY.values())
     check_keys(table, TOUCH_KEYS | own, where)
     law, shape = law_from_table(table, name, where), _shape(table, where)
-    hold = table.get("hold", False)
-    if not isinstance(hold, bool):
-        raise ConfigError(f"{where}: hold must be true or false, not {hold!r}")
+    hold = flag(table, "hold", False, where)
     path = table.get("path")
     if path is None:
         keyframes, hold = _standing(table, driving, where)

@@ -27,7 +27,6 @@ IntArray = npt.NDArray[np.int64]
 RASTER_MM = 1.5
 LOOKUPS = ("nearest", "bilinear")
 LOOKUP = "bilinear"
-THRESHOLDS: tuple[float, ...] = tuple(round(0.02 * k, 2) for k in range(1, 50))
 
 
 class Region(Protocol):
@@ -215,61 +214,6 @@ class ImageScorer:
     raster: Raster
     lookup: Lookup
     n_pixels: int
-
-    def curves(
-        self,
-        images: npt.ArrayLike,
-        truths: BoolArray,
-        thresholds: npt.ArrayLike = THRESHOLDS,
-        sign: int = 1,
-    ) -> FloatArray:
-        """MIoU of images (k, n) against truths (k, p) at each of T ascending thresholds: (k, T).
-
-        max(x) is that of the pixels. Each cell is counted once, at the highest threshold that it
-        passes; sums over thresholds do the rest, so that the curve costs little more than one of
-        its points.
-
-        Raises:
-            UsageError: shapes disagree, thresholds do not ascend, or an image has a value that is
-                not finite.
-        """
-        values = np.asarray(images, dtype=np.float64)
-        steps = np.asarray(thresholds, dtype=np.float64).reshape(-1)
-        if values.ndim != 2 or values.shape != (len(truths), self.n_pixels):
-            wanted = (len(truths), self.n_pixels)
-            raise UsageError(
-                f"images are {values.shape}, but {wanted} (frames, pixels) are to be judged"
-            )
-        if (np.diff(steps) <= 0).any():
-            raise UsageError("thresholds of an MIoU curve must ascend")
-        finite = np.isfinite(values).all(axis=1)
-        if not finite.all():
-            raise UsageError(
-                f"image {int(np.argmin(finite))} (from 0) has values that are not finite; cannot"
-                " judge it"
-            )
-        result = np.empty((len(values), len(steps)))
-        for k, image in enumerate(sign * values):
-            top = max(float(image.max()), 0.0)
-            passed = (
-                np.searchsorted(steps * top, self.lookup.show(image), side="left") if top else 0
-            )
-            result[k] = _miou_of_passed(
-                np.broadcast_to(passed, truths[k].shape), truths[k], len(steps)
-            )
-        return result
-
-
-def _miou_of_passed(passed: IntArray, truth: BoolArray, count: int) -> FloatArray:
-    """MIoU (count,) where cell i (p,) is a touch at the first ``passed[i]`` thresholds."""
-    claimed = np.cumsum(np.bincount(passed, minlength=count + 1)[::-1])[::-1][1:]
-    hit = np.cumsum(np.bincount(passed[truth], minlength=count + 1)[::-1])[::-1][1:]
-    true = np.count_nonzero(truth)
-    either = claimed + true - hit
-    background, not_both = len(truth) - either, len(truth) - hit
-    touch = np.divide(hit, either, out=np.ones(count), where=either > 0)
-    rest = np.divide(background, not_both, out=np.ones(count), where=not_both > 0)
-    return np.asarray((touch + rest) / 2)
 
 
 def judge_for(

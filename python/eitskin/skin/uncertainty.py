@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from math import isfinite
 from typing import Any
 
-from eitskin.config import check_keys, integer, number
+from eitskin.config import check_keys, flag, integer, number
 from eitskin.errors import ConfigError, UsageError
 
 MIN_SAMPLES, MAX_SAMPLES = 2, 100_000
@@ -108,12 +108,9 @@ def uncertainty_to_table(uncertainty: Uncertainty | None) -> object:
 
 
 def _value(table: Mapping[str, Any], name: str, default: Any, where: str) -> Any:
-    given = table[name]
     if isinstance(default, bool):
-        if not isinstance(given, bool):
-            raise ConfigError(f"{where}: {name} must be true or false, not {given!r}")
-        return given
-    low, high = LIMITS[name]
+        return flag(table, name, None, where)
+    given, (low, high) = table[name], LIMITS[name]
     if isinstance(default, tuple):
         if not isinstance(given, list) or len(given) != 2:
             raise ConfigError(f"{where}: {name} must be [least, greatest], not {given!r}")

@@ -2,12 +2,11 @@
 one frozen value."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from eitskin.config import check_keys, choice, integer, number
+from eitskin.config import from_table, parameter
 from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
-from eitskin.core.results import Options
 from eitskin.errors import ConfigError
 from eitskin.model.model import Defaults
 from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_REGULARISATION
@@ -54,22 +53,22 @@ class Configuration:
     """
 
     name: str
-    rank: int = 64
-    pixels: int = 32
-    storage: str = "f32"
-    regularisation: float = DEFAULT_REGULARISATION
-    column_power: float = DEFAULT_COLUMN_POWER
-    solver: str = Defaults.solver
-    iterations: int = Defaults.iterations
-    gap: float = 0.0
-    mac_limit: int = 0
-    lambda_rel: float = Defaults.lambda_rel
+    rank: int = parameter(64, low=1, high=1024)
+    pixels: int = parameter(32, low=4, high=128)
+    storage: str = parameter("f32", choices=STORAGES)
+    regularisation: float = parameter(DEFAULT_REGULARISATION, low=0, high=1e6)
+    column_power: float = parameter(DEFAULT_COLUMN_POWER, low=0, high=1)
+    solver: str = parameter(Defaults.solver, choices=SOLVERS)
+    iterations: int = parameter(Defaults.iterations, low=1, high=100_000)
+    gap: float = parameter(0.0, low=0, high=1)
+    mac_limit: int = parameter(0, low=0, high=2**62)
+    lambda_rel: float = parameter(Defaults.lambda_rel, low=0, high=1)
     warm_start: bool = False
-    touch_sweeps: int = 6
-    samples: int = BASE_SAMPLES
-    scan: str = "full"
+    touch_sweeps: int = parameter(6, low=0, high=1000)
+    samples: int = parameter(BASE_SAMPLES, low=PERIOD_SAMPLES, high=1020)
+    scan: str = parameter("full", choices=SCANS)
     second_pass: bool = False
-    touch_fit: int = ALL_TOUCH_FIT
+    touch_fit: int = parameter(ALL_TOUCH_FIT, low=0, high=ALL_TOUCH_FIT)
     model_errors: bool = True
 
     def as_dict(self) -> dict[str, Any]:
@@ -114,9 +113,8 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
     """A configuration from a TOML table or a results file; what is not there has its default.
 
     Raises:
-        ConfigError: a key is unknown, a value out of range, or the core does not know it.
+        ConfigError: a key is unknown, or a value out of range.
     """
-    check_keys(table, [one.name for one in fields(Configuration)], where)
     name = table.get("name")
     if not isinstance(name, str) or not name.strip() or "," in name:
         raise ConfigError(
@@ -124,46 +122,7 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
             " pictures"
         )
     where = f"{where} {name!r}"
-    for key in ("warm_start", "second_pass", "model_errors"):
-        if not isinstance(table.get(key, False), bool):
-            raise ConfigError(f"{where}: {key} must be true or false, not {table[key]!r}")
-    one = Configuration(
-        name=name,
-        rank=integer(table, "rank", Configuration.rank, where, low=1, high=1024),
-        pixels=integer(table, "pixels", Configuration.pixels, where, low=4, high=128),
-        storage=choice(table, "storage", Configuration.storage, STORAGES, where),
-        regularisation=number(
-            table, "regularisation", Configuration.regularisation, where, low=0, high=1e6
-        ),
-        column_power=number(
-            table, "column_power", Configuration.column_power, where, low=0, high=1
-        ),
-        solver=choice(table, "solver", Configuration.solver, SOLVERS, where),
-        iterations=integer(
-            table, "iterations", Configuration.iterations, where, low=1, high=100_000
-        ),
-        gap=number(table, "gap", Configuration.gap, where, low=0, high=1),
-        mac_limit=integer(table, "mac_limit", Configuration.mac_limit, where, low=0, high=2**62),
-        lambda_rel=number(table, "lambda_rel", Configuration.lambda_rel, where, low=0, high=1),
-        warm_start=table.get("warm_start", Configuration.warm_start),
-        touch_sweeps=integer(
-            table, "touch_sweeps", Configuration.touch_sweeps, where, low=0, high=1000
-        ),
-        samples=integer(
-            table, "samples", Configuration.samples, where, low=PERIOD_SAMPLES, high=1020
-        ),
-        scan=choice(table, "scan", Configuration.scan, SCANS, where),
-        second_pass=table.get("second_pass", Configuration.second_pass),
-        touch_fit=integer(
-            table, "touch_fit", Configuration.touch_fit, where, low=0, high=ALL_TOUCH_FIT
-        ),
-        model_errors=table.get("model_errors", Configuration.model_errors),
-    )
-    if one.mac_limit and "mac_limit" not in {entry.name for entry in fields(Options)}:
-        raise ConfigError(
-            f"{where}: mac_limit = {one.mac_limit}, but this build's core has no limit of MACs;"
-            " leave it out"
-        )
+    one: Configuration = from_table(Configuration, table, where)
     if one.samples % PERIOD_SAMPLES:
         raise ConfigError(
             f"{where}: samples = {one.samples} is no whole number of the excitation's periods; use"

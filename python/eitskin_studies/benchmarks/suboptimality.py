@@ -18,7 +18,7 @@ from eitskin.scene.simulate import Simulated
 from eitskin.scoring import metrics
 from eitskin_studies.benchmarks.solve_problems import bench_options, make_problems, models, sessions
 from eitskin_studies.compare.run import truth_masks
-from eitskin_studies.harness.thresholds import best_threshold
+from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
@@ -80,8 +80,8 @@ def run(scenes: int, seed: int, progress: Progress) -> GapCurves:
         engine.set_options(bench_options(model, solver=solver, **settings))
         trained, _, _ = _images(engine, train)
         images, coefficients, macs = _images(engine, test)
-        threshold = best_threshold(image_scorer.curves(trained, truths[0]))
-        scores = image_scorer.curves(images, truths[1], [threshold])[:, 0]
+        threshold = best_threshold(miou_curves(image_scorer, trained, truths[0]))
+        scores = miou_curves(image_scorer, images, truths[1], [threshold])[:, 0]
         off = [problems.suboptimality(k, x) for k, x in enumerate(coefficients)]
         worst = np.sort(scores)[: max(1, -(-len(scores) // 10))]
         effort = settings.get("mac_limit", settings["iterations"])

@@ -7,10 +7,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from eitskin.cli.arguments import option
-from eitskin.cli.cmd_scene import SCENE_HELP, check_folder
+from eitskin.cli.arguments import SCENE_HELP, option
 from eitskin.cli.progress import lines
-from eitskin.errors import UsageError
+from eitskin.errors import FileError, UsageError
 
 
 def add_parser(subparsers: Any) -> None:
@@ -56,7 +55,8 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.scene.library_scenes import find_scene
     from eitskin_studies.datasets.dataset import job_of, write_dataset
 
-    check_folder(options.output)
+    if not options.output.parent.is_dir():
+        raise FileError(f"{options.output}: the folder around it does not exist; make it first")
     if options.scheduler is not None and options.jobs != 1:
         raise UsageError(
             "dataset: --jobs goes with this computer, --scheduler with a cluster; give one of them"

@@ -27,12 +27,18 @@ from eitskin_studies.compare.families import Family, FindsTouches, Learns, Metho
 from eitskin_studies.compare.methods import methods
 from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.summary import Summary, summarise
-from eitskin_studies.harness.thresholds import best_threshold, best_touch_threshold, match_all
+from eitskin_studies.harness.thresholds import (
+    THRESHOLDS,
+    best_threshold,
+    best_touch_threshold,
+    match_all,
+    miou_curves,
+)
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any], str], Iterable[Any]]
 
-TOUCH_THRESHOLDS = metrics.THRESHOLDS[4::5]
+TOUCH_THRESHOLDS = THRESHOLDS[4::5]
 
 
 @dataclass(frozen=True)
@@ -81,7 +87,7 @@ class CompareResult:
         touch_threshold: t of positions, trained; None where the method reports touches itself.
         train_miou: mean on the training scenes, at ``threshold``.
         miou: (k,) of each test scene.
-        curve: (T,) mean test MIoU at each of ``metrics.THRESHOLDS``; no number in the table is
+        curve: (T,) mean test MIoU at each of ``THRESHOLDS``; no number in the table is
             chosen from it.
         matchings: of each test scene.
         images: (k, n) of the test scenes.
@@ -215,7 +221,7 @@ def compare(
             for scene in test.simulated.touches.scenes
         ]
     )
-    ceiling = image_scorer.curves(perfect, test.truths).mean(axis=0)
+    ceiling = miou_curves(image_scorer, perfect, test.truths).mean(axis=0)
     best = int(np.argmax(ceiling))
     return Comparison(
         how,
@@ -224,7 +230,7 @@ def compare(
         test.simulated,
         results,
         float(ceiling[best]),
-        metrics.THRESHOLDS[best],
+        THRESHOLDS[best],
     )
 
 
@@ -246,7 +252,7 @@ def _run(
     for value in family.values:
         method = family.make(value)
         images = _images(method, train, setup.grid.n_pixels)
-        curves = image_scorer.curves(images, train.truths)
+        curves = miou_curves(image_scorer, images, train.truths)
         score = float(curves.mean(axis=0).max())
         if best is None or score > best[0] + 1e-12:
             best = score, value, method, images, curves
@@ -269,7 +275,7 @@ def _run(
     else:
         assert touch_threshold is not None
         found = tuple(touches_in_image(image, index, centres, touch_threshold) for image in images)
-    curves = image_scorer.curves(images, test.truths)
+    curves = miou_curves(image_scorer, images, test.truths)
     return CompareResult(
         name=method.name,
         parameter=family.parameter,
@@ -277,7 +283,7 @@ def _run(
         threshold=threshold,
         touch_threshold=touch_threshold,
         train_miou=train_miou,
-        miou=np.asarray(curves[:, metrics.THRESHOLDS.index(threshold)]),
+        miou=np.asarray(curves[:, THRESHOLDS.index(threshold)]),
         curve=np.asarray(curves.mean(axis=0)),
         matchings=tuple(match_all(test.centres_mm, found, gate_mm)),
         images=images,

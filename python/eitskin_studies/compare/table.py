@@ -7,9 +7,9 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from eitskin.scoring import metrics
 from eitskin_studies.compare.run import CompareResult, Comparison
 from eitskin_studies.harness.summary import Summary
+from eitskin_studies.harness.thresholds import THRESHOLDS
 
 SNR_DEFINITION = "SNR = 20 log10(rms(V0) / sigma), V0 the untouched skin's frame, rms over its rows"
 THRESHOLD_RULE = "touch where x > t max(x), t per method: the best mean MIoU on the training scenes"
@@ -167,7 +167,7 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
         "clipped": test.clipped,
         "ceiling_miou": comparison.ceiling,
         "ceiling_threshold": comparison.ceiling_threshold,
-        "thresholds": list(metrics.THRESHOLDS),
+        "thresholds": list(THRESHOLDS),
         "methods": [_result_json(result) for result in comparison.results],
     }
 

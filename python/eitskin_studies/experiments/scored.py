@@ -17,7 +17,7 @@ from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.harness.sessions import FrameSession, Progress, SceneSolver
 from eitskin_studies.harness.summary import Summary
-from eitskin_studies.harness.thresholds import best_threshold
+from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class Evaluator:
         tuning seed."""
         results = reconstruct_many(self.model, frames_v, quiet_v, threads=1, touches=False)
         images = np.array([one.image for one in results], dtype=np.float64)
-        return best_threshold(self.image_scorer.curves(images, self.truths(scenes)))
+        return best_threshold(miou_curves(self.image_scorer, images, self.truths(scenes)))
 
     def scores(
         self, scenes: Sequence[TouchScene], quiet_v: FloatArray, frames_v: FloatArray, t: float
@@ -98,7 +98,9 @@ class Evaluator:
         truths = self.truths(scenes)
         images = np.array([one.image for one in results], dtype=np.float64)
         scored: dict[str, list[Any]] = {
-            "image": self.image_scorer.curves(images, truths, [t])[:, 0].round(DIGITS).tolist()
+            "image": miou_curves(self.image_scorer, images, truths, [t])[:, 0]
+            .round(DIGITS)
+            .tolist()
         }
         scored |= {
             name: []

@@ -15,6 +15,7 @@ from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panel, load_matplotlib
 from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD, AlgorithmResult
 from eitskin_studies.experiments.algorithms.scenes import shown_set
+from eitskin_studies.harness.thresholds import THRESHOLDS
 from eitskin_studies.pictures.comparison_pictures import truth_marks
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def draw_images(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Algorit
                     Mark(float(x), float(y))
                     for x, y in one.shown["found_mm"][one.shown["found_in"] == k]
                 )
-                miou = one.shown[metrics.LOOKUP][k, metrics.THRESHOLDS.index(one.chosen.threshold)]
+                miou = one.shown[metrics.LOOKUP][k, THRESHOLDS.index(one.chosen.threshold)]
                 panel = Panel(_title(one, k, float(miou)), one.shown["images"][k], marks, found)
                 draw_panel(axes[k, column], skin, grid, panel, small=True)
         figure.suptitle(
@@ -121,13 +122,9 @@ def draw_curves(path: Path, *, results: Sequence[AlgorithmResult]) -> None:
         for axes, fixed in ((left, True), (right, False)):
             for k, one in enumerate(results):
                 curve = one.curve(fixed)
-                (line,) = axes.plot(
-                    metrics.THRESHOLDS, curve, **_line(one, k), label=one.candidate.name
-                )
+                (line,) = axes.plot(THRESHOLDS, curve, **_line(one, k), label=one.candidate.name)
                 t = FIXED_THRESHOLD if fixed else one.chosen.threshold
-                axes.plot(
-                    t, curve[metrics.THRESHOLDS.index(t)], "o", color=line.get_color(), markersize=4
-                )
+                axes.plot(t, curve[THRESHOLDS.index(t)], "o", color=line.get_color(), markersize=4)
             axes.axhspan(0.4, 0.5, color=PAPER, alpha=0.08, linewidth=0)
             axes.axhline(0.84, color=PAPER, linewidth=0.9, linestyle=(0, (2, 2)))
             axes.set_xlim(0, 1)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from eitskin.scene.random_touches import TouchScene
-from eitskin.scoring import metrics
 from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
 from eitskin_studies.compare.run import CompareResult, Comparison
+from eitskin_studies.harness.thresholds import THRESHOLDS
 
 
 def truth_marks(scene: TouchScene, sheet_s_per_m: float) -> tuple[Mark, ...]:
@@ -84,9 +84,9 @@ def draw_curves(path: str | Path, comparison: Comparison) -> None:
         for k, result in enumerate(comparison.results):
             style = ("-", "--", "-.")[k // 10 % 3]
             (line,) = axes.plot(
-                metrics.THRESHOLDS, result.curve, style, color=f"C{k % 10}", label=result.name
+                THRESHOLDS, result.curve, style, color=f"C{k % 10}", label=result.name
             )
-            at = metrics.THRESHOLDS.index(result.threshold)
+            at = THRESHOLDS.index(result.threshold)
             axes.plot(result.threshold, result.curve[at], "o", color=line.get_color(), markersize=5)
         axes.axhline(
             comparison.ceiling, color=INK, linewidth=0.8, linestyle=":", label="perfect image"

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.scoring.metrics import THRESHOLDS
 from eitskin.view.frame_pictures import true_marks
 from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import STYLE, Mark, Panel, load_matplotlib
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.tanks import tank, touch_like
+from eitskin_studies.harness.thresholds import THRESHOLDS
 
 ROD_MM = 8.0  # as drawn; how thick the rods were is not stated
 SHORT = (

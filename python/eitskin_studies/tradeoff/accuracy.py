@@ -18,7 +18,7 @@ from eitskin_studies.harness.sessions import (
     apparent_change_s_per_m_mm2,
 )
 from eitskin_studies.harness.summary import Summary, summarise
-from eitskin_studies.harness.thresholds import best_threshold
+from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 from eitskin_studies.tradeoff.engines import Built
 
 FloatArray = npt.NDArray[np.float64]
@@ -77,7 +77,9 @@ def solve_frames(
 
 def train(built: Built, session: FrameSession, solved: SolvedSet) -> TrainedPoint:
     """t with the best mean MIoU, and the scale of force."""
-    curves = built.image_scorer.curves(solved.images, session.truths(built.image_scorer.raster))
+    curves = miou_curves(
+        built.image_scorer, solved.images, session.truths(built.image_scorer.raster)
+    )
     found, true = _forces(session, solved)
     usable = found > 0
     scale = float(np.median(true[usable] / found[usable])) if usable.any() else 1.0
@@ -90,7 +92,7 @@ def score(
     """Everything about the accuracy in plain values fit for JSON; see ``docs/results/tradeoff.md``
     for what each is."""
     truths = session.truths(built.image_scorer.raster)
-    image = built.image_scorer.curves(solved.images, truths, [trained.threshold])[:, 0]
+    image = miou_curves(built.image_scorer, solved.images, truths, [trained.threshold])[:, 0]
     discs = [
         metrics.miou(_discs(built, result), truth)
         for result, truth in zip(solved.results, truths, strict=True)

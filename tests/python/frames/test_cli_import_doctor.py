@@ -32,8 +32,8 @@ kind = "adjacent"
 def run(*words: object) -> int:
     parser = argparse.ArgumentParser()
     subparsers = parser.add_subparsers(required=True)
-    for command in (cmd_import, cmd_doctor):
-        command.add_parser(subparsers)
+    for name, command in {"import": cmd_import, "doctor": cmd_doctor}.items():
+        command.add_options(subparsers.add_parser(name))
     options = parser.parse_args([str(word) for word in words])
     return int(options.run(options))
 

@@ -72,6 +72,6 @@ def effect_module(
 def scene_command(*arguments: str) -> int:
     """``eitskin scene ARGUMENTS``; errors are raised."""
     parser = argparse.ArgumentParser()
-    cmd_scene.add_parser(parser.add_subparsers())
-    options = parser.parse_args(["scene", *arguments])
+    cmd_scene.add_options(parser)
+    options = parser.parse_args(arguments)
     return int(options.run(options))

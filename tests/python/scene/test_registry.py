@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import pytest
 from scene_helpers import effect_module
 
+from eitskin.config import from_table, parameter
 from eitskin.errors import ConfigError
-from eitskin.scene.effect_table import describe_parameters, parse_parameters
-from eitskin.scene.parameter import parameter
+from eitskin.scene.effect_table import describe_parameters
 from eitskin.scene.registry import BUILT_IN, ENTRY_POINT_GROUP, Registry
 
 
@@ -35,12 +35,12 @@ MODULE = SimpleNamespace(Parameters=Every)
 
 
 def test_tables_become_parameters():
-    assert parse_parameters(MODULE, {}, "w") == Every()
+    assert from_table(Every, {}, "w") == Every()
     table = {
         "gain": 2, "bits": 8.0, "on": False, "kind": "fast", "which": [1, 2], "pair": [3, 4],
         "limit_v": 0.5,
     }  # fmt: skip
-    found = parse_parameters(MODULE, table, "w")
+    found = from_table(Every, table, "w")
     assert found == Every(2.0, 8, False, "fast", (1, 2), (3.0, 4.0), 0.5)
     assert isinstance(found.gain, float) and isinstance(found.bits, int)
 
@@ -67,7 +67,7 @@ def test_tables_become_parameters():
 )  # fmt: skip
 def test_impossible_parameters_name_file_table_and_key(table, said):
     with pytest.raises(ConfigError, match=said):
-        parse_parameters(MODULE, table, "f [effects.x]")
+        from_table(Every, table, "f [effects.x]")
 
 
 def test_parameters_describe_themselves():

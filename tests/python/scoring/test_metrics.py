@@ -10,7 +10,7 @@ from eitskin.fem.grid import grid_for
 from eitskin.scoring import metrics
 from eitskin.skin.outline import disk, polygon
 from eitskin_studies.harness.discs import pixel_cover
-from eitskin_studies.harness.thresholds import best_threshold
+from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold, miou_curves
 
 SQUARE = polygon([(0, 0), (30, 0), (30, 30), (0, 30)])
 
@@ -130,7 +130,7 @@ def test_curves_equal_masks_on_the_raster(lookup):
     truths[4] = False
     thresholds = [0.0, 0.3, 0.8, 1.0]
     for sign in (1, -1):
-        curves = image_scorer.curves(images, truths, thresholds, sign)
+        curves = miou_curves(image_scorer, images, truths, thresholds, sign)
         for k in range(7):
             top = (sign * images[k]).max()
             for j, t in enumerate(thresholds):
@@ -144,7 +144,7 @@ def test_nearest_curve_is_the_pixel_mask_spread_over_cells():
     image = np.random.default_rng(2).uniform(size=36)
     truth = metrics.disc_mask(image_scorer.raster.points_mm, [[12, 17]], [6])
     mask = metrics.touch_mask(image, 0.6)[image_scorer.lookup.pixel[:, 0]]
-    assert image_scorer.curves(image[None], truth[None], [0.6])[0, 0] == pytest.approx(
+    assert miou_curves(image_scorer, image[None], truth[None], [0.6])[0, 0] == pytest.approx(
         metrics.miou(mask, truth)
     )
 
@@ -166,32 +166,32 @@ def test_a_perfect_image_is_limited_by_its_pixels_only():
     perfect = np.stack([pixel_cover(grid, *d) for d in discs])
     score = {}
     for kind in metrics.LOOKUPS:
-        curves = metrics.judge_for(outline, grid, lookup=kind).curves(perfect, truths)
+        curves = miou_curves(metrics.judge_for(outline, grid, lookup=kind), perfect, truths)
         score[kind] = curves.mean(axis=0).max()
     assert 0.83 < score["nearest"] < 0.90
     assert 0.95 < score["bilinear"] < 0.99
     fine = grid_for(SQUARE, 20)
     image_scorer = metrics.judge_for(SQUARE, fine, lookup="nearest")
     truth = metrics.disc_mask(image_scorer.raster.points_mm, [[12, 17]], [6])[None]
-    assert image_scorer.curves(truth.astype(float), truth, [0.5])[0, 0] == 1.0
+    assert miou_curves(image_scorer, truth.astype(float), truth, [0.5])[0, 0] == 1.0
 
 
 def test_curves_refuse_what_they_cannot_judge():
     image_scorer = metrics.judge_for(SQUARE, grid_for(SQUARE, 6))
     truths = np.zeros((2, len(image_scorer.raster.points_mm)), dtype=bool)
     with pytest.raises(UsageError, match=r"\(2, 36\)"):
-        image_scorer.curves(np.zeros((2, 35)), truths)
+        miou_curves(image_scorer, np.zeros((2, 35)), truths)
     with pytest.raises(UsageError, match="ascend"):
-        image_scorer.curves(np.zeros((2, 36)), truths, [0.5, 0.4])
+        miou_curves(image_scorer, np.zeros((2, 36)), truths, [0.5, 0.4])
     broken = np.zeros((2, 36))
     broken[1, 3] = np.nan
     with pytest.raises(UsageError, match="image 1"):
-        image_scorer.curves(broken, truths)
+        miou_curves(image_scorer, broken, truths)
 
 
 def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals():
     curves = np.array([[0.2, 0.9, 0.5, 0.5], [0.2, 0.1, 0.6, 0.6]])
     assert best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
-    assert metrics.THRESHOLDS[0] == 0.02
-    assert metrics.THRESHOLDS[-1] == 0.98
-    assert len(metrics.THRESHOLDS) == 49
+    assert THRESHOLDS[0] == 0.02
+    assert THRESHOLDS[-1] == 0.98
+    assert len(THRESHOLDS) == 49

@@ -21,6 +21,7 @@ from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.compare.run import CompareSettings, Comparison, compare, truth_masks
 from eitskin_studies.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text
 from eitskin_studies.harness.discs import pixel_cover
+from eitskin_studies.harness.thresholds import THRESHOLDS, miou_curves
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
 SMALL = CompareSettings(
@@ -51,14 +52,14 @@ def test_results_are_what_their_parts_give(comparison):
         images = baselines.noser(setup.jacobian, strength).reconstruct(
             session.frames_v - session.quiet_v.mean(axis=0)
         )
-        return image_scorer.curves(
-            images, truth_masks(session.touches, image_scorer.raster.points_mm)
+        return miou_curves(
+            image_scorer, images, truth_masks(session.touches, image_scorer.raster.points_mm)
         )
 
     best = max((1e-5, 1e-2), key=lambda a: curves(a, "train").mean(axis=0).max())
     assert result.value == best
     at = int(np.argmax(curves(best, "train").mean(axis=0)))
-    assert result.threshold == metrics.THRESHOLDS[at]
+    assert result.threshold == THRESHOLDS[at]
     assert result.train_miou == pytest.approx(curves(best, "train").mean(axis=0)[at])
     assert result.miou == pytest.approx(curves(best, "test")[:, at])
     assert result.curve == pytest.approx(curves(best, "test").mean(axis=0))

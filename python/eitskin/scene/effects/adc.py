@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.errors import ConfigError
 from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
-from eitskin.scene.parameter import parameter
 
 NAME = "adc"
 STAGE = Stage.DIGITISE

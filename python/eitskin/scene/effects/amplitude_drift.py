@@ -11,8 +11,8 @@ from math import sqrt
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, Stage, Voltages, VoltageStep
-from eitskin.scene.parameter import parameter
 
 NAME = "amplitude_drift"
 STAGE = Stage.EXCITATION

@@ -11,8 +11,8 @@ from math import log, sqrt
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, MaterialStep, Stage
-from eitskin.scene.parameter import parameter
 from eitskin.scene.random_field import COSINES, random_field
 
 NAME = "background"

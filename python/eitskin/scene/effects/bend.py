@@ -12,11 +12,11 @@ the outer face for R above 0; the curved way is measured along the sheet.
 from dataclasses import dataclass
 from math import sqrt
 
+from eitskin.config import parameter
 from eitskin.errors import ConfigError
 from eitskin.scene.change import part_at
 from eitskin.scene.deformation import Deformation, stretched
 from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage
-from eitskin.scene.parameter import parameter
 
 NAME = "bend"
 STAGE = Stage.MATERIAL

@@ -8,9 +8,9 @@ stays symmetric, so that reciprocity holds. R = 0 makes them one electrode.
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from eitskin.config import parameter
 from eitskin.errors import ConfigError
 from eitskin.scene.effect import Contacts, ContactStep, EffectCost, EffectSession, Stage
-from eitskin.scene.parameter import parameter
 
 NAME = "bridged"
 STAGE = Stage.BOUNDARY

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, Stage, Voltages, VoltageStep
-from eitskin.scene.parameter import parameter
 from eitskin.scene.scan import channels
 
 NAME = "channel_gain"

@@ -18,9 +18,9 @@ from math import exp, expm1, isclose, pi
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.errors import ConfigError
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, Stage, Voltages, VoltageStep
-from eitskin.scene.parameter import parameter
 from eitskin.scene.scan import switched
 
 NAME = "charge_injection"

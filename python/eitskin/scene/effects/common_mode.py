@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, LoadedStep, Loads, Stage, Voltages
-from eitskin.scene.parameter import parameter
 
 NAME = "common_mode"
 STAGE = Stage.FRONT_END

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.errors import ConfigError
 from eitskin.scene.change import part_at
 from eitskin.scene.effect import Contacts, ContactStep, EffectCost, EffectSession, FloatArray, Stage
-from eitskin.scene.parameter import parameter
 
 NAME = "contact_impedance"
 STAGE = Stage.BOUNDARY

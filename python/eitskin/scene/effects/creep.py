@@ -14,9 +14,9 @@ release is wrong for some tau.
 from dataclasses import dataclass
 from math import exp
 
+from eitskin.config import parameter
 from eitskin.scene.deformation import Deformation, stretched
 from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage
-from eitskin.scene.parameter import parameter
 
 NAME = "creep"
 STAGE = Stage.MATERIAL

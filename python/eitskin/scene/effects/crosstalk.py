@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import (
     EffectCost,
     EffectSession,
@@ -22,7 +23,6 @@ from eitskin.scene.effect import (
     Stage,
     Voltages,
 )
-from eitskin.scene.parameter import parameter
 from eitskin.skin.protocol import Protocol
 
 NAME = "crosstalk"

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.errors import ConfigError
 from eitskin.scene.effect import Contacts, ContactStep, EffectCost, EffectSession, Stage
-from eitskin.scene.parameter import parameter
 
 NAME = "detached"
 STAGE = Stage.BOUNDARY

@@ -16,8 +16,8 @@ from math import exp
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, MaterialStep, Stage
-from eitskin.scene.parameter import parameter
 
 NAME = "gel_drying"
 STAGE = Stage.MATERIAL

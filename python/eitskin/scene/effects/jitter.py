@@ -19,8 +19,8 @@ from math import exp, expm1, pi, sqrt
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
-from eitskin.scene.parameter import parameter
 
 NAME = "jitter"
 STAGE = Stage.DIGITISE

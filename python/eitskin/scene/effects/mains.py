@@ -12,8 +12,8 @@ from math import pi, radians
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
-from eitskin.scene.parameter import parameter
 from eitskin.scene.scan import row_delays_s
 
 NAME = "mains"

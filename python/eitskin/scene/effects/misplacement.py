@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, GeometryStep, Stage
-from eitskin.scene.parameter import parameter
 from eitskin.skin.skin import Skin
 
 NAME = "misplacement"

@@ -15,8 +15,8 @@ from math import exp
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, Stage, Voltages, VoltageStep
-from eitskin.scene.parameter import parameter
 from eitskin.scene.scan import settled_from_the_row_before
 
 NAME = "mux"

@@ -11,9 +11,9 @@ from math import pi, sqrt
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, GeometryStep, Stage
-from eitskin.scene.parameter import parameter
 from eitskin.skin.outline import Outline, polygon
 from eitskin.skin.skin import Skin
 

@@ -15,6 +15,7 @@ from math import pi
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import (
     ComplexArray,
     EffectCost,
@@ -23,7 +24,6 @@ from eitskin.scene.effect import (
     PhaseStep,
     Stage,
 )
-from eitskin.scene.parameter import parameter
 
 NAME = "phase"
 STAGE = Stage.EXCITATION

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
-from eitskin.scene.parameter import parameter
 
 NAME = "rectifier"
 STAGE = Stage.DIGITISE

@@ -13,8 +13,8 @@ from math import pi
 
 import numpy as np
 
+from eitskin.config import parameter
 from eitskin.scene.effect import EffectCost, EffectSession, LoadedStep, Loads, Stage, Voltages
-from eitskin.scene.parameter import parameter
 
 NAME = "source_impedance"
 STAGE = Stage.EXCITATION

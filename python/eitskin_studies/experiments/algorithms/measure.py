@@ -18,7 +18,7 @@ from eitskin_studies.experiments.algorithms.candidates import Candidate, macs_of
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, SHOWN, shown_set, touch_set
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Workspace
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
-from eitskin_studies.harness.thresholds import best_threshold, match_all
+from eitskin_studies.harness.thresholds import best_threshold, match_all, miou_curves
 
 FloatArray = npt.NDArray[np.float64]
 Arrays = dict[str, npt.NDArray[Any]]
@@ -126,7 +126,7 @@ def choose(field: Field, candidate: Candidate) -> ChosenParameter:
 
 
 def tuning_curves(field: Field, candidate: Candidate, value: float) -> dict[str, FloatArray]:
-    """Mean MIoU over all tuning scenes at each of ``metrics.THRESHOLDS``, (T,), by lookup."""
+    """Mean MIoU over all tuning scenes at each of ``THRESHOLDS``, (T,), by lookup."""
     of_number = [_tuning(field, candidate, value, number) for number in NUMBERS]
     return {
         lookup: np.mean([one[lookup] for one in of_number], axis=0) for lookup in metrics.LOOKUPS
@@ -238,7 +238,7 @@ def _curves(field: Field, session: FrameSession, images: FloatArray) -> dict[str
     image_scorers = field.image_scorers
     truths = session.truths(image_scorers[metrics.LOOKUP].raster)
     return {
-        lookup: image_scorer.curves(images, truths)
+        lookup: miou_curves(image_scorer, images, truths)
         for lookup, image_scorer in image_scorers.items()
     }
 

@@ -20,7 +20,7 @@ from eitskin_studies.experiments.algorithms.measure import (
 )
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS
 from eitskin_studies.harness.summary import Summary, summarise
-from eitskin_studies.harness.thresholds import best_threshold
+from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -88,8 +88,8 @@ class AlgorithmResult:
 
 
 def column(curves: FloatArray, t: float) -> FloatArray:
-    """Of MIoU (k, T) at each of ``metrics.THRESHOLDS`` those at ``t``, (k,)."""
-    return np.asarray(curves[:, metrics.THRESHOLDS.index(t)])
+    """Of MIoU (k, T) at each of ``THRESHOLDS`` those at ``t``, (k,)."""
+    return np.asarray(curves[:, THRESHOLDS.index(t)])
 
 
 def result_of(field: Field, candidate: Candidate) -> AlgorithmResult:
@@ -98,7 +98,7 @@ def result_of(field: Field, candidate: Candidate) -> AlgorithmResult:
     tuned = {
         value: tuning_curves(field, candidate, value)[metrics.LOOKUP] for value in candidate.values
     }
-    low_t = [float(curve[metrics.THRESHOLDS.index(FIXED_THRESHOLD)]) for curve in tuned.values()]
+    low_t = [float(curve[THRESHOLDS.index(FIXED_THRESHOLD)]) for curve in tuned.values()]
     return AlgorithmResult(
         candidate=candidate,
         chosen=chosen,

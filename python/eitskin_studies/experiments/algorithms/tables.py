@@ -10,6 +10,7 @@ from eitskin_studies.experiments.algorithms.scenes import NUMBERS
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.summary import Summary, summarise
+from eitskin_studies.harness.thresholds import THRESHOLDS
 
 TOUCHES = ("1 touch", "2 touches", "3 touches")
 SHOWN_AT = (0.1, 0.2, 0.3, 0.5, 0.7)
@@ -46,7 +47,7 @@ def data(field: Field, results: Sequence[AlgorithmResult]) -> dict[str, Any]:
     return {
         "conditions": _conditions(field),
         "fixed_threshold": FIXED_THRESHOLD,
-        "thresholds": list(metrics.THRESHOLDS),
+        "thresholds": list(THRESHOLDS),
         "methods": [_method(one) for one in results],
     }
 
@@ -128,7 +129,7 @@ def _thresholds(results: Sequence[AlgorithmResult]) -> tuple[tuple[str, ...], ..
     return tuple(
         (
             one.candidate.name,
-            *(short(float(one.curve(fixed=False)[metrics.THRESHOLDS.index(t)])) for t in SHOWN_AT),
+            *(short(float(one.curve(fixed=False)[THRESHOLDS.index(t)])) for t in SHOWN_AT),
         )
         for one in results
     )

@@ -18,7 +18,7 @@ from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.experiments.scored import Evaluator
-from eitskin_studies.harness.thresholds import best_threshold
+from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -80,8 +80,8 @@ def tuned(
             evaluator = Evaluator(replace(regularised, defaults=defaults), image_scorer)
             truths = evaluator.truths(scenes)
             results = reconstruct_many(evaluator.model, frames_v, quiet_v, threads=1)
-            curves = image_scorer.curves(
-                np.array([one.image for one in results], dtype=np.float64), truths
+            curves = miou_curves(
+                image_scorer, np.array([one.image for one in results], dtype=np.float64), truths
             )
             t = best_threshold(curves)
             discs = [

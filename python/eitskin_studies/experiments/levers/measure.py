@@ -24,7 +24,7 @@ from eitskin_studies.experiments.scored import session_in_parts
 from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import FrameSession, apparent_change_s_per_m_mm2
 from eitskin_studies.harness.summary import summarise
-from eitskin_studies.harness.thresholds import best_threshold
+from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold, miou_curves
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -134,8 +134,10 @@ class AblationRuns:
         image_scorer = metrics.ImageScorer(
             self._raster, metrics.lookup_for(self._raster.points_mm, grid), grid.n_pixels
         )
-        return image_scorer.curves(
-            np.array([one.image for one in results], dtype=np.float64), session.truths(self._raster)
+        return miou_curves(
+            image_scorer,
+            np.array([one.image for one in results], dtype=np.float64),
+            session.truths(self._raster),
         )
 
     def _threshold(self, ablation: Ablation) -> float:
@@ -145,7 +147,7 @@ class AblationRuns:
     def _image(self, ablation: Ablation, snr_db: float, threshold: float) -> dict[str, Any]:
         session = self.session(RANDOM)
         results = self._solve(ablation, session, snr_db)
-        values = self._curves(ablation, session, results)[:, metrics.THRESHOLDS.index(threshold)]
+        values = self._curves(ablation, session, results)[:, THRESHOLDS.index(threshold)]
         return {
             "image": vars(summarise(values.round(DIGITS))),
             "macs": float(np.mean([_macs(one) for one in results])),

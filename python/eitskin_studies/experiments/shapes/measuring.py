@@ -17,6 +17,7 @@ from eitskin_studies.experiments.scored import Evaluator, session_in_parts
 from eitskin_studies.experiments.shapes.variants import ShapeVariant
 from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
+from eitskin_studies.harness.thresholds import miou_curves
 
 SNR_DB = 60.0
 TUNING, TEST = 40, 160
@@ -157,7 +158,7 @@ class Maker:
             ),
             "sensitivity_log10": np.log10(norm / norm.max()).round(3).tolist(),
             "ceiling": float(
-                image_scorer.curves(perfect, self.evaluator.truths(scenes), [0.5]).mean()
+                miou_curves(image_scorer, perfect, self.evaluator.truths(scenes), [0.5]).mean()
             ),
             "scene_image": [float(f"{value:.4g}") for value in one.image],
             "scene_found": [[t.x_mm, t.y_mm, t.radius_mm] for t in one.touches],

@@ -23,12 +23,12 @@ from eitskin_studies.experiments.tank.signed_scores import (
     signed_miou,
 )
 from eitskin_studies.experiments.tank.tanks import Rods, objects_of, touch_like, truth_of
-from eitskin_studies.harness.thresholds import best_threshold, match_all
+from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold, match_all, miou_curves
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 DIGITS = 5
-PLACE_THRESHOLDS = metrics.THRESHOLDS[4::5]
+PLACE_THRESHOLDS = THRESHOLDS[4::5]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def evaluate(entry: Entry, evaluation_sets: EvaluationSets) -> dict[str, Any]:
     assert best is not None
     trained, value, imager, curves, metal = best
     threshold = best_threshold(curves)
-    at = metrics.THRESHOLDS.index(threshold)
+    at = THRESHOLDS.index(threshold)
     test = imager.show(evaluation_sets.test.quiet_v, evaluation_sets.test.frames_v, False)
     test_curves = curves_of(test, evaluation_sets.test.conductive, evaluation_sets.image_scorer)
     chosen = touch_like(evaluation_sets.phantoms)
@@ -113,12 +113,12 @@ def evaluate(entry: Entry, evaluation_sets: EvaluationSets) -> dict[str, Any]:
 def curves_of(shown: Shown, truth: BoolArray, image_scorer: metrics.ImageScorer) -> FloatArray:
     """MIoU (k, T) of increases; discs are judged as discs, the same at each threshold."""
     if shown.touches is None:
-        return image_scorer.curves(shown.images, truth)
+        return miou_curves(image_scorer, shown.images, truth)
     scores = [
         metrics.miou(_discs(touches, 1, image_scorer), true)
         for touches, true in zip(shown.touches, truth, strict=True)
     ]
-    return np.repeat(np.array(scores)[:, None], len(metrics.THRESHOLDS), axis=1)
+    return np.repeat(np.array(scores)[:, None], len(THRESHOLDS), axis=1)
 
 
 def signed_curves_of(
@@ -131,7 +131,7 @@ def signed_curves_of(
         signed_miou(_discs(touches, 1, image_scorer), _discs(touches, -1, image_scorer), up, down)
         for touches, up, down in zip(shown.touches, conductive, resistive, strict=True)
     ]
-    return np.repeat(np.array(scores)[:, None], len(metrics.THRESHOLDS), axis=1)
+    return np.repeat(np.array(scores)[:, None], len(THRESHOLDS), axis=1)
 
 
 def _discs(touches: Sequence[Touch], sign: int, image_scorer: metrics.ImageScorer) -> BoolArray:
@@ -168,7 +168,7 @@ def _both_signs(
     shown = imager.show(frames.reference_voltage_v, frames.voltage_v, True)
     truths = truth_of(frames, evaluation_sets.image_scorer.raster)
     scores = signed_curves_of(shown, *truths, evaluation_sets.image_scorer)[
-        :, metrics.THRESHOLDS.index(threshold)
+        :, THRESHOLDS.index(threshold)
     ]
     matchings: list[Matching] = []
     for k, found in enumerate(_both(shown, place_threshold, evaluation_sets.grid)):

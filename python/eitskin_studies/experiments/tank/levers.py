@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.scoring import metrics
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.imagers import KINDS, CoreImager, Entry, Levers, SimulatedTank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
-from eitskin_studies.harness.thresholds import best_threshold
+from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold, miou_curves
 
 REGULARISATIONS = (0.01, 0.03, 0.1, 0.3)
 ITERATIONS = (15, 30, 60, 120)
@@ -95,9 +94,11 @@ def _measured(
 ) -> dict[str, Any]:
     imager = CoreImager(tank, levers)
     tuned = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, False)
-    curves = evaluation_sets.image_scorer.curves(tuned.images, evaluation_sets.metal.conductive)
+    curves = miou_curves(
+        evaluation_sets.image_scorer, tuned.images, evaluation_sets.metal.conductive
+    )
     threshold = best_threshold(curves)
-    at = metrics.THRESHOLDS.index(threshold)
+    at = THRESHOLDS.index(threshold)
     places = touch_like(evaluation_sets.phantoms)
     real = imager.show(
         evaluation_sets.phantoms.reference_voltage_v,
@@ -105,7 +106,7 @@ def _measured(
         False,
     )
     truth = truth_of(evaluation_sets.phantoms, evaluation_sets.image_scorer.raster)[0][places]
-    measured = evaluation_sets.image_scorer.curves(real.images, truth)
+    measured = miou_curves(evaluation_sets.image_scorer, real.images, truth)
     return {
         "tuned": float(curves.mean(axis=0).max()),
         "threshold": threshold,

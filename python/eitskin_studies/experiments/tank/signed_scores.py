@@ -9,6 +9,7 @@ from eitskin.scene.streams import stream
 from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import Matching, match
+from eitskin_studies.harness.thresholds import THRESHOLDS
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -35,7 +36,7 @@ def signed_curves(
     images: FloatArray,
     conductive: BoolArray,
     resistive: BoolArray,
-    thresholds: Sequence[float] = metrics.THRESHOLDS,
+    thresholds: Sequence[float] = THRESHOLDS,
 ) -> FloatArray:
     """:func:`signed_miou` (k, T) of images (k, n) against truths (k, p) each, where x > t max|x|
     and where -x > t max|x|."""
