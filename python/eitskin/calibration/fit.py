@@ -14,14 +14,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.calibration.presses import Presses
 from eitskin.errors import FrameError, missing_extra
 from eitskin.model.force_law import MAX_ORDER, LoadLaw, monomials
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 MIN_PRESSES, MIN_WEIGHTS, MIN_RATIO = 4, 3, 1.5
 SAME_WEIGHT = 1.005  # loads nearer than that are one

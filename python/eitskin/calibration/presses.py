@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.calibration.weights import Weight
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FrameError
 from eitskin.frames.frames import Frames
 from eitskin.solve.reconstructor import Reconstructor
-
-FloatArray = npt.NDArray[np.float64]
 
 NEAR_MM = 25.0  # a touch that far from where the weight is said to be is not it
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.errors import ProtocolError, UsageError, missing_extra
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.patterns import Patterns, patterns_for
@@ -29,10 +30,6 @@ try:
     from scipy.sparse.linalg import splu
 except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass

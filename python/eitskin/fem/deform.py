@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import missing_extra
 from eitskin.fem.cem import factorise, shape_gradients
 from eitskin.fem.mesh import Mesh
@@ -20,8 +20,6 @@ try:
 except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 LEAST_PART = 0.5  # an electrode or a gap keeps at least this of its length
 LEAST_AREA = 0.2  # and each element this of its area

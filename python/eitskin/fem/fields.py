@@ -8,11 +8,10 @@ fields themselves: each touch answers as a dipole in the field that the others b
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.grid import Grid
 from eitskin.fem.sensitivity import element_fields, element_to_pixel
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def electrode_fields(

@@ -9,11 +9,9 @@ from math import ceil
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import UsageError
 from eitskin.skin.outline import Outline
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 MAX_PIXELS_ACROSS = 512
 

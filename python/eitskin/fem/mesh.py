@@ -17,11 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 import eitskin
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import GeometryError, UsageError, missing_extra
 from eitskin.skin.skin import Skin
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 MIN_ELEMENTS = 200
 MAX_ELEMENTS = 200_000

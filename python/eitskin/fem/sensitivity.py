@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import missing_extra
 from eitskin.fem.cem import ForwardModel, Solution
 from eitskin.fem.grid import Grid
@@ -22,8 +23,6 @@ try:
 except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 PIXELS_AT_ONCE = 64  # keeps a block's gradients and products in cache
 

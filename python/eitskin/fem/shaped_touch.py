@@ -6,9 +6,8 @@ from math import cos, sin, sqrt
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.mesh import Mesh
-
-FloatArray = npt.NDArray[np.float64]
 
 PROFILES = ("uniform", "hertz", "gaussian")
 # how far a profile reaches, in its ellipse's half axes

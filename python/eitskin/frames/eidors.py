@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.fem.grid import Grid
 from eitskin.fem.mesh import Mesh
@@ -19,8 +20,6 @@ from eitskin.frames.import_options import ImportOptions
 from eitskin.skin.eidors import EidorsModel, find_model, read_eidors
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-
-FloatArray = npt.NDArray[np.float64]
 
 CALM, PRESSED = ("vh", "vh.meas"), ("vi", "vi.meas")  # names that EIDORS' tutorials use
 MIN_CONTACT = 1e-4  # of a shunt, times electrode width over sheet conductance: EIDORS divides by it

@@ -14,15 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import EitskinError, FrameError
 from eitskin.fileio import parse_json, write_beside
 from eitskin.frames.arrays import read_npz
 from eitskin.frames.paths import NAMES as PATH_FIELDS
 from eitskin.frames.paths import Paths
 from eitskin.skin.protocol import Protocol, in_order, table
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 FORMAT = "eitskin-frames"
 VERSION = 1

@@ -8,12 +8,10 @@ less current, one that conducts well more current or gain.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.frames.homogeneous import voltages_of
 from eitskin.skin.protocol import Protocol
-
-FloatArray = npt.NDArray[np.float64]
 
 MULTIPLEXERS_OHM = 240.0  # two ADG1206 in the current's way, data sheet
 SOURCE_REACH_V = 12.0  # of the Howland source at supplies of 15 V

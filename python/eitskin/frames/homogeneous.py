@@ -15,11 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import GeometryError, UsageError
 from eitskin.skin.skin import Skin
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 WIDTH_SAMPLES = 8
 DEFAULT_WIDTH_PER_PITCH = 0.2

@@ -6,12 +6,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.skin.protocol import table
 from eitskin.skin.skin import Skin
 
-FloatArray = NDArray[np.float64]
 ELEMENTS = 3000
 TOUCH_CONTRAST = 3.0
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eitskin import __version__
+from eitskin.arrays import IntArray
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.frames.eidors import with_eidors_defaults
 from eitskin.frames.frames import Frames, load_frames
@@ -33,9 +33,6 @@ from eitskin.frames.tables import read_table
 from eitskin.frames.truth import TruthOptions, truth_fields
 from eitskin.skin.protocol import Protocol, table
 from eitskin.skin.skin import Skin
-
-IntArray = NDArray[np.int64]
-
 
 ASSUMED_QUIET = "no quiet frames were named; the first frame is taken for one"
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eitskin.arrays import IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.skin.protocol import Protocol
-
-IntArray = NDArray[np.int64]
 
 ORDERS = ("fixed", "rotating", "fixed-all", "rotating-all")
 

@@ -3,12 +3,9 @@
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import FrameError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 NAMES = ("path_touch", "path_time_s", "path_xy_mm", "path_radius_mm", "path_strength")
 

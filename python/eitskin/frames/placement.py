@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eitskin.arrays import IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.orders import (
     electrode_map,
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from eitskin.model.model import Model
     from eitskin.skin.protocol import Protocol
     from eitskin.skin.skin import Skin
-
-IntArray = NDArray[np.int64]
 
 
 def source_rows(

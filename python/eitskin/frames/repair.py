@@ -6,12 +6,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.orders import touching
 from eitskin.skin.protocol import table
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 SIGNS = ("signed", "reversed", "magnitude")
 MIN_GAIN = 0.05

@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.arrays import listing, pick, read_arrays, read_npz
 from eitskin.frames.frames import FORMAT
 from eitskin.frames.lines import COMMENT, LineFormat
 from eitskin.frames.pairs import PAIRS, Paired, all_magnitudes, paired, refuse_parts, to_complex
 from eitskin.frames.tables import TextTable, chosen, read_table
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
 ARRAY_SUFFIXES = (".npz", ".npy", ".mat")

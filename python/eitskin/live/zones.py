@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.config import check_keys, load_toml, number
 from eitskin.core.gestures import Zone
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.fem.grid import Grid
 from eitskin.skin.outline import Outline, polygon
-
-FloatArray = npt.NDArray[np.float64]
 
 KEYS = {
     "key": ("name", "corners_mm"),

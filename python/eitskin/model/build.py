@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin import __version__
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid, grid_for
@@ -30,7 +31,6 @@ from eitskin.skin.protocol import Protocol, protocol_to_table
 from eitskin.skin.skin import Skin, size_to_paper, skin_to_table
 from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY, Uncertainty
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 LIPSCHITZ_MARGIN = 1e-4

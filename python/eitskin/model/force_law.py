@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.constants_table import MAX_GAIN
 from eitskin.errors import ModelError
-
-FloatArray = npt.NDArray[np.float64]
 
 HEAD = struct.Struct("<IIfff12x")
 MAX_POINTS, MAX_ORDER = 64, 4

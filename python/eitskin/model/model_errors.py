@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ModelError
 
-FloatArray = npt.NDArray[np.float64]
 Float32s = npt.NDArray[np.float32]
 
 HEAD = struct.Struct("<I3f")

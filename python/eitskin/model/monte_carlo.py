@@ -16,14 +16,13 @@ from queue import SimpleQueue
 from typing import IO, Any
 
 import numpy as np
-import numpy.typing as npt
 
 import eitskin
+from eitskin.arrays import FloatArray
 from eitskin.errors import ModelError
 from eitskin.model.model_errors import ModelErrors
 from eitskin.model.random_skins import RandomSkins, Request
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.constants_table import MAX_RATIO, MAX_ROW_GAIN, RATIO_DEFINED
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.deform import Deformation
@@ -24,8 +25,6 @@ from eitskin.model.reduction import fold_rows
 from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin
 from eitskin.skin.uncertainty import Range, Uncertainty
-
-FloatArray = npt.NDArray[np.float64]
 
 COSINES = 64
 HARMONICS = (2, 3, 4)

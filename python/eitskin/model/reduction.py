@@ -16,10 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.skin.protocol import Reciprocity
-
-FloatArray = npt.NDArray[np.float64]
 
 DEFAULT_REGULARISATION = 1e-2
 DEFAULT_COLUMN_POWER = 0.5

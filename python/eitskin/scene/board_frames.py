@@ -4,12 +4,10 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.scene.description import Scene
 from eitskin.skin.protocol import Protocol, in_order, table
-
-FloatArray = npt.NDArray[np.float64]
 
 WHOLE_FRAMES = 512  # a scene of no more frames, quiet ones included, is simulated at once
 WINDOW_FRAMES = 64  # of a longer one: so many are compiled together, and made one at a time

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.config import from_table
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
@@ -40,9 +40,6 @@ from eitskin.scene.session import MeshCache, SessionWork, check_shared, load_eff
 from eitskin.scene.touch_path import touches_at
 from eitskin.skin.skin import Skin, size_to_paper
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-AnyArray = npt.NDArray[Any]
 VoltageFunction: TypeAlias = Callable[[AnyArray, Loads, float, int], AnyArray]
 
 NO_CHANGE = Change(np.zeros(0, np.int64), np.zeros(0))

@@ -3,14 +3,11 @@
 from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.shaped_touch import centres_of_parts
 from eitskin.scene.random_touches import TrueTouch
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 SUBDIVISION = 8
 MIN_FACTOR = 1e-3

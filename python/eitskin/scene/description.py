@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.config import check_keys, choice, flag, integer, load_toml, number, subtable, word
 from eitskin.errors import ConfigError
 from eitskin.scene.laws import DRIVING_KEY, LAW_KEYS, LAWS, law_from_table
@@ -25,7 +26,6 @@ from eitskin.skin.skin import Skin, load_skin, paper_skin
 if TYPE_CHECKING:
     from eitskin.scene.touch_shape import TouchShape
 
-FloatArray = npt.NDArray[np.float64]
 
 SCENE_KEYS = (
     "name",

@@ -34,14 +34,14 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray as BoolArray  # for effects
+from eitskin.arrays import ComplexArray as ComplexArray
+from eitskin.arrays import FloatArray as FloatArray
 from eitskin.fem.mesh import Mesh
 from eitskin.scene.deformation import Deformation
 from eitskin.skin.protocol import Protocol as ScanProtocol
 from eitskin.skin.skin import Skin
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
-BoolArray = npt.NDArray[np.bool_]
 Voltages: TypeAlias = npt.NDArray[Any]
 """(m,) volts: float64, or complex128 between a phase step and the converter."""
 

@@ -19,12 +19,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_matrix
 
+from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.fem.cem import ForwardModel, System, factorise
 from eitskin.scene.effect import PhaseStep
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-AnyArray = npt.NDArray[Any]
 
 # Ordering and symbolic analysis, in multiplications per stored value of the matrix. Measured with
 # SuperLU at 3,000 and 10,000 elements: a factorisation takes as long as 50 to 80 solves, although

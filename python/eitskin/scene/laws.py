@@ -25,12 +25,10 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.config import number
 from eitskin.errors import ConfigError
-
-FloatArray = npt.NDArray[np.float64]
 
 LAW_KEYS: dict[str, tuple[str, ...]] = {
     "short_circuit": ("contrast",),

@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import TouchTrack, touches_at, touches_of
 from eitskin.scene.touch_path import sample as sample_track
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 Touches = tuple[TrueTouch, ...]
 
 STEP_MM = 1.0  # of a touch's way, on a skin as wide as the paper's

@@ -8,9 +8,8 @@ of place, so that another mesh samples the same field.
 from math import sqrt
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from eitskin.arrays import FloatArray
 
 COSINES = 256
 

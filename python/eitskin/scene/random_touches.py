@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.config import nearest
 from eitskin.errors import GeometryError, UsageError
 from eitskin.scene.streams import stream
@@ -22,7 +23,6 @@ from eitskin.skin.outline import Outline
 if TYPE_CHECKING:
     from eitskin.scene.touch_shape import TouchShape
 
-FloatArray = npt.NDArray[np.float64]
 
 TRIES = 20_000
 

@@ -7,18 +7,13 @@ factorisation: with the potentials Z D of the bridges' own current patterns D an
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.fem.patterns import Patterns
 from eitskin.scene.effect import BoolArray, Contacts, Loads
 from eitskin.skin.protocol import Protocol
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-AnyArray = npt.NDArray[Any]
 
 # A detached electrode's impedance in the solve. It carries no current as a whole, and 1e4 ohm m2
 # keeps what little runs in and out again along its width below 1e-8 of the other rows; one that a

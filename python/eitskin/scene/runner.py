@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin import __version__
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
 from eitskin.scene.compiler import Compiled, State, background_of, compile_scene, used_in
@@ -20,8 +21,6 @@ from eitskin.scene.motion import Mix
 from eitskin.scene.reading import PlainReader, TrueVoltages, WholeReader, solved_impedance
 from eitskin.scene.truth import Truth, truth_of
 from eitskin.skin.skin import skin_to_table
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

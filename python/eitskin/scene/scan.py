@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.scene.effect import EffectSession
 from eitskin.skin.protocol import Protocol
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 def row_delays_s(session: EffectSession) -> FloatArray:

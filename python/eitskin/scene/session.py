@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError, EitskinError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
@@ -18,8 +18,6 @@ from eitskin.scene.registry import Registry
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class MeshCache:

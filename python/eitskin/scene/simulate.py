@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
@@ -22,8 +23,6 @@ from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-
-FloatArray = npt.NDArray[np.float64]
 
 ELEMENTS = 11_000
 

@@ -5,16 +5,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.scene.laws import Law, ShortCircuit
 from eitskin.scene.random_touches import TrueTouch
 
 if TYPE_CHECKING:
     from eitskin.scene.touch_shape import TouchShape
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 SLACK_S = 1e-9
 ALWAYS_S = (float("-inf"), float("inf"))

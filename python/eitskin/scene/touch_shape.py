@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from eitskin.arrays import FloatArray
 
 # name: its profile, and its long over short axis where none is given
 SHAPES = {

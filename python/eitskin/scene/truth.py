@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.fem.sensitivity import element_to_pixel
@@ -17,8 +18,6 @@ from eitskin.scene.forward_steps import touched
 from eitskin.scene.laws import ShortCircuit
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import sample, touches_at
-
-FloatArray = npt.NDArray[np.float64]
 
 MAX_CELLS = 500_000_000
 LAW_PIECES = 16  # straight lines between two keyframes, for a law that bends

@@ -7,10 +7,9 @@ corner); each component is one touch, at the centroid of its pixels weighted by 
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import missing_extra
 from eitskin.scoring.metrics import touch_mask
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def touches_in_image(

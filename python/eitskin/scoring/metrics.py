@@ -17,12 +17,9 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int64]
 
 RASTER_MM = 1.5
 LOOKUPS = ("nearest", "bilinear")

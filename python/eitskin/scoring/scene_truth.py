@@ -15,7 +15,6 @@ from eitskin.scene.touch_path import touches_at, touches_of
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.skin.skin import size_to_paper
 
-FloatArray = npt.NDArray[np.float64]
 WRAP_US = 2**32
 LOOKED_FOR = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 

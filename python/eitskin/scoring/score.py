@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
@@ -12,9 +12,6 @@ from eitskin.model.model import Model
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.skin.skin import size_to_paper
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 

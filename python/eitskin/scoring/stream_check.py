@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics import words
 from eitskin.core.results import force_text, solve_text
 from eitskin.device.known_model import KnownModel
@@ -17,8 +18,6 @@ from eitskin.errors import MissingExtraError
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.fileio import read_bytes
-from eitskin.skin.drawing_shapes import DrawingReading, DrawnShape, FloatArray
+from eitskin.skin.drawing_shapes import DrawingReading, DrawnShape
 from eitskin.skin.outline import Outline, polygon
 
 MAX_BYTES = 2_000_000

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError
-
-FloatArray = npt.NDArray[np.float64]
 
 TOLERANCE_MM = 0.1
 MAX_SHAPES = 20_000

@@ -13,14 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import FileError, GeometryError, ProtocolError
 from eitskin.fileio import read_mat
 from eitskin.skin.outline import Outline, disk, polygon
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 ROUND = 1e-3  # of the radius: as far may a disk's rim nodes be from a circle
 UNKNOWN_THICKNESS_MM = 1000.0  # conductivity in S/m is then EIDORS' number

@@ -3,9 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import ComplexArray
 from eitskin.skin.outline import Outline
-
-ComplexArray = npt.NDArray[np.complex128]
 
 
 def rim_mirror(outline: Outline, points_mm: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:

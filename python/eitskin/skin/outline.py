@@ -12,10 +12,8 @@ from math import cos, isfinite, pi, radians, sin
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.errors import GeometryError
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 MIN_SIZE_MM = 1.0
 MAX_SIZE_MM = 1e5

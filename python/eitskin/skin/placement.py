@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import GeometryError
 from eitskin.skin.drawing_shapes import DrawnShape
 from eitskin.skin.outline import Outline
-
-FloatArray = npt.NDArray[np.float64]
 
 SNAP_MM = 5.0
 

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import IntArray
 from eitskin.config import check_keys, choice, integer, number
 from eitskin.errors import ConfigError, ProtocolError
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 
-IntArray = npt.NDArray[np.int64]
 TableArray = npt.NDArray[np.uint8]
 
 KINDS = ("adjacent", "opposite", "skip", "table")

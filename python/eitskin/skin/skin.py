@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.config import check_keys, choice, integer, load_toml, number
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.skin.drawing import Drawing, read_drawing
@@ -25,8 +25,6 @@ from eitskin.skin.uncertainty import (
     uncertainty_from_table,
     uncertainty_to_table,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 OUTLINES = ("diameter_mm", "polygon_mm", "outline")
 DRAWING_KEYS = ("element", "scale_mm", "tolerance_mm")

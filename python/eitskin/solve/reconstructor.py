@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.config import nearest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import LearnedReference, Options, Reconstruction, check_options
@@ -21,7 +22,6 @@ from eitskin.skin.protocol import Protocol
 if TYPE_CHECKING:
     from eitskin_reference.engine import ReferenceEngine
 
-FloatArray = npt.NDArray[np.float64]
 
 ENGINES = ("c", "c64", "numpy")
 MIN_CORRELATION = 0.9

@@ -1,13 +1,11 @@
 """Presses that cannot teach are refused before any work; a line says which, and what to do."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.skin.skin import Skin
 from eitskin.teaching.presses import Presses
-
-FloatArray = npt.NDArray[np.float64]
 
 MIN_PRESSES = 5
 FAINT = 0.1  # of the median change: no press

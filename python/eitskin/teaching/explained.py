@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.skin.outline import disk
@@ -25,7 +25,6 @@ from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity
 from eitskin.teaching.left_out import LeftOut, chance_share, leave_one_out, refined_places
 from eitskin.teaching.presses import Presses, shifted
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
 PIXELS_ACROSS = 32

@@ -7,13 +7,12 @@ from math import exp, log
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError, missing_extra
 from eitskin.teaching.kernel import Kernel, Placement
 from eitskin.teaching.process import Process, condition
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Iterable[Any]], Iterable[Any]]
 
 START_ANGLES = 32

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.device.settings import ScanSettings
 from eitskin.errors import UsageError
 from eitskin.teaching.plan import Plan
@@ -28,7 +29,6 @@ from eitskin.teaching.press_file import PressFile
 if TYPE_CHECKING:
     from eitskin.device.wire.packets import BoardInfo
 
-FloatArray = npt.NDArray[np.float64]
 
 PACE_US = 25_000  # a frame: a hold of twelve is .3 s
 JUMPS = 2  # between frames at rest: so many of the greatest are not counted as noise

@@ -15,14 +15,13 @@ from dataclasses import dataclass, replace
 from math import cos, radians, sin
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.grid import between_pixels, grid_for
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 
-FloatArray = npt.NDArray[np.float64]
 # J_r at places (n, 2) mm: (n, m)
 Sensitivity = Callable[[FloatArray], FloatArray]
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.grid import Grid
 from eitskin.teaching.fit import PLACE_KEPT, PLACE_ROUNDS, Learned, learn
-
-FloatArray = npt.NDArray[np.float64]
 
 CHI2_90 = 4.605  # the .9 quantile of two squared normal numbers
 MISFIT = 4.0  # times the median: a press that does not fit the others

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin import __version__
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.core.options_table import ALL_TOUCH_FIT
 from eitskin.fem.grid import Grid
@@ -17,8 +18,6 @@ from eitskin.model.reduction import noise_gain, spectral_norm_squared
 from eitskin.model.storage import store
 from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.teaching.fit import Learned
-
-FloatArray = npt.NDArray[np.float64]
 
 RANK = 64
 LAMBDA_REL = 0.2  # of the image alone: touches are sought in the data

@@ -4,15 +4,13 @@ law of force."""
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.grid import Grid
 from eitskin.model.force_law import LoadLaw, monomials
 from eitskin.skin.outline import polygon
 from eitskin.skin.skin import Skin
 from eitskin.teaching.kernel import Placement, rotation
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.fileio import read_bytes, write_beside
@@ -26,8 +26,6 @@ from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.teaching.kernel import Kernel, field_sensitivity
 from eitskin.teaching.presses import MAX_MM
-
-FloatArray = npt.NDArray[np.float64]
 
 CANDIDATES_ACROSS = 32
 RIM_PER_SIZE = 0.05  # of the outline's longer side: a press wholly on the skin

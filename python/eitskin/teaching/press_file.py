@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FileError, FrameError
 from eitskin.fileio import followed, locked, write_beside
 from eitskin.skin.protocol import Protocol
 from eitskin.teaching.plan import Plan
 from eitskin.teaching.presses import Presses, joined, load_presses, write_presses
-
-FloatArray = npt.NDArray[np.float64]
 
 SAME_PLACE_MM = 0.02
 

@@ -7,12 +7,11 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import EitskinError, FrameError
 from eitskin.fileio import write_beside
 from eitskin.frames.arrays import read_npz
 from eitskin.skin.protocol import Protocol, table
-
-FloatArray = npt.NDArray[np.float64]
 
 FORMAT, VERSION = "eitskin-presses", 1
 MAX_PRESSES = 20_000

@@ -10,11 +10,9 @@ nothing more: its residual is A^-1 (y - a o mean) / diag(A^-1).
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.teaching.kernel import Kernel
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import EitskinError, ProtocolError, UsageError
 from eitskin.fem.grid import Grid
@@ -34,7 +35,6 @@ from eitskin.teaching.left_out import (
 from eitskin.teaching.make import LEAST_SHARES, taught_model
 from eitskin.teaching.presses import Presses, aged
 
-FloatArray = npt.NDArray[np.float64]
 # models, each with the numbers of presses that it did not know
 Tried = list[tuple[Model, npt.NDArray[np.int64]]]
 

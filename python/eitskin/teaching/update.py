@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ProtocolError
 from eitskin.fem.grid import between_pixels, grid_for
 from eitskin.model.force_law import LoadLaw
@@ -51,8 +52,6 @@ from eitskin.teaching.move import UNMOVED, Move
 from eitskin.teaching.presses import Presses, shifted
 from eitskin.teaching.process import condition
 from eitskin.teaching.teach import Tried, chosen_share, solve_presses
-
-FloatArray = npt.NDArray[np.float64]
 
 KEPT, MOVED, FULL = "kept", "moved", "full"
 START_TURNS, REFINED_STARTS = 36, 3

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fileio import write_beside
 from eitskin.skin.skin import Skin
 from eitskin.view.panels import check_path
@@ -14,7 +14,6 @@ from eitskin.view.pictures import load_matplotlib
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 
 MM_PER_INCH = 25.4
 PAGE_MM, MARGIN_MM = (210.0, 297.0), 6.0

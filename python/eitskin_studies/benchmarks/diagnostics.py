@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import FrameError
 from eitskin.model.prebuilt import load_prebuilt
@@ -39,8 +39,6 @@ from eitskin_studies.benchmarks.diagnostics_scenes import (
 from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import copied
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 SNRS_DB, HEADLINE_DB, BETWEEN_DB = (40.0, 60.0, 80.0), 60.0, 50.0

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Info
 from eitskin.scene.streams import stream
 from eitskin_studies.benchmarks.diagnostics_scenes import PROTOCOL, ROLE, ROWS, SceneCase
 
-FloatArray = npt.NDArray[np.float64]
 Spoil = Callable[[SceneCase, FloatArray], FloatArray]
 CROWDED = "crowded"
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
 from eitskin.scene.random_touches import TouchScene, random_touches
@@ -23,8 +23,6 @@ from eitskin.scene.simulate import measure
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.harness.sessions import converter_for
-
-FloatArray = npt.NDArray[np.float64]
 
 ROLE = "findings"  # keys the seeds of recorded results
 ELECTRODES, QUIET_FRAMES, RATE_HZ, BRIDGE_OHM = 16, 16, 20.0, 10.0

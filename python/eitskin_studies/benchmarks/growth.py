@@ -15,8 +15,8 @@ from time import thread_time_ns
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.fileio import write_bytes
 from eitskin.model.build import BuildSettings, linearise, make_model
@@ -31,7 +31,6 @@ from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, text_table
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 SNR_DB, SCENES, SEED, ELEMENTS = 60.0, 8, 5, 3000

@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin import __version__
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError, missing_extra
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.grid import Grid, grid_for
@@ -29,8 +30,6 @@ from eitskin.fem.sensitivity import element_to_pixel, sensitivity
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
 from eitskin_studies.harness.machine import machine
-
-FloatArray = npt.NDArray[np.float64]
 
 ELEMENTS = (3000, 10000)
 MODEL_ELEMENTS = 3000

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.device.ports import BAUD
 from eitskin.device.wire.codec import Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream
@@ -26,8 +27,6 @@ from eitskin_studies.benchmarks.outputs import BITS_A_BYTE, host_times_ms
 from eitskin_studies.gestures.bench import wilson
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling
-
-FloatArray = npt.NDArray[np.float64]
 
 ROWS, ROW_US, DRIVES_A_FRAME = 208, 100.0, 16
 RATE_HZ = 1e6 / (ROWS * ROW_US)  # scans without a pause

@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.device.ports import BAUD
 from eitskin.device.wire.codec import Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream
@@ -34,8 +34,6 @@ from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import Source
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, Tabular
-
-FloatArray = npt.NDArray[np.float64]
 
 RATE_HZ = 48.0
 SCENE_HZ = 500.0  # of the emulated board's scene

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Options
 from eitskin.errors import FrameError
@@ -24,8 +25,6 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-
-FloatArray = npt.NDArray[np.float64]
 
 LAMBDA_REL = 0.03
 SURE = 1e-10

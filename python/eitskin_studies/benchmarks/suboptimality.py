@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.scene.simulate import Simulated
 from eitskin.scoring import metrics
@@ -20,7 +20,6 @@ from eitskin_studies.benchmarks.solve_problems import bench_options, make_proble
 from eitskin_studies.compare.run import truth_masks
 from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 MIN = 1e-7

@@ -19,9 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError, UsageError
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def difference_frames(dv: npt.ArrayLike, rows: int) -> FloatArray:

@@ -2,8 +2,8 @@
 host."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.build import BuildSettings, make_model
@@ -11,8 +11,6 @@ from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.families import Family, Setup
 from eitskin_studies.harness.discs import pixel_cover
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class CoreMethod:

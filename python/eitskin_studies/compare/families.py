@@ -10,9 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-import numpy.typing as npt
-
+from eitskin.arrays import FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.fields import electrode_fields
 from eitskin.fem.grid import Grid, grid_for
@@ -21,8 +19,6 @@ from eitskin.fem.sensitivity import sensitivity
 from eitskin.model.build import Linearisation
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Method(Protocol):

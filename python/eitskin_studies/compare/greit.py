@@ -15,13 +15,11 @@ instead of for a noise figure.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
 from eitskin_studies.compare.baselines import LinearMethod
-
-FloatArray = npt.NDArray[np.float64]
 
 TARGETS = 4000
 TARGET_RADIUS = 0.05  # of half the grid's longer side: a fifth of a touch's area or less

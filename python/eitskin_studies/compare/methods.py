@@ -2,11 +2,12 @@
 
 from importlib.metadata import entry_points
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
 from eitskin_studies.compare import baselines
 from eitskin_studies.compare.core_method import core_methods
-from eitskin_studies.compare.families import Family, FloatArray, Setup
+from eitskin_studies.compare.families import Family, Setup
 from eitskin_studies.compare.greit import train_greit
 
 ENTRY_POINT_GROUP = "eitskin.methods"

@@ -9,12 +9,11 @@ import importlib
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin_studies.benchmarks.jacobian import pyeit_case
 from eitskin_studies.compare.baselines import LinearMethod
 from eitskin_studies.compare.families import Family, Setup
-
-FloatArray = npt.NDArray[np.float64]
 
 ELEMENTS = 3000
 NAME = "pyEIT Gauss-Newton"

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
@@ -35,7 +36,6 @@ from eitskin_studies.harness.thresholds import (
     miou_curves,
 )
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any], str], Iterable[Any]]
 
 TOUCH_THRESHOLDS = THRESHOLDS[4::5]

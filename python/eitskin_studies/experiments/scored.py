@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.model.model import Model
 from eitskin.scene.random_touches import TouchScene, TouchSet
@@ -18,8 +19,6 @@ from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.harness.sessions import FrameSession, Progress, SceneSolver
 from eitskin_studies.harness.summary import Summary
 from eitskin_studies.harness.thresholds import best_threshold, miou_curves
-
-FloatArray = npt.NDArray[np.float64]
 
 PART = 20  # scenes that are solved and kept at once: some seconds
 DIGITS = 5

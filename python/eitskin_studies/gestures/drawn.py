@@ -7,13 +7,11 @@ radius of every finger are drawn; a gesture depends on (seed, role, session, its
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.scene.laws import ShortCircuit
 from eitskin.scene.streams import stream
 from eitskin.scene.touch_path import Keyframe, TouchTrack
-
-FloatArray = npt.NDArray[np.float64]
 
 # what a session holds, each as often; the last two are no gestures and must stay without one
 KINDS = ("tap", "double-tap", "hold", "swipe", "pinch", "spread", "rotate", "drag", "press")

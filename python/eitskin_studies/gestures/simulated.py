@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FrameError
 from eitskin.fem.cem import ForwardModel
@@ -26,8 +26,6 @@ from eitskin.scene.touch_path import sample, touches_at
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.gestures.drawn import DrawnSession
 from eitskin_studies.harness.snr import noise_deviation_v
-
-FloatArray = npt.NDArray[np.float64]
 
 ELEMENTS = 8000
 RATE_HZ = 48.0

@@ -3,13 +3,12 @@
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
 from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
 from eitskin.scoring.metrics import disc_mask
 from eitskin.skin.outline import Outline
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def spaced_touches(

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
 from eitskin.fileio import write_beside
@@ -29,8 +29,6 @@ from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import BASE_SAMPLES
 from eitskin_studies.harness.snr import FINE_BITS, FINE_CONVERTER_DB, noise_deviation_v
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
 

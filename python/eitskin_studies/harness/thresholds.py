@@ -10,14 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.errors import UsageError
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.scoring.metrics import ImageScorer
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int64]
 THRESHOLDS: tuple[float, ...] = tuple(round(0.02 * k, 2) for k in range(1, 50))
 
 

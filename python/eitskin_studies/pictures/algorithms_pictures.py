@@ -21,7 +21,6 @@ from eitskin_studies.pictures.comparison_pictures import truth_marks
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 
 LEFT_OUT = (
     "plain FISTA 30, signed",

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.skin.skin import Skin
 from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, RIM, STYLE, load_matplotlib
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from eitskin_studies.experiments.force.curves import ForceCurves
     from eitskin_studies.experiments.force.detection import Detection
 
-FloatArray = npt.NDArray[np.float64]
 
 COLOURS = ("#7b1fa2", "#1565c0", "#00796b", "#c75b00")  # from the centre to the rim
 NAMES = ("centre", *(f"{share:g} R" for share in RADIUS_SHARES[1:]))

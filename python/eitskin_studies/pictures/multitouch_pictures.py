@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
 from eitskin.view.panels import draw_panels, save_picture
@@ -23,8 +24,6 @@ from eitskin_studies.experiments.multitouch.measure import Ambiguities, CountedS
 from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
 from eitskin_studies.experiments.multitouch.test_data import CLASSICAL, HEADLINE_DB, SNRS_DB
 from eitskin_studies.pictures.comparison_pictures import truth_marks
-
-FloatArray = npt.NDArray[np.float64]
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
@@ -21,7 +22,6 @@ from eitskin_studies.harness.summary import Summary, summarise
 from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 from eitskin_studies.tradeoff.engines import Built
 
-FloatArray = npt.NDArray[np.float64]
 DIGITS = 6
 
 

@@ -9,8 +9,8 @@ from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.scene.simulate import Measurement
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
@@ -20,8 +20,6 @@ from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.compare.pyeit_method import pyeit_method
 from eitskin_studies.compare.run import CompareSettings, compare
 from eitskin_studies.harness.sessions import Progress
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def peer_families(setup: Setup) -> Sequence[Family]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FrameError
 from eitskin.scoring.matching import match
@@ -20,7 +20,6 @@ from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.multitouch.counts import Share, share
 from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
 
-FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any], str], Iterable[Any]]
 DIGITS = 4
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.config import nearest
 from eitskin.errors import GeometryError, UsageError
 from eitskin.fem.cem import ForwardModel
@@ -33,7 +33,6 @@ from eitskin.skin.skin import Skin
 from eitskin_studies.harness.sessions import converter_for
 from eitskin_studies.worlds.worlds import WORLDS, Errors, TouchKinds, World
 
-FloatArray = npt.NDArray[np.float64]
 Generators = Callable[[str], np.random.Generator]
 Progress = Callable[[Sequence[Any], str], Iterable[Any]]
 

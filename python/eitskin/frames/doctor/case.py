@@ -6,15 +6,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import Homogeneous, voltages_of
 from eitskin.skin.skin import Skin
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 GROUP = 12
 SAME = 1e-6

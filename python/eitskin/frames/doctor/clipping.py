@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from eitskin.frames.doctor.case import BoolArray, Case, FloatArray, numbers
+from eitskin.arrays import BoolArray, FloatArray
+from eitskin.frames.doctor.case import Case, numbers
 from eitskin.frames.doctor.remedy import channel_remedy
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.frames.doctor.case import (
     GROUP,
     SAME,
-    BoolArray,
     Case,
-    FloatArray,
     correlation,
     numbers,
     rms,

@@ -5,7 +5,8 @@ from itertools import combinations
 
 import numpy as np
 
-from eitskin.frames.doctor.case import BoolArray, Case, FloatArray
+from eitskin.arrays import BoolArray, FloatArray
+from eitskin.frames.doctor.case import Case
 from eitskin.frames.homogeneous import shorted, shorted_frames
 
 TRIMMED = 0.04

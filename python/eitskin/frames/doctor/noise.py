@@ -8,15 +8,8 @@ changes along a straight line through all quiet frames.
 
 import numpy as np
 
-from eitskin.frames.doctor.case import (
-    Case,
-    FloatArray,
-    IntArray,
-    numbers,
-    rms,
-    short_list,
-    strength_groups,
-)
+from eitskin.arrays import FloatArray, IntArray
+from eitskin.frames.doctor.case import Case, numbers, rms, short_list, strength_groups
 from eitskin.frames.doctor.remedy import channel_remedy
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 from eitskin.frames.orders import touching

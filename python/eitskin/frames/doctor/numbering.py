@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eitskin.frames.doctor.case import Case, FloatArray, correlation
+from eitskin.arrays import FloatArray
+from eitskin.frames.doctor.case import Case, correlation
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.homogeneous import voltages_of
 from eitskin.frames.orders import electrode_map, relabel

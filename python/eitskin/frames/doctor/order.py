@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.frames.doctor.case import SAME, Case, FloatArray, cosine, numbers, rms
+from eitskin.arrays import FloatArray
+from eitskin.frames.doctor.case import SAME, Case, cosine, numbers, rms
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.doctor.subject import AS_GIVEN
 from eitskin.frames.doctor.swaps import likeness

@@ -6,7 +6,8 @@ other leave nothing.
 
 import numpy as np
 
-from eitskin.frames.doctor.case import Case, FloatArray, cosine, rms
+from eitskin.arrays import FloatArray
+from eitskin.frames.doctor.case import Case, cosine, rms
 from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
 from eitskin.frames.doctor.numbering import Numbering, ranked, renumbered_frames
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.frames.doctor.case import Case, FloatArray, numbers
+from eitskin.arrays import FloatArray
+from eitskin.frames.doctor.case import Case, numbers
 from eitskin.frames.doctor.gain import channel_gains, outliers
 from eitskin.frames.doctor.misfit import Joined, best_joined, misfit
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_studies.compare import baselines
 from eitskin_studies.compare.core_method import CoreMethod, core_methods
 from eitskin_studies.compare.families import Family, Method, Setup
 from eitskin_studies.compare.greit import GreitTraining, train_greit
 from eitskin_studies.compare.methods import RATIOS, STEPS, STRENGTHS
-
-FloatArray = npt.NDArray[np.float64]
 
 FIXED_STRENGTH, FIXED_STEPS, FIXED_RATIO = 1e-5, 30.0, 1e-3
 CONVERGED = 3000

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.skin.protocol import Protocol
@@ -20,7 +21,6 @@ from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELE
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 from eitskin_studies.harness.thresholds import best_threshold, match_all, miou_curves
 
-FloatArray = npt.NDArray[np.float64]
 Arrays = dict[str, npt.NDArray[Any]]
 
 SNR_DB = 60.0

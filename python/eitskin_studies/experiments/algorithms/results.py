@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.scoring import metrics
 from eitskin_studies.experiments.algorithms.candidates import Candidate
 from eitskin_studies.experiments.algorithms.measure import (
@@ -21,8 +21,6 @@ from eitskin_studies.experiments.algorithms.measure import (
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS
 from eitskin_studies.harness.summary import Summary, summarise
 from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold
-
-FloatArray = npt.NDArray[np.float64]
 
 FIXED_THRESHOLD = 0.1
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.fem.cem import ForwardModel
 from eitskin.model.prebuilt import load_prebuilt
@@ -27,8 +27,6 @@ from eitskin_studies.experiments.multitouch.counts import share
 from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.sessions import converter_for
 from eitskin_studies.harness.snr import noise_deviation_v
-
-FloatArray = npt.NDArray[np.float64]
 
 TITLE = "Touches on a skin that is stretched or bent, by the model of the flat one"
 USUAL, SNR_DB, UNTOUCHED = 100, 60.0, 50

@@ -7,8 +7,8 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.fields import electrode_fields
 from eitskin.fem.grid import grid_for
@@ -40,8 +40,6 @@ from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import FrameSession
 from eitskin_studies.harness.snr import noise_deviation_v
 from eitskin_studies.tradeoff.scene_sets import ring_touches
-
-FloatArray = npt.NDArray[np.float64]
 
 SNR_DB = 60.0
 COUNTS = (16, 32, 64)

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
-
-FloatArray = npt.NDArray[np.float64]
 
 PATTERNS: dict[str, Callable[[int], Protocol]] = {
     "adjacent": adjacent,

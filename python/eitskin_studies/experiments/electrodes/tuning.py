@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.model.build import LIPSCHITZ_MARGIN
 from eitskin.model.model import Model
 from eitskin.model.reduction import DEFAULT_REGULARISATION, noise_gain, spectral_norm_squared
@@ -19,8 +19,6 @@ from eitskin.scoring import metrics
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.experiments.scored import Evaluator
 from eitskin_studies.harness.thresholds import best_threshold, miou_curves
-
-FloatArray = npt.NDArray[np.float64]
 
 REGULARISATIONS, LAMBDAS, ITERATIONS = (
     (0.1, DEFAULT_REGULARISATION, 1e-3),

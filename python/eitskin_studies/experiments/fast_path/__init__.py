@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
 from eitskin_studies.experiments.fast_path import adaptive, beyond
@@ -27,8 +28,6 @@ from eitskin_studies.experiments.fast_path.states import (
     draw_states,
 )
 from eitskin_studies.experiments.multitouch.counts import share
-
-FloatArray = npt.NDArray[np.float64]
 
 TITLE = "Touches after each drive: false ones, delay and error, while they land, move and lift"
 BEFORE_S, HELD_S, AFTER_S = 0.06, 0.08, 0.06

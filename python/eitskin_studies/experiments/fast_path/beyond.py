@@ -8,6 +8,7 @@ from functools import cache, partial
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
@@ -26,7 +27,6 @@ from eitskin_studies.experiments.fast_path.scans import (
 )
 from eitskin_studies.experiments.fast_path.states import Keyframes, States, Touched, place_on
 
-FloatArray = npt.NDArray[np.float64]
 Paths = Sequence[tuple[Keyframes, TrueInTime]]
 
 FINGER, INSULATING = Touched(), Touched(law="insulating", contrast=0.2)

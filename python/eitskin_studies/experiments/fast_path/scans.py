@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
 from eitskin.core.results import Info, Reconstruction
 from eitskin.model.model import Model
 from eitskin.scoring.matching import GATE_MM
-
-FloatArray = npt.NDArray[np.float64]
 
 ROW_S = 1e-4
 TARE_FRAMES = 64

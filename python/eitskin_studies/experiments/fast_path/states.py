@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.model.model import Model
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import Scene, scene_from_table
@@ -18,7 +18,6 @@ from eitskin.skin.protocol import Protocol, in_order
 from eitskin.skin.skin import Skin
 from eitskin_studies.experiments.fast_path.scans import ROW_S, STEP
 
-FloatArray = npt.NDArray[np.float64]
 Keyframes = Sequence[tuple[float, ...]]
 
 ELEMENTS = 7000

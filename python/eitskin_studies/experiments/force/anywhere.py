@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.calibration.fit import calibrate
 from eitskin.calibration.presses import Presses
 from eitskin.core.results import NEWTONS_PER_GRAM
@@ -14,8 +14,6 @@ from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.force.law import LOADS_G
 from eitskin_studies.experiments.force.readouts import LOG_TOUCH, READOUTS, TOUCH, Readout
 from eitskin_studies.experiments.force.scenes import PressSet
-
-FloatArray = npt.NDArray[np.float64]
 
 RESAMPLES = 1000
 

@@ -4,14 +4,12 @@ uncertainty moves them."""
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.force.law import LOADS_G
 from eitskin_studies.experiments.force.readouts import READOUTS, Readout
 from eitskin_studies.experiments.force.scenes import RADIUS_SHARES, PressSet
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

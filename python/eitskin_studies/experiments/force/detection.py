@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.scene.simulate import measure
 from eitskin_studies.experiments.experiment import Table
@@ -14,8 +14,6 @@ from eitskin_studies.experiments.force.readouts import Instruments
 from eitskin_studies.experiments.force.scenes import RADIUS_SHARES, PressSet
 from eitskin_studies.harness.sessions import converter_for
 from eitskin_studies.harness.snr import noise_deviation_v
-
-FloatArray = npt.NDArray[np.float64]
 
 SNRS_DB = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
 PROBABILITY = 0.9

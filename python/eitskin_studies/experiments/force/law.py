@@ -23,8 +23,6 @@ from eitskin.scene.laws import Piezoresistive
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.streams import stream
 
-FloatArray = npt.NDArray[np.float64]
-
 LOADS_G = (50.0, 80.0, 100.0, 150.0, 200.0)
 DEVIATION = {"modulus_pa": 0.25, "tip_mm": 0.1, "sensitivity_per_gram": 0.2, "saturation": 0.2}
 

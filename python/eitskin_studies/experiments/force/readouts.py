@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.model.build import BuildSettings, Linearisation, linearise, make_model
 from eitskin.model.model import Model
@@ -18,8 +18,6 @@ from eitskin.solve.batch import Batch
 from eitskin_studies.compare.baselines import PlainFista
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS
 from eitskin_studies.harness.sessions import FrameSession
-
-FloatArray = npt.NDArray[np.float64]
 
 FISTA_ITERATIONS, FISTA_RATIO = 30, 0.03
 PEAK, INTEGRAL, IMAGE_PEAK, IMAGE_INTEGRAL, TOUCH = (

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scene.streams import stream
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.force.law import LOADS_G, NOMINAL, PressLaw
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
-
-FloatArray = npt.NDArray[np.float64]
 
 RADIUS_SHARES = (0.0, 0.3, 0.6, 0.85)  # of the skin's radius: from the centre to near the rim
 ANGLES_DEG = (

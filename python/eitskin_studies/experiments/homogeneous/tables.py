@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_studies.experiments.experiment import ExperimentSettings, Table
 from eitskin_studies.experiments.homogeneous.cases import INSTRUMENT, QUIET_FRAMES
 from eitskin_studies.experiments.homogeneous.measured import FILE, SOURCE
 from eitskin_studies.experiments.homogeneous.uniformity import Uniformity
 from eitskin_studies.harness.summary import summarise
-
-FloatArray = npt.NDArray[np.float64]
 
 MEASURES = ("spread", "worst", "reciprocity", "mirror")
 HEAD = (

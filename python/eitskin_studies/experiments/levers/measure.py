@@ -6,8 +6,8 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.model.build import linearise, make_model
 from eitskin.model.model import Model
@@ -25,8 +25,6 @@ from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import FrameSession, apparent_change_s_per_m_mm2
 from eitskin_studies.harness.summary import summarise
 from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold, miou_curves
-
-FloatArray = npt.NDArray[np.float64]
 
 RANDOM, SCENES, TUNING = "1 to 3 random", 160, 60
 IMAGE_SNRS_DB = (40.0, 50.0, 60.0, 80.0)

@@ -11,16 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.constants_table import CROWD_CLEAR, CROWD_FAR, CROWD_STRONG
 from eitskin.errors import missing_extra
 from eitskin.scoring.matching import match
 from eitskin_studies.experiments.multitouch.counts import Share, share_of
 from eitskin_studies.experiments.multitouch.variants import SeenFrame
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 # what each feature is, in the order of the coefficients; none may thrive on touches of a scene
 # being equal, as half of these are

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import element_fields
@@ -25,8 +25,6 @@ from eitskin.skin.skin import Skin
 from eitskin_reference.engine import ReferenceEngine
 from eitskin_reference.problem import Problem, SolveResult
 from eitskin_studies.harness.sessions import MeasuredFrames
-
-FloatArray = npt.NDArray[np.float64]
 
 ELEMENTS = 3000
 STEPS = 12

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_studies.harness.thresholds import match_all
-
-FloatArray = npt.NDArray[np.float64]
 
 NORMAL_95 = 1.959964
 RESAMPLES = 1000

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import GeometryError
 from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TouchScene
@@ -20,8 +21,6 @@ from eitskin_studies.experiments.multitouch.variants import (
     differences_v,
     read_images,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 EXAMPLES = (
     (RING, 7),

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import GeometryError
 from eitskin.scoring.matching import match
 from eitskin_studies.experiments.experiment import Workspace
@@ -40,8 +40,6 @@ from eitskin_studies.experiments.multitouch.test_data import (
 from eitskin_studies.experiments.multitouch.variants import VARIANTS, SeenFrame, TouchVariant
 from eitskin_studies.harness.sessions import MeasuredFrames
 from eitskin_studies.harness.snr import noise_deviation_v
-
-FloatArray = npt.NDArray[np.float64]
 
 CEILING_CELLS = (
     (WIDE, 6, 80.0), (WIDE, 8, 80.0), (WIDE, 12, 80.0), (NARROW, 3, 60.0), (NARROW, 5, 60.0),

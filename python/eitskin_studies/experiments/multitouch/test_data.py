@@ -5,8 +5,8 @@ from dataclasses import asdict
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.model.build import make_model, scaled_defaults
 from eitskin.model.model import Model
 from eitskin.scene.random_touches import TouchSet
@@ -26,8 +26,6 @@ from eitskin_studies.experiments.multitouch.variants import (
     train,
 )
 from eitskin_studies.harness.sessions import FrameSession
-
-FloatArray = npt.NDArray[np.float64]
 
 SNRS_DB, HEADLINE_DB = (40.0, 60.0, 80.0), 60.0
 # of the two signs of FISTA this one counts better on tuning scenes

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.model.build import BuildSettings
 from eitskin.model.model import Model
@@ -17,8 +18,6 @@ from eitskin.solve.batch import Batch
 from eitskin_studies.compare.families import Family, Method
 from eitskin_studies.harness.sessions import MeasuredFrames
 from eitskin_studies.harness.thresholds import best_touch_threshold, match_all
-
-FloatArray = npt.NDArray[np.float64]
 
 TOUCH_THRESHOLDS = tuple(round(0.1 * k, 1) for k in range(1, 10))
 DIGITS = 5

@@ -5,7 +5,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin.model.build import linearise
 from eitskin.model.prebuilt import load_prebuilt
@@ -25,8 +24,6 @@ from eitskin_studies.experiments.multitouch.counts import share
 from eitskin_studies.experiments.multitouch.variants import read_images
 from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.sessions import FrameSession
-
-FloatArray = npt.NDArray[np.float64]
 
 TITLE = "The paper, claim by claim; its weights placed one after another (Fig. 12)"
 

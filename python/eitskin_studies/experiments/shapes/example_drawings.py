@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import missing_extra
 from eitskin.fileio import write_beside, write_bytes
 from eitskin.skin.placement import nearest_on_rim
 from eitskin_studies.experiments.shapes.rounded import Corner, as_outline, as_polyline, as_svg_path
-
-FloatArray = npt.NDArray[np.float64]
 
 PAGE_MM = (170.0, 210.0)
 MILLIMETRES = 4  # $INSUNITS of a DXF file

@@ -4,7 +4,6 @@ put them."""
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import numpy.typing as npt
 
 from eitskin.fileio import write_bytes
@@ -23,8 +22,6 @@ from eitskin_studies.experiments.shapes.example_drawings import (
     write_forearm_dxf,
 )
 from eitskin_studies.experiments.shapes.rounded import as_outline
-
-FloatArray = npt.NDArray[np.float64]
 
 WRIST_DEG = -90.0  # where electrode 0 of a hand is: the middle of the wrist
 BANDS = ("rim third", "middle third", "innermost third")

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.fem.grid import Grid
 from eitskin.frames.frames import Frames
@@ -25,8 +25,6 @@ from eitskin_studies.experiments.tank.signed_scores import (
 from eitskin_studies.experiments.tank.tanks import Rods, objects_of, touch_like, truth_of
 from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold, match_all, miou_curves
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 DIGITS = 5
 PLACE_THRESHOLDS = THRESHOLDS[4::5]
 

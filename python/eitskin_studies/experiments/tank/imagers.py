@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.fem.grid import Grid
 from eitskin.model.build import BuildSettings, Linearisation, make_model
@@ -19,8 +19,6 @@ from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.families import Family, Method
 from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.harness.discs import pixel_cover
-
-FloatArray = npt.NDArray[np.float64]
 
 DISCS = "eitskin, touches as discs"
 TUNED_DISCS = "eitskin, touches as discs, change from simulation"

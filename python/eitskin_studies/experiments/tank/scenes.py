@@ -4,17 +4,14 @@ these."""
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.scene.random_touches import TouchRules, TouchScene, TouchSet, random_touches
 from eitskin.scene.streams import stream
 from eitskin.scoring.metrics import Raster, disc_mask
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tank.tanks import tank
 from eitskin_studies.harness.sessions import FrameSession
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 # 0.1 to 0.29 of the tank's radius; metal conducts all but infinitely beside water
 RULES = TouchRules(

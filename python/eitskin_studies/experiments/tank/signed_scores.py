@@ -5,14 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.scene.streams import stream
 from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import Matching, match
 from eitskin_studies.harness.thresholds import THRESHOLDS
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 def signed_miou(

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray
 from eitskin.errors import UsageError
 from eitskin.frames.frames import Frames
 from eitskin.frames.import_options import ImportOptions
@@ -23,8 +24,6 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin
-
-BoolArray = npt.NDArray[np.bool_]
 
 RADIUS_MM = 140.0
 PHANTOMS = "kit4_dev.npz"

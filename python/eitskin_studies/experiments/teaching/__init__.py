@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
@@ -31,8 +30,6 @@ from eitskin_studies.experiments.teaching.remounted import (
     updates,
 )
 from eitskin_studies.experiments.teaching.untaught import untaught
-
-FloatArray = npt.NDArray[np.float64]
 
 TITLE = "A skin taught from presses at known places"
 FILE = "hydrogel_presses.npz"

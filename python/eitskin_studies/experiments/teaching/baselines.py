@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import missing_extra
 
-FloatArray = npt.NDArray[np.float64]
 # data and places (n, m), (n, 2) taught, data (k, m) judged: places (k, 2)
 Baseline = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 

@@ -5,15 +5,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin.model.model import Model
 from eitskin.teaching.presses import Presses
 from eitskin.teaching.teach import solve_presses
 from eitskin.teaching.update import KEPT, update
 from eitskin_studies.experiments.experiment import Table
-
-FloatArray = npt.NDArray[np.float64]
 
 TAUGHT, JUDGED = 200, 100
 COUNTS = (5, 10, 20, 50)

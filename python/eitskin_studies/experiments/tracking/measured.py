@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Options
 from eitskin.model.model import Model
@@ -23,8 +23,6 @@ from eitskin_studies.experiments.tracking.counted import TrackCount, count_strea
 from eitskin_studies.experiments.tracking.streams import ELEMENTS, TouchStream
 from eitskin_studies.harness.sessions import converter_for
 from eitskin_studies.harness.snr import noise_deviation_v
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import GeometryError
 from eitskin.scene.description import Scene
 from eitskin.scene.laws import ShortCircuit
@@ -15,8 +15,6 @@ from eitskin.scene.simulate import Measurement
 from eitskin.scene.streams import stream
 from eitskin.scene.touch_path import Keyframe, TouchTrack, TrackSamples, sample
 from eitskin.skin.outline import Outline
-
-FloatArray = npt.NDArray[np.float64]
 
 RATE_HZ = 48.0  # of a board that scans both rows of each pair (docs/guide/board.md)
 FRAMES = 72
