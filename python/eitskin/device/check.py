@@ -10,7 +10,9 @@ from eitskin.device.wire.codec import LinkCounters
 from eitskin.device.wire.link_table import LINK_VERSION
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import DeviceError
+from eitskin.model.eitm import load_model
 from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_prebuilt
 
 FLASH = "flash this version's firmware with  eitskin flash"
 
@@ -100,9 +102,6 @@ def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
 def model_of(info: BoardInfo, path: str | Path | None, name: str) -> tuple[Model, bytes]:
     """The board's own model on the host: the file ``path``, or the prebuilt one where that is what
     the board has."""
-    from eitskin.model.eitm import load_model
-    from eitskin.model.prebuilt import load_prebuilt
-
     model, blob = load_prebuilt() if path is None else load_model(path)
     check_model(info, model, blob, name)
     return model, blob

@@ -7,16 +7,15 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from eitskin.core.results import Options
 from eitskin.device.check import model_of
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import DeviceError, ProtocolError
 from eitskin.model.model import Model
+from eitskin.model.options import default_options, tracking
+from eitskin.model.prebuilt import load_prebuilt
 from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
-
-if TYPE_CHECKING:
-    from eitskin.core.results import Options
 
 NAMES_IT = "name its file with  --model FILE"
 
@@ -32,8 +31,6 @@ class KnownModel:
 def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | None:
     """The board's model: the file ``path``, or the prebuilt one where that is what the board has;
     None where it has another."""
-    from eitskin.model.prebuilt import load_prebuilt
-
     if path is not None:
         return KnownModel(*model_of(info, path, name))
     model, blob = load_prebuilt()
@@ -88,11 +85,9 @@ def _usual(electrodes: int) -> Iterator[Protocol]:
             yield make(electrodes)
 
 
-def board_options(model: Model, board: BoardInfo | None = None, *, track: bool = True) -> "Options":
+def board_options(model: Model, board: BoardInfo | None = None, *, track: bool = True) -> Options:
     """The options that a board starts with: the model's own, the noise floor of ``board``'s
     converter, and touches tracked; or without that."""
-    from eitskin.model.options import default_options, tracking
-
     options = default_options(model)
     if board is not None:
         options = replace(options, noise_floor_v=board.noise_floor_v)

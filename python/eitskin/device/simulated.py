@@ -13,7 +13,10 @@ import numpy as np
 from eitskin.core.engine import aligned
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.errors import DeviceError, UsageError
+from eitskin.model.eitm import decode_model
+from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.board_frames import BoardFrames
+from eitskin.scene.library_scenes import find_scene
 
 WORKSPACE_BYTES = 4 << 20  # enough for any model that fits a bank
 OUTPUT_BYTES = 1 << 16
@@ -112,7 +115,6 @@ class HostBoard:
         blob = self._lib.sim_model(self._sim, self._bytes, self._crc)
         if blob == self._ffi.NULL or self._crc[0] == self._model_crc:
             return None
-        from eitskin.model.eitm import decode_model
 
         model = decode_model(bytes(self._ffi.buffer(blob, self._bytes[0])), "the board's model")
         self._model_crc = self._crc[0]
@@ -255,9 +257,6 @@ def open_simulated(scene: str, *, model: bytes | None = None, loop: bool = False
         FileError, ConfigError, GeometryError, ProtocolError: the scene cannot be read.
         DeviceError: the model does not fit a bank.
     """
-    from eitskin.model.prebuilt import load_prebuilt
-    from eitskin.scene.library_scenes import find_scene
-
     frames = BoardFrames(find_scene(scene))
     blob = load_prebuilt()[1] if model is None else model
     empty = bytes([ERASED]) * BANK_BYTES

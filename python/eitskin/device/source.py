@@ -22,6 +22,7 @@ from eitskin.device.simulated import GivenBoard
 from eitskin.device.transport import Transport
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_prebuilt
 
 GROUP = "eitskin.sources"
 POLL_S = 0.02
@@ -98,8 +99,6 @@ class SourceTransport:
     replays = False
 
     def __init__(self, url: str, source: Source, model: bytes | None = None) -> None:
-        from eitskin.model.prebuilt import load_prebuilt
-
         self.url, self.source = url, source
         self._passed: deque[int] = deque(maxlen=PERIODS)
         blob = load_prebuilt()[1] if model is None else model

@@ -16,6 +16,7 @@ from eitskin.device.wire.link_table import (
 )
 from eitskin.device.wire.packets import Reply
 from eitskin.errors import DeviceError
+from eitskin.model.eitm import decode_model, load_model
 
 ERASE_S = 15.0
 PIECE_S = 1.0
@@ -64,8 +65,6 @@ def _demand(device: CommandExchange, reply: Reply) -> None:
 
 def _checked(device: CommandExchange, model: str | Path | bytes) -> bytes:
     """The model's bytes, refused here rather than after minutes on the wire."""
-    from eitskin.model.eitm import decode_model, load_model
-
     if isinstance(model, bytes):
         decoded, blob = decode_model(model, "the model"), model
     else:

@@ -1,17 +1,16 @@
 """Where each channel of a frame comes from, in a source's own order: electrodes renumbered, rows in
 a protocol's order, signs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eitskin.arrays import IntArray
 from eitskin.errors import FrameError, UsageError
+from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.orders import (
     electrode_map,
     match_rows,
@@ -23,12 +22,9 @@ from eitskin.frames.orders import (
 from eitskin.frames.repair import check_range, partners
 from eitskin.frames.source import electrode_table
 from eitskin.frames.tables import read_table
-
-if TYPE_CHECKING:
-    from eitskin.frames.import_options import ImportOptions
-    from eitskin.model.model import Model
-    from eitskin.skin.protocol import Protocol
-    from eitskin.skin.skin import Skin
+from eitskin.model.model import Model
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
 
 
 def source_rows(

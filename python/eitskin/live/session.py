@@ -11,8 +11,9 @@ from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
+from eitskin.core.results import Options
 from eitskin.device.bandwidth import carried_every
 from eitskin.device.client import Device
 from eitskin.device.events import Events
@@ -29,6 +30,7 @@ from eitskin.device.live_frames import (
     replayed,
 )
 from eitskin.device.open import open_with_files
+from eitskin.device.recordings.recording import Recorder, read_head, recorded_options
 from eitskin.device.set_up import begin_scene, set_up, take_reference
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.timing import Pacer, Slowness, WaitingClock, split_timing
@@ -39,12 +41,9 @@ from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.gestures import GestureTeller
 from eitskin.live.settings import KINDS, Say, SessionSettings
 from eitskin.live.zones import refuse_off_skin
+from eitskin.scoring.matching import match
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore, truth_of
 from eitskin.scoring.stream_check import Watcher
-
-if TYPE_CHECKING:
-    from eitskin.core.results import Options
-    from eitskin.device.recordings.recording import Recorder
 
 TARE_FRAMES = 16
 KEPT_ON = (
@@ -281,8 +280,6 @@ class Session:
         self._look_on()
         self.solver = set_up(self.device, *self.scan_and_solver(), self.known)
         if how.record is not None:
-            from eitskin.device.recordings.recording import Recorder
-
             self.recorder = Recorder(how.record, self.device, self.solver, overwrite=True)
         self._take_reference()
         began_us, meanwhile = begin_scene(self.device)
@@ -403,9 +400,6 @@ def _kind(item: Item) -> str:
 
 def _recorded_truth(url: str) -> SceneTruth | None:
     """Of the scene that the recorded board saw, where that is still to be found."""
-    from eitskin.device.recordings.recording import read_head, recorded_options
-    from eitskin.scoring.matching import match
-
     path = split_timing(url)[0].partition(":")[2]
     solver = recorded_options(path)
     try:

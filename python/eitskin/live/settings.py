@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from eitskin.config import nearest
 from eitskin.core.gestures import Zone
@@ -12,9 +12,8 @@ from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import UsageError
-
-if TYPE_CHECKING:
-    from eitskin.tuning.front import Target
+from eitskin.tuning.for_model import chosen_point, settings_text
+from eitskin.tuning.front import REPORT_US, Target, board_takes
 
 KINDS = ("raw", "image", "touches", "events")
 REPORTS = ("frame", "drive")
@@ -77,8 +76,6 @@ class SessionSettings:
         scan, named, target = self.scan, self.solver, self.target
         if target is None:
             return scan, named
-        from eitskin.tuning.for_model import chosen_point, settings_text
-        from eitskin.tuning.front import REPORT_US, board_takes
 
         known = known or need_model(board, self.model, name, "a budget")
         any_scan = target.unit == REPORT_US

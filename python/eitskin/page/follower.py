@@ -8,11 +8,12 @@ from contextlib import nullcontext
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from eitskin.device.client import Device
+from eitskin.device.known_model import KnownModel
 from eitskin.device.link import Reconnect
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.set_up import set_up, take_reference
@@ -25,11 +26,10 @@ from eitskin.errors import DeviceError, EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.session import TARE_FRAMES, Session
 from eitskin.live.settings import KINDS, SessionSettings
+from eitskin.model.eitm import decode_model
+from eitskin.page.teacher import Teacher
+from eitskin.sinks.outputs import Outputs
 from eitskin.tuning.front import preset
-
-if TYPE_CHECKING:
-    from eitskin.page.teacher import Teacher
-    from eitskin.sinks.outputs import Outputs
 
 DRAWN_S = 0.015
 FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
@@ -83,8 +83,8 @@ class Follower:
         folder: Path,
         on_frame: Callable[[Frame], None],
         on_news: Callable[[str, dict[str, Any]], None],
-        outputs: "Callable[[Session], Outputs] | None" = None,
-        teacher: "Teacher | None" = None,
+        outputs: Callable[[Session], Outputs] | None = None,
+        teacher: Teacher | None = None,
     ) -> None:
         self.teacher = teacher
         if teacher is not None:
@@ -279,9 +279,6 @@ class Follower:
 
     def upload(self, blob: bytes) -> Future[str]:
         """Another model, and the reference for it."""
-        from eitskin.device.known_model import KnownModel
-        from eitskin.model.eitm import decode_model
-
         session = self._board("a model")
         model = decode_model(blob, "the uploaded file")
 

@@ -26,15 +26,14 @@ from eitskin.live.settings import SessionSettings
 from eitskin.page.facts import frame_bytes, setup_text, text_of
 from eitskin.page.follower import Follower
 from eitskin.page.hub import Hub, Outgoing, PageClient
+from eitskin.page.teacher import Teacher
+from eitskin.sinks.outputs import Outputs
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
     from starlette.requests import Request
     from starlette.responses import Response
     from starlette.websockets import WebSocket
-
-    from eitskin.page.teacher import Teacher
-    from eitskin.sinks.outputs import Outputs
 
 FILES = {
     "/": ("index.html", "text/html; charset=utf-8"),

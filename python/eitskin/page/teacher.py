@@ -5,18 +5,18 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.device.known_model import scanned_protocol
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame
 from eitskin.live.session import Session
+from eitskin.model.eitm import save_model
+from eitskin.skin.skin import Skin
 from eitskin.teaching.guide import GuideEvent, PressGuide, Step, scan_of_presses
+from eitskin.teaching.plan import Plan
 from eitskin.teaching.press_file import PressFile
-
-if TYPE_CHECKING:
-    from eitskin.skin.skin import Skin
-    from eitskin.teaching.plan import Plan
+from eitskin.teaching.teach import teach
 
 
 class Teacher:
@@ -24,9 +24,7 @@ class Teacher:
     ``text``, None and "" for that of the board's model. ``on_event`` gets the facts for pages
     whenever something is new."""
 
-    def __init__(
-        self, plan: "Plan", presses: Path, skin: "Skin | None" = None, text: str = ""
-    ) -> None:
+    def __init__(self, plan: Plan, presses: Path, skin: Skin | None = None, text: str = "") -> None:
         self.plan, self.path, self._skin, self._text = plan, presses, skin, text
         self.on_event: Callable[[dict[str, Any]], None] = lambda facts: None
         self._guide: PressGuide | None = None
@@ -102,9 +100,6 @@ class Teacher:
         Raises:
             EitskinError: the presses cannot teach.
         """
-        from eitskin.model.eitm import save_model
-        from eitskin.teaching.teach import teach
-
         presses = None if self._file is None else self._file.presses
         if presses is None:
             raise UsageError("teach: no press is there yet")

@@ -1,16 +1,14 @@
 """What came of recorded frames, as a table for people and as a message for programs."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from eitskin.core.results import NEWTONS_PER_GRAM, Reconstruction, solve_text
 from eitskin.live.message import frame_table, head, known
 from eitskin.reconstruct.steps import ReconstructOutcome
-
-if TYPE_CHECKING:
-    from eitskin.scoring.score import FrameScore
+from eitskin.scoring.score import FrameScore
 
 
 def to_text(outcome: ReconstructOutcome) -> str:
@@ -38,7 +36,7 @@ def to_text(outcome: ReconstructOutcome) -> str:
 
 
 def _lines(
-    label: str, result: Reconstruction, score: "FrameScore | None", weighed: bool
+    label: str, result: Reconstruction, score: FrameScore | None, weighed: bool
 ) -> Iterator[str]:
     """A line a touch of one frame; a line where there is none, and one for what was found wrong."""
     info = result.info
@@ -65,7 +63,7 @@ def _lines(
         yield f"{'':11} found: {'; '.join(info.found)}"
 
 
-def summary(scores: "dict[int, FrameScore]") -> dict[str, Any]:
+def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
     """The scores of all frames in a few numbers; positions are NaN where nothing was found."""
     matchings = [score.matching for score in scores.values()]
     distances = [d for matching in matchings for d in matching.distances_mm]

@@ -5,13 +5,11 @@
 :func:`reconstruct_frames` does these; ``report`` says what came of it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,15 +19,18 @@ from eitskin.core.results import LearnedReference, Reconstruction
 from eitskin.errors import ConfigError, EitskinError, FrameError, UsageError
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import Frames, load_frames
+from eitskin.frames.results_file import save_results
 from eitskin.model.model import Model
 from eitskin.model.options import tracking
 from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.scoring.score import FrameScore, scorer_for
 from eitskin.solve.batch import Batch, check_threads
 from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
-
-if TYPE_CHECKING:
-    from eitskin.scoring.score import FrameScore
-    from eitskin.tuning.front import Point, Target
+from eitskin.tuning.for_model import chosen_point, settings_text
+from eitskin.tuning.front import Point, Target
+from eitskin.view.film import check_film
+from eitskin.view.frame_pictures import draw_results, film_results
+from eitskin.view.panels import check_picture
 
 Results = dict[int, Reconstruction]
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
@@ -150,9 +151,6 @@ def check(
         )
     refuse_unwritable(output, picture, film)
     if picture is not None or film is not None:
-        from eitskin.view.film import check_film
-        from eitskin.view.panels import check_picture
-
         check_picture(picture)
         check_film(film)
 
@@ -201,7 +199,6 @@ def apply_options(
         reconstructor.set_options(tracking(reconstructor.options))
     if how.target is None:
         return None
-    from eitskin.tuning.for_model import chosen_point, settings_text
 
     point = chosen_point(how.target, reconstructor.model, reconstructor.options)
     reconstructor.with_options(**point.configuration.solver_settings)
@@ -278,7 +275,6 @@ def score(
     """The results against the truth, where the frames carry it."""
     if frames.touch_frame is None and frames.truth_mask is None:
         return {}
-    from eitskin.scoring.score import scorer_for
 
     if point is not None:
         model = replace(model, defaults=replace(model.defaults, mask_threshold=point.threshold))
@@ -300,14 +296,8 @@ def write(
 ) -> None:
     """The file of results, the film and the picture, where there is something to show."""
     if output is not None and outcome.results:
-        from eitskin.frames.results_file import save_results
-
         save_results(output, outcome.model, outcome.frames, outcome.results)
     if film is not None and outcome.results:
-        from eitskin.view.frame_pictures import film_results
-
         film_results(film, outcome.model, outcome.frames, outcome.results, progress=progress)
     if picture is not None and outcome.results:
-        from eitskin.view.frame_pictures import draw_results
-
         draw_results(picture, outcome.model, outcome.frames, outcome.results, outcome.scores)

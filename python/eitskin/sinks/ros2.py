@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from eitskin.fem.grid import Grid
+
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-    from eitskin.fem.grid import Grid
 
 Table = dict[str, Any]
 NUMBERS = (
@@ -100,7 +100,7 @@ def report(message: Table, time_ns: int, frame_id: str) -> Table:
     return {"header": header(time_ns, frame_id)} | head
 
 
-def image(grid: "Grid", values: "npt.ArrayLike", time_ns: int, frame_id: str) -> Table:
+def image(grid: Grid, values: "npt.ArrayLike", time_ns: int, frame_id: str) -> Table:
     """sensor_msgs/Image, 32FC1 in S/m: row 0 is the highest y, NaN outside the skin."""
     picture = np.ascontiguousarray(grid.image(values)[::-1], dtype="<f4")
     height, width = picture.shape

@@ -10,6 +10,7 @@ import numpy as np
 from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.fem.grid import Grid, grid_for
+from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.skin import Skin
 from eitskin.teaching.checks import MIN_PRESSES
@@ -174,7 +175,6 @@ def seen_skin(learned: Learned, skin: Skin | None, presses: Presses) -> Skin:
     """The skin in the presses' coordinates; without a description a disk around them."""
     if skin is not None:
         return learned.kernel.placement.skin_in_places(skin)
-    from eitskin.skin.electrodes import Electrodes
 
     reach = float(np.linalg.norm(presses.place_mm, axis=1).max())
     count = presses.protocol.n_electrodes

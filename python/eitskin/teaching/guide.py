@@ -15,20 +15,16 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from eitskin.arrays import FloatArray
 from eitskin.device.settings import ScanSettings
+from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import UsageError
 from eitskin.teaching.plan import Plan
 from eitskin.teaching.press_file import PressFile
-
-if TYPE_CHECKING:
-    from eitskin.device.wire.packets import BoardInfo
-
 
 PACE_US = 25_000  # a frame: a hold of twelve is .3 s
 JUMPS = 2  # between frames at rest: so many of the greatest are not counted as noise
@@ -267,7 +263,7 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def scan_of_presses(board: "BoardInfo", replays: bool) -> ScanSettings:
+def scan_of_presses(board: BoardInfo, replays: bool) -> ScanSettings:
     """Every row of every frame, no faster than a person presses; a board that is given its frames,
     or a recording, sends what it has."""
     if board.frames_given or replays:

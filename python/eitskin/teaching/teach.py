@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.arrays import FloatArray
+from eitskin.calibration.fit import calibrate
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import EitskinError, ProtocolError, UsageError
 from eitskin.fem.grid import Grid
@@ -294,7 +295,6 @@ def learning_curve(
 def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | None, list[str]]:
     """The law from strength to force, or where presses have a depth to that, from presses held
     out."""
-    from eitskin.calibration.fit import calibrate
     from eitskin.calibration.presses import Presses as Weights
 
     given = known_size(presses)

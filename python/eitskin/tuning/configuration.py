@@ -3,18 +3,16 @@ one frozen value."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin.config import from_table, parameter
 from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
 from eitskin.errors import ConfigError
+from eitskin.model.build import BuildSettings, scaled_defaults
 from eitskin.model.model import Defaults
 from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_REGULARISATION
 from eitskin.model.storage import STORAGES
-
-if TYPE_CHECKING:
-    from eitskin.model.build import BuildSettings
-    from eitskin.skin.skin import Skin
+from eitskin.skin.skin import Skin
 
 SCANS = ("full", "reciprocal")
 PERIOD_SAMPLES = 20
@@ -132,13 +130,11 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
 
 
 def build_settings(
-    one: Configuration, skin: "Skin", mask_threshold: float | None = None
-) -> "BuildSettings":
+    one: Configuration, skin: Skin, mask_threshold: float | None = None
+) -> BuildSettings:
     """How the model of a configuration is built; its solver's settings and t become the model's
     defaults, as far as a model has them: not the gap, a limit of MACs, the warm start and the
     sweeps."""
-    from eitskin.model.build import BuildSettings, scaled_defaults
-
     usual = scaled_defaults(skin, "difference")
     left_out = ALL_TOUCH_FIT & ~one.touch_fit
     defaults = replace(

@@ -3,15 +3,14 @@ options for the rest."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from eitskin.model.build import Progress, build_model
+from eitskin.model.eitm import save_model
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import build_settings
 from eitskin.tuning.front import REPORT_US, Point, Target
-
-if TYPE_CHECKING:
-    from eitskin.model.build import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +137,9 @@ def _time_line(board: str, solve_us: float, most_us: float, point: Point) -> str
 
 
 def write_model(
-    path: Path, point: Point, skin: Skin, protocol: Protocol, progress: "Progress | None" = None
+    path: Path, point: Point, skin: Skin, protocol: Protocol, progress: Progress | None = None
 ) -> int:
     """Build and write the model of a point for ``skin``, the solver's settings and t as its
     defaults; returns its bytes. ``progress`` as ``build_model``."""
-    from eitskin.model.build import build_model
-    from eitskin.model.eitm import save_model
-
     settings = build_settings(point.configuration, skin, point.threshold)
     return save_model(path, build_model(skin, protocol, settings, progress=progress))

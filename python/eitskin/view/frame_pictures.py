@@ -8,6 +8,7 @@ from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 from eitskin.scoring.score import FrameScore
+from eitskin.view.film import draw_film, thinned
 from eitskin.view.panels import draw_panels
 from eitskin.view.pictures import Mark, Panel, found_mark
 
@@ -69,8 +70,6 @@ def film_results(
 ) -> None:
     """Image, true and found touches frame by frame, in the frames' time, or ten a second where they
     have none."""
-    from eitskin.view.film import draw_film, thinned
-
     kept = [list(results)[k] for k in thinned(len(results))]
     panels = [
         Panel(

@@ -8,6 +8,7 @@ import numpy as np
 
 from eitskin.model.model import Model
 from eitskin.scoring.stream_check import ComparedFrame, spread
+from eitskin.view.film import MAX_FRAMES, draw_film
 from eitskin.view.panels import draw_frame, draw_panels
 from eitskin.view.pictures import Mark, Panel, found_mark
 
@@ -86,8 +87,6 @@ def film_stream(
     progress: Callable[..., Iterable[Any]] = lambda items, _: items,
 ) -> None:
     """The album as a film. Raises as ``draw_stream``."""
-    from eitskin.view.film import MAX_FRAMES, draw_film
-
     frames = album.spread(MAX_FRAMES)
     times_s = [seen.frame.time_us / 1e6 for seen in frames]
     draw_film(path, model, [_panel(model, seen) for seen in frames], times_s, progress=progress)

@@ -2,19 +2,17 @@
 what each row explains. Needs matplotlib."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from eitskin.teaching.teach import Taught
 from eitskin.view.panels import check_picture, save_picture
-
-if TYPE_CHECKING:
-    from eitskin.teaching.teach import Taught
 
 GIVEN, FOUND, STRANGE = "#1f5f99", "#b0b7bd", "#c2410c"
 
 
-def draw_taught(path: str | Path, taught: "Taught") -> None:
+def draw_taught(path: str | Path, taught: Taught) -> None:
     """Write the picture to ``path`` (.png, .pdf, .svg)."""
     check_picture(path)
     from matplotlib.backends.backend_agg import FigureCanvasAgg

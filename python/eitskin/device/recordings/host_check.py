@@ -12,10 +12,12 @@ import numpy.typing as npt
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.gestures import Gestures, event_numbers
 from eitskin.core.results import Info, Options, Reconstruction
+from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
 from eitskin.device.live_frames import Item, LiveDrive, LiveFrame, follow
 from eitskin.device.recordings.drives_twin import DrivesTwin
+from eitskin.device.recordings.recording import FileTransport, recorded_kinds, recorded_options
 from eitskin.device.wire.link_table import Quality
 from eitskin.device.wire.packets import BoardInfo, FollowedTouches, RawFrame, Solved
 from eitskin.errors import FrameError
@@ -223,9 +225,6 @@ class HostTwin:
 def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
     """The recording ``path`` compared with this host's core; also whether it notes the solver's
     options (else the model's own are taken)."""
-    from eitskin.device.client import Device
-    from eitskin.device.recordings.recording import FileTransport, recorded_kinds, recorded_options
-
     options = recorded_options(path)
     with Device(FileTransport(path)) as device:
         known = need_model(device.board, model, str(path), "the comparison")

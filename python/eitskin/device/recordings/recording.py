@@ -4,28 +4,27 @@ last, a machine that loses power two seconds. Reading one goes through the live 
 docs/reference/link-protocol.md, "Recordings", specifies the file.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eitskin import __version__
 from eitskin.core.results import Options, check_options
+from eitskin.device.client import Device
+from eitskin.device.known_model import find_model, scanned_protocol
+from eitskin.device.live_frames import follow
 from eitskin.device.recordings.new_file import RecordingFile
+from eitskin.device.recordings.raw_frames import as_frames, gather
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import LINK_VERSION, PacketType, Stream
 from eitskin.device.wire.packets import BoardHashes
 from eitskin.device.wire.payloads import pack
-from eitskin.errors import DeviceError, EitskinError, FileError
+from eitskin.errors import DeviceError, EitskinError, FileError, FrameError
 from eitskin.fileio import parse_json
-
-if TYPE_CHECKING:
-    from eitskin.device.client import Device
-    from eitskin.frames.frames import Frames
+from eitskin.frames.frames import Frames
 
 FORMAT = "eits"
 VERSION = 1
@@ -80,7 +79,7 @@ class Recorder:
             self._file.close()
             raise
 
-    def __enter__(self) -> Recorder:
+    def __enter__(self) -> "Recorder":
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -217,13 +216,6 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
         FileError, DeviceError: it cannot be read, or the model is another.
         FrameError: no raw frames were recorded, or no quiet ones.
     """
-    from eitskin.device.client import Device
-    from eitskin.device.known_model import find_model, scanned_protocol
-    from eitskin.device.live_frames import follow
-    from eitskin.device.recordings.raw_frames import as_frames, gather
-    from eitskin.device.wire.link_table import Stream
-    from eitskin.errors import FrameError
-
     with Device(FileTransport(path)) as device:
         name = str(path)
         known = find_model(device.board, model, name)
