@@ -4,7 +4,7 @@ scenes with a truth."""
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin_reference.constants_table import (
     CONFIDENCE_HALF,
     MAX_MOVE,
     MIN_CONFIDENCE,

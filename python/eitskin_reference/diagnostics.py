@@ -12,7 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
+from eitskin.core.results import Options
+from eitskin.model.model import Model
+from eitskin.model.row_form import RowForm
+from eitskin_reference.constants_table import (
     CROWD_CLEAR,
     CROWD_CLEAREST,
     CROWD_ELECTRODES,
@@ -50,10 +54,6 @@ from eitskin.core.constants_table import (
     STALE_NOISE,
     STALE_RATIO,
 )
-from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
-from eitskin.core.results import Options
-from eitskin.model.model import Model
-from eitskin.model.row_form import RowForm
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.core.results import Options
+from eitskin.model.model import Model
+from eitskin_reference.constants_table import (
     DAMPING,
     DROP_SWEEPS,
     GAIN_LIFT,
@@ -19,8 +21,6 @@ from eitskin.core.constants_table import (
     STEP_TRIALS,
     STRENGTH_PASSES,
 )
-from eitskin.core.results import Options
-from eitskin.model.model import Model
 
 FloatArray = npt.NDArray[np.float64]
 

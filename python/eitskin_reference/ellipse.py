@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin_reference.constants_table import (
     ELLIPSE_EVIDENCE,
     ELLIPSE_EXPECTED,
     ELLIPSE_HALF,

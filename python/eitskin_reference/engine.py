@@ -12,13 +12,13 @@ from time import perf_counter_ns
 
 import numpy as np
 
-from eitskin.core.constants_table import ERROR_MIN_NOISE, ERROR_SHARE, MIN_SQUARE
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import INTERACTION
 from eitskin.core.results import Info, LearnedReference, Options, Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.model.storage import stride_for
+from eitskin_reference.constants_table import ERROR_MIN_NOISE, ERROR_SHARE, MIN_SQUARE
 from eitskin_reference.disc_fit import Disc, Reduced
 from eitskin_reference.evidence import DataErrors
 from eitskin_reference.exact import ActiveSet, coordinate

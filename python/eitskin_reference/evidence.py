@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin_reference.constants_table import (
     CLEAR,
     CLEAR_AS_DISCS,
     CLEAR_OF_FEW,

@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.core.results import Options
+from eitskin.fem.grid import Grid
+from eitskin_reference.constants_table import (
     EPSILON,
     INDEPENDENT,
     LOOK_GROWTH,
@@ -22,8 +24,6 @@ from eitskin.core.constants_table import (
     TOLERANCE_EPSILONS,
     WORTHWHILE,
 )
-from eitskin.core.results import Options
-from eitskin.fem.grid import Grid
 from eitskin_reference.problem import FloatArray, Problem, SolveResult, shrink
 
 IntArray = npt.NDArray[np.int64]

@@ -3,14 +3,14 @@ column or on a working set."""
 
 import numpy as np
 
-from eitskin.core.constants_table import (
+from eitskin.core.results import Options
+from eitskin_reference.constants_table import (
     LOOK_GROWTH,
     MAX_RISE,
     MAX_STEP_HALVINGS,
     PRUNE_EVERY,
     ZERO_GAP,
 )
-from eitskin.core.results import Options
 from eitskin_reference.problem import (
     Certificate,
     FloatArray,

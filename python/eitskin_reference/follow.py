@@ -4,7 +4,7 @@ eits_check_drift do, for tests and studies."""
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin_reference.constants_table import (
     DRIFT_CLEAR,
     DRIFT_UNEXPLAINED,
     FOLLOW_GAIN,

@@ -6,15 +6,6 @@ it.
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
-    FAR_REGULARISATION,
-    FOLD_ROUNDING,
-    MAX_OF_NOISE,
-    MAX_RATIO,
-    MIN_REFERENCE_FRAMES,
-    NOISE_ROUNDING,
-    RATIO_DEFINED,
-)
 from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.diagnostics_table import DIAGNOSTICS
 from eitskin.core.options_table import LOG_DATA
@@ -26,6 +17,15 @@ from eitskin.core.results import (
 from eitskin.errors import FrameError
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
+from eitskin_reference.constants_table import (
+    FAR_REGULARISATION,
+    FOLD_ROUNDING,
+    MAX_OF_NOISE,
+    MAX_RATIO,
+    MIN_REFERENCE_FRAMES,
+    NOISE_ROUNDING,
+    RATIO_DEFINED,
+)
 from eitskin_reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
 from eitskin_reference.problem import (
     FloatArray,

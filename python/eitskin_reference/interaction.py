@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import NO_DIPOLE_MM2
 from eitskin.model.model import Model
+from eitskin_reference.constants_table import NO_DIPOLE_MM2
 from eitskin_reference.disc_fit import Disc
 
 FloatArray = npt.NDArray[np.float64]

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin_reference.constants_table import (
     PAIR_BOTH,
     PAIR_BULGE,
     PAIR_DIPOLE,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import BASIS_TOLERANCE, MAX_RISE
+from eitskin_reference.constants_table import BASIS_TOLERANCE, MAX_RISE
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -4,7 +4,8 @@ written for reading."""
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.skin.protocol import Reciprocity
+from eitskin_reference.constants_table import (
     CHANGED_AS_MUCH,
     OUTLIER_MAX,
     OWN_MIN,
@@ -13,7 +14,6 @@ from eitskin.core.constants_table import (
     UNPAIRED,
     UNPAIRED_MIN,
 )
-from eitskin.skin.protocol import Reciprocity
 from eitskin_reference.diagnostics import robust
 
 FloatArray = npt.NDArray[np.float64]

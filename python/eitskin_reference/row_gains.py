@@ -4,8 +4,8 @@ model's own, row by row."""
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import MAX_DISTANCE, MAX_RECIPROCITY, MAX_ROW_GAIN
 from eitskin.model.model import Model
+from eitskin_reference.constants_table import MAX_DISTANCE, MAX_RECIPROCITY, MAX_ROW_GAIN
 
 FloatArray = npt.NDArray[np.float64]
 

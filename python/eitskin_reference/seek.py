@@ -4,7 +4,8 @@ written for reading."""
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.core.options_table import SIGNS
+from eitskin_reference.constants_table import (
     CENTRE_SHARE,
     CENTRE_SPREAD,
     SEEK_EXCHANGED,
@@ -12,7 +13,6 @@ from eitskin.core.constants_table import (
     SEEK_ROUNDS,
     SEEK_SWEEPS,
 )
-from eitskin.core.options_table import SIGNS
 from eitskin_reference.disc_fit import Disc, Fit
 
 FloatArray = npt.NDArray[np.float64]

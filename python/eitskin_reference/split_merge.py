@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from eitskin.core.constants_table import (
+from eitskin.core.results import Options
+from eitskin_reference.constants_table import (
     DIRECTIONS_OF_NOISE,
     FIT_MOVES,
     MERGE_LEFT,
@@ -25,7 +26,6 @@ from eitskin.core.constants_table import (
     SPLIT_SWEEPS,
     SPLIT_TOTAL,
 )
-from eitskin.core.results import Options
 from eitskin_reference.disc_fit import Disc, Fit
 
 

@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.options_table import SPLIT_MERGE
+from eitskin.core.results import Options
+from eitskin.fem.grid import Grid
+from eitskin.model.model import Model
+from eitskin_reference.confidence import miscounted, places_by_fit, rated
+from eitskin_reference.constants_table import (
     CENTRE_SURE,
     EARLY_RADIUS,
     FINAL_RADIUS,
@@ -15,12 +21,6 @@ from eitskin.core.constants_table import (
     LATER_SWEEPS,
     ROUNDS,
 )
-from eitskin.core.diagnostics_table import Touch
-from eitskin.core.options_table import SPLIT_MERGE
-from eitskin.core.results import Options
-from eitskin.fem.grid import Grid
-from eitskin.model.model import Model
-from eitskin_reference.confidence import miscounted, places_by_fit, rated
 from eitskin_reference.disc_fit import Disc, Fit, Reduced
 from eitskin_reference.evidence import DataErrors, keep_likely
 from eitskin_reference.seek import centre, seek

@@ -9,7 +9,11 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.options_table import MAX_TOUCHES
+from eitskin.core.results import Options
+from eitskin.fem.grid import Grid
+from eitskin_reference.constants_table import (
     FIRST_SPEED,
     KNOWN_FRAMES,
     MIN_DEVIATION,
@@ -18,10 +22,6 @@ from eitskin.core.constants_table import (
     SURE_FRACTION,
     TENTATIVE_REACH,
 )
-from eitskin.core.diagnostics_table import Touch
-from eitskin.core.options_table import MAX_TOUCHES
-from eitskin.core.results import Options
-from eitskin.fem.grid import Grid
 
 FloatArray = npt.NDArray[np.float64]
 Pairing: TypeAlias = Callable[[FloatArray, float], list[tuple[int, int]]]

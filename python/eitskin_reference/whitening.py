@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.constants_table import (
+from eitskin.model.model import Model
+from eitskin_reference.constants_table import (
     LOST,
     LOST_PIVOT,
     MAX_REGULARISATION,
@@ -18,7 +19,6 @@ from eitskin.core.constants_table import (
     REST_POWER,
     STEP_MARGIN,
 )
-from eitskin.model.model import Model
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

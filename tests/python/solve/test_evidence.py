@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from eitskin.core.constants_table import CENTRE_SURE
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Reconstruction
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
+from eitskin_reference.constants_table import CENTRE_SURE
 from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
 from small_models import prebuilt
 
