@@ -367,6 +367,14 @@ def test_help_imports_nothing_heavy():
     assert run_python(code).stdout.strip() == "[]"
 
 
+def test_only_the_named_command_is_imported():
+    code = (
+        "import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser('tare')\nprint([name"
+        " for name in sys.modules if '.cmd_' in name])"
+    )
+    assert run_python(code).stdout.strip() == "['eitskin.cli.cmd_tare']"
+
+
 def test_frames_of_a_recording_give_the_boards_touches(done, scene, tmp_path):
     run, exported = tmp_path / "run.eits", tmp_path / "run.npz"
     done("record", "--device", f"sim:{scene}", "-o", run)

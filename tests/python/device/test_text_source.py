@@ -368,7 +368,7 @@ def test_the_example_of_a_source_is_one(monkeypatch):
         ("[channels]\ntable = [[0, 1, 2, 3]]\n", "have not all rows of the model's protocol"),
         ('[protocol]\nkind = "opposite"\n', "'electrodes' is required"),
         ("[port]\nrate_hz = 0\n", "out of range"),
-        ("lines = 3\n", r"lines must be a table, \[lines\]"),
+        ("lines = 3\n", r"lines must be a table: write \[lines\]"),
     ],
 )
 def test_a_layout_that_does_not_fit_is_one_line(tmp_path, content, said):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from scene_helpers import effect_module
 
-from eitskin.config import from_table, parameter
+from eitskin.config import from_table, number, parameter
 from eitskin.errors import ConfigError
 from eitskin.scene.effect_table import describe_parameters
 from eitskin.scene.registry import BUILT_IN, ENTRY_POINT_GROUP, Registry
@@ -68,6 +68,11 @@ def test_tables_become_parameters():
 def test_impossible_parameters_name_file_table_and_key(table, said):
     with pytest.raises(ConfigError, match=said):
         from_table(Every, table, "f [effects.x]")
+
+
+def test_an_infinite_number_is_refused_where_a_range_has_no_end():
+    with pytest.raises(ConfigError, match="x = inf is out of range; it must be finite"):
+        number({"x": float("inf")}, "x", None, "f")
 
 
 def test_parameters_describe_themselves():
