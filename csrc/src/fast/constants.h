@@ -76,7 +76,7 @@
  * taken for them; smaller: a lift looks like a new touch */
 #define EITS_FAST_CHANGE R(1.0)
 
-/* change of place with it [mm]. as FAST_CHANGE */
+/* change of place with it, where nothing waits [mm]. as FAST_CHANGE */
 #define EITS_FAST_CHANGE_MM R(3.0)
 
 /* of what a drive says of the gain's drift that is believed. larger: drift follows noise; smaller:
@@ -103,6 +103,10 @@
 
 /* that wait to be explained [drives]. larger: memory and work; smaller: misses touches at 40 dB */
 #define EITS_FAST_HELD 9
+
+/* chi^2 above which the first drive that waits is left out: a touch may have landed within it.
+ * larger: sudden presses are placed by halves of drives; smaller: slow ones come later */
+#define EITS_FAST_SUDDEN R(400.0)
 
 /* after which a wait begins again [drives]. larger: the map keeps what has passed; smaller: slow
  * touches begin again */
@@ -157,7 +161,11 @@
 
 /* rms of what it may leave beside noise [of the signal]. larger: two touches are born as one
  * between them; smaller: none that the model does not fit */
-#define EITS_FAST_BIRTH_ERROR R(0.08)
+#define EITS_FAST_BIRTH_ERROR R(0.05)
+
+/* of that noise, above its mean [deviations]. as FAST_BIRTH_ERROR; larger: a second touch is looked
+ * for late, smaller: in vain */
+#define EITS_FAST_LEFT_SD R(2.0)
 
 /* greatest deviation of its place [mm]. larger: wrong first places; smaller: late */
 #define EITS_FAST_SPREAD_MM R(1.8)

@@ -50,8 +50,9 @@ typedef struct fast_share {
 typedef struct fast_held {
     eits_real *white, *factor;
     uint16_t drive, rows;
-    uint32_t used;       /* a bit for each row in use */
-    uint8_t news, alone; /* alone: no touch was known */
+    uint32_t used;  /* a bit for each row in use */
+    uint8_t alone;  /* no touch was known */
+    uint8_t sudden; /* much is unexplained: if it waits first, a touch may have landed within it */
     uint8_t said;
     fast_share share[EITS_FAST_STARTS];
 } fast_held;

@@ -41,8 +41,12 @@ void eits_fast_loosen(eits_fast *fast, eits_real strength, eits_real place_mm)
 {
     for (uint32_t k = 0; k < fast->count; ++k) {
         const uint32_t at = FAST_SIZE * k;
-        fast->p[at][at] += fast_square(place_mm);
-        fast->p[at + 1][at + 1] += fast_square(place_mm);
+        /* While drives wait, a touch that is on may lift but not move: it would go to meet the one
+         * that lands. */
+        const int stays = fast->known[k].on && fast->held_count > 0;
+        const eits_real place = stays ? 0 : fast_square(place_mm);
+        fast->p[at][at] += place;
+        fast->p[at + 1][at + 1] += place;
         fast->p[at + FAST_C][at + FAST_C] += fast_square(strength * fast->known[k].peak);
     }
 }

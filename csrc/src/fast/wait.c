@@ -26,13 +26,13 @@ void eits_fast_wait(eits_fast *fast, uint32_t drive, uint32_t rows, int news)
     held->used = 0;
     for (uint32_t i = 0; i < count; ++i)
         held->used |= (uint32_t)fast->used[i] << i;
-    held->news = news != 0;
+    held->sudden = fast_dot(fast->white, fast->white, count) > EITS_FAST_SUDDEN;
     held->alone = fast->count == 0;
     held->said = 0;
     eits_copy(held->white, fast->white, count);
     eits_copy(held->factor, fast->factor, (size_t)count * (count + 1) / 2);
-    /* but the first: a touch landed while it was measured; nor where the drive's work is another */
-    if (!begins && fast->stage != FAST_TWO)
+    /* nor where the drive's work is another */
+    if (!(begins && held->sudden) && fast->stage != FAST_TWO)
         eits_fast_map(fast, held);
     fast->quiet = news ? 0 : fast->quiet + 1;
 }
@@ -46,16 +46,30 @@ static void drop(eits_fast *fast, uint32_t n)
     fast->held[n] = dropped;
 }
 
-/* What is left of chi^2 for each degree of freedom, at least 1. A model that is wrong by more than
- * the noise leaves more; all that is believed is then asked for in that proportion. */
-static eits_real excess(const eits_fast *fast, const fast_fit *fit, uint32_t from)
+/* Rows less what has been fitted to them, at least 1. */
+static eits_real freedom(const eits_fast *fast, const fast_fit *fit, uint32_t from)
 {
     const uint32_t drives = fast->held_count - from, spent = fit->count * (drives + 2);
     uint32_t rows = 0;
     for (uint32_t n = from; n < fast->held_count; ++n)
         rows += fast->held[n].rows;
-    const eits_real each = fit->left_all / (rows > spent ? (eits_real)(rows - spent) : R(1));
+    return rows > spent ? (eits_real)(rows - spent) : R(1);
+}
+
+/* What is left of chi^2 for each degree of freedom, at least 1. A model that is wrong by more than
+ * the noise leaves more; all that is believed is then asked for in that proportion. */
+static eits_real excess(const eits_fast *fast, const fast_fit *fit, uint32_t from)
+{
+    const eits_real each = fit->left_all / freedom(fast, fit, from);
     return each > 1 ? each : 1;
+}
+
+/* What noise alone leaves of chi^2, and hardly more: its mean is its freedom, its variance twice
+ * that. */
+static eits_real noise(const eits_fast *fast, const fast_fit *fit, uint32_t from)
+{
+    const eits_real free = freedom(fast, fit, from);
+    return free + EITS_FAST_LEFT_SD * eits_sqrt(2 * free);
 }
 
 /* Apart from each other and from touches; one that is off gives way. */
@@ -76,19 +90,19 @@ static int is_believed(const eits_fast *fast, const fast_fit *fit, uint32_t from
 {
     if (!eits_fast_invert((const eits_real(*)[4])fit->h, 2 * fit->count, inverse))
         return 0;
-    const eits_real kappa = excess(fast, fit, from), drives = (eits_real)(fast->held_count - from);
+    const eits_real kappa = excess(fast, fit, from);
     for (uint32_t i = 0; i < fit->count; ++i) {
         const eits_real spread = inverse[2 * i][2 * i] + inverse[2 * i + 1][2 * i + 1];
         if (!(fit->own[i] > EITS_FAST_BIRTH * kappa) ||
             !(kappa * spread < fast_square(EITS_FAST_SPREAD_MM)))
             return 0;
     }
-    /* 12 rows a drive leave 12 in the mean with a variance of 24; four deviations more are hardly
-     * luck. Beside that, a part of what is explained is left by a touch that is no disc. */
-    const eits_real noise = 12 * drives + 4 * eits_sqrt(24 * drives);
+    /* Beside noise, a part of what is explained is left by a touch that is no disc; two touches
+     * that are explained by one between them leave more. */
+    const eits_real most = noise(fast, fit, from) + fast_square(EITS_FAST_BIRTH_ERROR) * fit->score;
     const eits_real clear = EITS_FAST_AMBIGUOUS * fit->own[fit->count - 1];
-    return fit->left_all < noise + fast_square(EITS_FAST_BIRTH_ERROR) * fit->score &&
-           lead > (clear > EITS_FAST_BIRTH ? clear : EITS_FAST_BIRTH) && is_apart(fast, fit);
+    return fit->left_all < most && lead > (clear > EITS_FAST_BIRTH ? clear : EITS_FAST_BIRTH) &&
+           is_apart(fast, fit);
 }
 
 /* Touches where one is born, all of which are off: it is another press. */
@@ -128,21 +142,19 @@ static void give_birth(eits_fast *fast, const fast_fit *fit, uint32_t from,
     fast->held_count = 0;
 }
 
-/* `fit` is born where it is believed: without the first drive that waits, or with it. */
+/* `fit` is born where it is believed: with the first drive that waits or without it, first as it
+ * was searched for. */
 static int try(eits_fast *fast, const fast_fit *fit, uint32_t from, eits_real lead)
 {
     eits_real inverse[4][4];
     int believed = is_believed(fast, fit, from, lead, inverse);
-    /* The first drive that waits may have been measured while the touch landed and then says less
-     * than it could; but for a touch that came between two drives it is worth as much as the
-     * others, so it is asked second. */
     if (!believed && fit->count == 1) {
-        fast_fit *whole = &fast->trial;
-        *whole = *fit;
-        fit = whole;
-        from = 0;
-        believed = eits_fast_fit_at(fast, from, ~1u, whole) &&
-                   is_believed(fast, whole, from, lead, inverse);
+        fast_fit *other = &fast->trial;
+        *other = *fit;
+        fit = other;
+        from = 1 - from;
+        believed = eits_fast_fit_at(fast, from, from == 0 ? ~1u : ~0u, other) &&
+                   is_believed(fast, other, from, lead, inverse);
     }
     if (believed)
         give_birth(fast, fit, from, (const eits_real(*)[4])inverse);
@@ -150,12 +162,12 @@ static int try(eits_fast *fast, const fast_fit *fit, uint32_t from, eits_real le
 }
 
 /* A drive that spoils the fit alone, not the newest, waits no more; 1 where there was one. */
-static int drop_spoiled(eits_fast *fast, const fast_fit *fit)
+static int drop_spoiled(eits_fast *fast, const fast_fit *fit, uint32_t from)
 {
-    uint32_t worst = 1;
+    uint32_t worst = from;
     /* The newest is kept: it may be the first that a second touch has changed, and the next drives
      * will say. */
-    for (uint32_t n = 2; n < fast->held_count; ++n)
+    for (uint32_t n = from + 1; n < fast->held_count; ++n)
         worst = fit->share[n].left > fit->share[worst].left ? n : worst;
     const eits_real left = fit->share[worst].left;
     if (!(left > EITS_FAST_NEWS && left > fit->left_all / 2) || worst + 1 >= fast->held_count)
@@ -166,15 +178,20 @@ static int drop_spoiled(eits_fast *fast, const fast_fit *fit)
 
 static int find_one(eits_fast *fast)
 {
+    /* The first drive that waits may have been measured while a touch landed, and then tells of a
+     * wrong place. What comes slowly changes it little, and it is worth as much as the others. */
+    const uint32_t from = fast->held[0].sudden;
     eits_real lead;
-    const fast_fit *fit = eits_fast_find(fast, 1, NULL, &lead);
+    const fast_fit *fit = eits_fast_find(fast, from, NULL, &lead);
     fast->stage = FAST_ONE;
     if (fit == NULL)
         return 0;
-    if (try(fast, fit, 1, lead))
+    if (try(fast, fit, from, lead))
         return 1;
     eits_copy(fast->first, fit->place[0], 2);
-    if (!drop_spoiled(fast, fit) && fast->held_count > 2)
+    /* The search for a second touch takes two drives, in which the first could have been born. */
+    const int more = fit->left_all > noise(fast, fit, from);
+    if (!drop_spoiled(fast, fit, from) && fast->held_count > 2 && more)
         fast->stage = FAST_BESIDE;
     return 0;
 }

@@ -22,6 +22,7 @@ from eitskin_reference.constants_table import (
     FAST_SINGULAR,
     FAST_STARTS,
     FAST_STEPS,
+    FAST_SUDDEN,
 )
 from eitskin_reference.fast.rows import Drive, RowModel
 from eitskin_reference.fast.tracks import (
@@ -51,6 +52,11 @@ class Held:
     def rows(self) -> int:
         """How many are in use."""
         return int(self.use.sum())
+
+    @property
+    def sudden(self) -> bool:
+        """Much is unexplained: if it waits first, a touch may have landed within it."""
+        return dot(self.white, self.white) > FAST_SUDDEN
 
 
 @dataclass(frozen=True, eq=False)

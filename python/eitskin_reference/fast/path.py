@@ -39,6 +39,7 @@ from eitskin_reference.constants_table import (
     FAST_GLITCH,
     FAST_GONE,
     FAST_HELD,
+    FAST_LEFT_SD,
     FAST_LOST_FRAMES,
     FAST_MAX_DRIFT,
     FAST_MAX_TOUCHES,
@@ -203,10 +204,12 @@ class FastPath:
                 return True
         else:
             self._glitched = False
+        # while drives wait, what is on stays: it would go to meet the one that lands
+        moves = np.array([not (known.on and self._held) for known in self._known])
         for strength, place_mm in ((FAST_STRENGTH_JUMP, 0.0), (FAST_CHANGE, FAST_CHANGE_MM)):
             if seen.chi2 < FAST_NEWS or not len(tracks):
                 break
-            kept, tracks.p = tracks.p, tracks.loosened(strength, place_mm)
+            kept, tracks.p = tracks.p, tracks.loosened(strength, place_mm * moves)
             seen = tracks.innovation(z, used, self._sigma, answers)
             if seen.chi2 >= FAST_NEWS:
                 tracks.p = kept
@@ -273,11 +276,12 @@ class FastPath:
     def _wait(self, one: Held) -> None:
         """A drive is held until it is accounted for, as long as there is room."""
         self._waited += 1
-        if not self._held or self._waited > FAST_MAX_WAIT:
+        begins = not self._held or self._waited > FAST_MAX_WAIT
+        if begins:
             self._births.begin()
             self._held, self._waited, self._first, self._beside = [], 0, None, False
-        elif not self._beside:
-            self._births.add(one)  # but the first: a touch landed while it was measured
+        if not (begins and one.sudden) and not self._beside:
+            self._births.add(one)
         self._held = [*self._held, one][-FAST_HELD:]
         self._quiet = 0 if one.news else self._quiet + 1
 
@@ -295,24 +299,30 @@ class FastPath:
             first, self._first, self._beside = self._first, None, False
             return self._try(self._births.two(held, first), held[-FAST_PAIR_HELD:])
         self._first, self._beside = None, False
+        begin = int(self._held[0].sudden)
+        held = self._held[begin:]
         fits = self._births.one(held)
         if self._try(fits, held):
             return True
         if fits:
-            self._first = fits[0].places if len(held) > 1 else None
-            spoiled, left = int(np.argmax(fits[0].left)), fits[0].left
+            left = fits[0].left
+            more = float(summed(left)) > _noise(fits[0], held)
+            self._first = fits[0].places if more and len(self._held) > 2 else None
+            spoiled = int(np.argmax(left))
             if left[spoiled] > max(FAST_NEWS, float(summed(left)) / 2) and spoiled < len(held) - 1:
-                del self._held[1 + spoiled]
+                del self._held[begin + spoiled]
                 self._first = None
         return False
 
     def _try(self, fits: Sequence[Fit], held: list[Held]) -> bool:
-        """The best of ``fits`` is born where it is believed, with the first drive or without."""
+        """The best of ``fits`` is born where it is believed, with the first drive or without, first
+        as it was searched for."""
         if not fits:
             return False
         others = [fit.score for fit in fits[1:] if apart(fit.places[-1:], fits[0].places[-1]).all()]
         lead = fits[0].score - max([0.0, *others])
-        for drives in (held, self._held) if len(fits[0].places) == 1 else (held,):
+        other = self._held[1:] if len(held) == len(self._held) else self._held
+        for drives in (held, other) if len(fits[0].places) == 1 else (held,):
             fit = fits[0] if drives is held else self._births.fit(drives, fits[0].places)
             if fit is not None and self._believed(fit, lead, drives):
                 self._give_birth(fit, drives)
@@ -321,8 +331,7 @@ class FastPath:
         return False
 
     def _believed(self, best: Fit, lead: float, held: Sequence[Held]) -> bool:
-        j, k = len(held), len(best.places)
-        inverse = inverted(best.h)
+        k, inverse = len(best.places), inverted(best.h)
         if inverse is None:
             return False
         left, kappa = float(summed(best.left)), _excess(best, held)
@@ -330,8 +339,7 @@ class FastPath:
         spread = max(float(np.trace(inverse[i : i + 2, i : i + 2])) for i in range(0, 2 * k, 2))
         return bool(
             (best.own > FAST_BIRTH * kappa).all()
-            and left
-            < 12 * j + 4 * np.sqrt(24 * j) + FAST_BIRTH_ERROR * FAST_BIRTH_ERROR * best.score
+            and left < _noise(best, held) + FAST_BIRTH_ERROR * FAST_BIRTH_ERROR * best.score
             and kappa * spread < FAST_SPREAD_MM * FAST_SPREAD_MM
             and lead > max(FAST_BIRTH, FAST_AMBIGUOUS * best.own[-1])
             and all(
@@ -486,8 +494,17 @@ class FastPath:
             self._next_id += 1
 
 
+def _freedom(fit: Fit, held: Sequence[Held]) -> int:
+    """Rows less what has been fitted to them, at least 1."""
+    return max(1, sum(one.rows for one in held) - len(fit.places) * (len(held) + 2))
+
+
 def _excess(fit: Fit, held: Sequence[Held]) -> float:
     """What is left of chi^2 for each degree of freedom, at least 1."""
-    k = len(fit.places)
-    freedom = sum(one.rows for one in held) - k * (len(held) + 2)
-    return max(1.0, float(summed(fit.left)) / max(1, freedom))
+    return max(1.0, float(summed(fit.left)) / _freedom(fit, held))
+
+
+def _noise(fit: Fit, held: Sequence[Held]) -> float:
+    """What noise alone leaves of chi^2, and hardly more."""
+    free = _freedom(fit, held)
+    return free + FAST_LEFT_SD * float(np.sqrt(2 * free))

@@ -100,13 +100,13 @@ class Tracks:
         for speed in (VX, VY):
             p[at + speed, at + speed] += FAST_SPEED_NOISE**2 * drives
 
-    def loosened(self, strength: float, place_mm: float) -> FloatArray:
+    def loosened(self, strength: float, place_mm: FloatArray) -> FloatArray:
         """The covariance (5 k, 5 k) where each touch may have changed by these at once, the
-        strength as a fraction of its greatest."""
+        strength as a fraction of its greatest, the place by its own of ``place_mm`` (k,)."""
         p = self.p.copy()
         for k in range(len(self)):
             at = np.arange(3) + SIZE * k
-            p[at, at] += np.array([place_mm, place_mm, strength * self.peak[k]]) ** 2
+            p[at, at] += np.array([place_mm[k], place_mm[k], strength * self.peak[k]]) ** 2
         return p
 
     def innovation(

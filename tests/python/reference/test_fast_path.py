@@ -92,9 +92,10 @@ def played(
 
 SCENES: dict[str, tuple[str, Any, float, float]] = {
     "sudden press": ("presses", partial(fast_path._press, rise_s=0.0), 6, 3),
-    "press in 60 ms": ("presses", partial(fast_path._press, rise_s=0.06), 20, 5),
+    "press in 60 ms": ("presses", partial(fast_path._press, rise_s=0.06), 10, 5),
     "two at once": ("pairs", partial(fast_path._pair), 25, 5),
     "one after another": ("pairs", partial(fast_path._pair, later_s=0.03), 8, 4),
+    "and slowly": ("pairs", partial(fast_path._pair, rise_s=0.06, later_s=0.06), 15, 6),
     "swipe": ("swipes", partial(fast_path._swipe, speed_mm_per_s=600.0), 6, 4),
     "glitches": ("presses", partial(fast_path._fault, spoil=fast_path._glitches), 40, 5),
     "open electrode": ("presses", partial(fast_path._fault, spoil=fast_path._open), 100, 10),
