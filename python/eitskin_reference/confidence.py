@@ -12,6 +12,7 @@ from eitskin_reference.constants_table import (
     PAIR_ODDS,
     PLACE_DISTANCE,
     PLACE_FACTOR,
+    PLACE_GEOMETRY,
     PLACE_MIN,
 )
 from eitskin_reference.disc_fit import Fit
@@ -22,11 +23,17 @@ FloatArray = npt.NDArray[np.float64]
 PLACE_PARAMETERS = 4  # of a disc: strength, place, radius
 
 
-def rated(tested: Tested, distance: float, pixel_mm: float) -> tuple[FloatArray, FloatArray]:
+def rated(
+    tested: Tested, distance: float, moved_mm2: float | None, pixel_mm: float
+) -> tuple[FloatArray, FloatArray]:
     """For each disc the probability that it is a touch (k,), and the covariance of its place as
-    wide as places err: xx, xy, yy (k, 3), mm^2; ``distance`` of the reference from the model's."""
+    wide as places err: xx, xy, yy (k, 3), mm^2; ``distance`` of the reference from the model's,
+    ``moved_mm2`` what that tells of places, None where it does not."""
     x, y = np.clip(tested.apart_mm, -MAX_MOVE * pixel_mm, MAX_MOVE * pixel_mm).T
-    least = pixel_mm**2 * (PLACE_MIN + PLACE_DISTANCE * distance)
+    least = pixel_mm**2 * PLACE_MIN
+    least += pixel_mm**2 * PLACE_DISTANCE * distance if moved_mm2 is None else (
+        PLACE_GEOMETRY * moved_mm2
+    )  # fmt: skip
     place = PLACE_FACTOR * tested.place_mm2 + np.column_stack([x * x + least, x * y, y * y + least])
     return tested.rise / (tested.rise + CONFIDENCE_HALF), place
 

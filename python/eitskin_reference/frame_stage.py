@@ -59,6 +59,7 @@ class FrameStage:
         self._drift_v0: FloatArray | None = None
         self._gain, self._row_gain = 1.0, np.ones(model.protocol.n_rows)
         self._distance, self._far = 0.0, False
+        self._moved_mm2: float | None = None
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._unusable = self._bad
@@ -112,7 +113,10 @@ class FrameStage:
             return
         usable = ~(self._bad | self._without_reference)
         assert self._drift_v0 is not None
-        gains, self._distance, far = row_gains(self.model, usable, self._gain * self._drift_v0)
+        gains, logs, far = row_gains(self.model, usable, self._gain * self._drift_v0)
+        self._distance = float(np.sqrt(np.nanmean(logs**2)))
+        if errors.places is not None:
+            self._moved_mm2 = float(np.sum((errors.places @ np.nan_to_num(logs)) ** 2))
         self._far = far and self.model.data_kind != "normalised"
         if errors.row_gains and self.options.row_gains and self.model.data_kind != "normalised":
             self._row_gain = gains

@@ -114,7 +114,7 @@ def find_touches(
         if errors is not None:
             tested = keep_likely(fit, errors)
         if tested is not None and errors is not None:
-            sure, places = rated(tested, errors.distance, model.grid.pixel_mm)
+            sure, places = rated(tested, errors.distance, errors.moved_mm2, model.grid.pixel_mm)
             if errors.kept and len(sure) == 1 and sure[0] < CENTRE_SURE:
                 moved = centre(fit, frame.y)
                 if moved is not None:

@@ -61,6 +61,29 @@ TEST(places_get_factor_floor_distance_and_what_the_test_would_move)
     ctx->reference.distance = 0;
 }
 
+/* What the reference tells of electrodes and outline stands in the distance's place, but where it
+ * is the instrument that is far from the model. */
+TEST(places_widen_by_what_the_reference_tells)
+{
+    static const float some = 0;
+    eits_model told = *ctx->model;
+    const eits_model *before = ctx->model;
+    told.uncertainty.places = &some;
+    ctx->model = &told;
+    ctx->reference.distance = R(0.25);
+    ctx->reference.place_mm2 = 2;
+    const double pixel = (double)told.pixel_mm, floor = pixel * pixel * (double)EITS_PLACE_MIN,
+                 own = (double)EITS_PLACE_FACTOR * (double)PLACE[0] + floor;
+    CHECK_NEAR(rated(100, 1, PLACE, 0, 0).place_mm2[0][0], own + 2 * (double)EITS_PLACE_GEOMETRY,
+               1e-5);
+    ctx->reference.far = 1;
+    CHECK_NEAR(rated(100, 1, PLACE, 0, 0).place_mm2[0][0],
+               own + pixel * pixel * (double)EITS_PLACE_DISTANCE * 0.25, 1e-5);
+    ctx->reference.far = 0;
+    ctx->reference.distance = ctx->reference.place_mm2 = 0;
+    ctx->model = before;
+}
+
 TEST(what_is_not_known_is_zero)
 {
     const eits_fit not_tested = rated(100, 0, PLACE, 0, 0);

@@ -87,8 +87,28 @@ static void what_is_no_second_moment_is_refused(void)
     CHECK_EQUAL(opened(PLAIN, bytes, SIZE), EITS_E_MODEL_VALUE);
 }
 
+/* Section GEOM: so many numbers a fold, of a model with UNCE. */
+static void what_the_reference_tells_of_places_is_read_or_refused(void)
+{
+    enum { FOLD = 4 * SMALL_FOLDED, LARGEST = FOLD * (EITS_MAX_PLACE_ROWS + 1) };
+    static uint8_t bytes[LARGEST];
+    const eits_status of_size[][2] = {{0, EITS_E_MODEL_SECTION},
+                                      {FOLD - 4, EITS_E_MODEL_SECTION},
+                                      {LARGEST, EITS_E_MODEL_SECTION},
+                                      {2 * FOLD, EITS_E_MODEL_VALUE}}; /* without UNCE */
+    small_model bare = small_model_make(WHITENED);
+    for (size_t k = 0; k < sizeof of_size / sizeof of_size[0]; ++k) {
+        small_model made = small_model_with_section(&bare, "GEOM", bytes, (uint32_t)of_size[k][0]);
+        eits_model model;
+        CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), of_size[k][1]);
+        small_model_free(&made);
+    }
+    small_model_free(&bare);
+}
+
 int main(void)
 {
+    what_the_reference_tells_of_places_is_read_or_refused();
     it_is_read_in_place();
     what_is_no_second_moment_is_refused();
     return checks_report("uncertainty");

@@ -41,6 +41,9 @@ typedef struct eits_reference {
     /* how far v0 is from the model: rms over folds of log(gain v0 / v_ref); and, over its own rms,
      * what rows differ by from their reciprocals */
     eits_real distance, reciprocity;
+    /* what the variance of a place grows by for what v0 tells of electrodes and outline, mm^2; 0
+     * where the model does not say */
+    eits_real place_mm2;
     uint32_t row_gains; /* 1: in force */
     uint32_t far;       /* 1: it is the instrument that is far from the model, not the skin */
     eits_real correlation;

@@ -6,8 +6,9 @@
  *
  * A disc is a touch with probability rise / (rise + HALF), a logistic function of the logarithm of
  * its rise. A place is off by what the data leave open (the covariance, as far as it was found
- * true), by what the test would move it, and by what the skin is unlike its model, for which the
- * reference's distance from the model's stands.
+ * true), by what the test would move it, and by what the skin is unlike its model: what the
+ * reference tells of electrodes and outline, or, where the model cannot say or it is the instrument
+ * that is unlike it, the reference's distance from the model's.
  *
  * A taught model has no such test. There the fit's normal equations say how far a place is known,
  * with the strengths of all discs free and what is left of the data for their noise, and the model
@@ -26,12 +27,20 @@ static int is_known(const eits_real *place_mm2, const eits_real *apart_mm)
            place_mm2[2] > 0;
 }
 
+/* What no disc's own data tell of its place, mm^2. */
+static eits_real variance_of_all(const eits_context *ctx)
+{
+    const eits_reference *b = &ctx->reference;
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+    if (ctx->model->uncertainty.places == NULL || b->far)
+        return pixel * pixel * eits_fma(EITS_PLACE_DISTANCE, b->distance, EITS_PLACE_MIN);
+    return eits_fma(EITS_PLACE_GEOMETRY, b->place_mm2, pixel * pixel * EITS_PLACE_MIN);
+}
+
 void eits_rate_touches(const eits_context *ctx, eits_fit *f)
 {
-    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
-                    least = pixel * pixel *
-                            eits_fma(EITS_PLACE_DISTANCE, ctx->reference.distance, EITS_PLACE_MIN),
-                    reach = EITS_MAX_MOVE * pixel;
+    const eits_real least = variance_of_all(ctx),
+                    reach = EITS_MAX_MOVE * (eits_real)ctx->model->pixel_mm;
     for (uint32_t k = 0; k < f->count; ++k) {
         eits_real *place = f->place_mm2[k];
         if (!f->tested || !is_known(place, f->apart_mm[k])) {

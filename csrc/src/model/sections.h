@@ -46,6 +46,11 @@ eits_status eits_read_row_form(eits_model *model, const eits_section *found);
  * variance below 0, or a model that does not say how it was whitened). */
 eits_status eits_read_uncertainty(eits_model *model, const eits_section *found);
 
+/* Section GEOM, where there is one, into model->uncertainty; that and model->n_folded are known.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are out of range, or
+ * a model without UNCE). */
+eits_status eits_read_places(eits_model *model, const eits_section *found);
+
 /* Section PREC, where there is one, into model->precision; row_form is known.
  * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are not finite, a
  * variance below 0, or a model that says how it was whitened besides). */

@@ -44,6 +44,27 @@ eits_status eits_read_place_factor(eits_model *model, const eits_section *sectio
     return eits_between(model->place_factor, 0, 1e30f) ? EITS_OK : EITS_E_MODEL_VALUE;
 }
 
+/* Section GEOM: so many numbers for each fold, small enough that sums of squares are numbers. */
+eits_status eits_read_places(eits_model *model, const eits_section *section)
+{
+    const float *values = (const float *)(const void *)section->data;
+    const uint32_t row_size = 4u * model->n_folded;
+    if (values == NULL)
+        return EITS_OK;
+    if (section->size == 0 || section->size % row_size != 0 ||
+        section->size / row_size > EITS_MAX_PLACE_ROWS)
+        return EITS_E_MODEL_SECTION;
+    for (uint32_t i = 0; i < section->size / 4u; ++i) {
+        if (!eits_between(values[i], -1e6f, 1e6f))
+            return EITS_E_MODEL_VALUE;
+    }
+    if (model->uncertainty.errors == NULL)
+        return EITS_E_MODEL_VALUE;
+    model->uncertainty.places = values;
+    model->uncertainty.place_rows = section->size / row_size;
+    return EITS_OK;
+}
+
 eits_status eits_read_uncertainty(eits_model *model, const eits_section *section)
 {
     const size_t numbers = (size_t)model->rank * (model->rank + 1u) / 2u;

@@ -22,9 +22,16 @@ from eitskin.arrays import FloatArray
 from eitskin.errors import ModelError
 from eitskin.model.model_errors import ModelErrors
 from eitskin.model.random_skins import RandomSkins, Request
+from eitskin.model.tare_places import tare_places
 
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
+METHODS: dict[str, Callable[..., Any]] = {
+    "sample": RandomSkins.sample,
+    "error": RandomSkins.error,
+    "drift": RandomSkins.drift,
+    "places": tare_places,
+}
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -51,7 +58,7 @@ def draw_model_errors(
             for _ in range(count):
                 processes.append(_Process(request))
                 idle.put(processes[-1])
-            drift = pool.submit(ask, "drift")
+            drift, places = (pool.submit(ask, name) for name in ("drift", "places"))
             drawn: Iterable[FloatArray] = pool.map(
                 lambda number: ask("sample", number), range(samples)
             )
@@ -63,6 +70,7 @@ def draw_model_errors(
                 rms_error=float(np.float32(rms_error)),
                 rms_shape_error=float(np.float32(rms_shape_error)),
                 row_gains=request.uncertainty.row_gains,
+                places=places.result(),
             )
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -86,7 +94,7 @@ class _Process:
         self._send(request)
 
     def ask(self, name: str, *arguments: Any) -> Any:
-        """What the method ``name`` says to ``arguments``."""
+        """What METHODS' ``name`` says to ``arguments``."""
         self._send((name, arguments))
         assert self._process.stdout is not None
         try:
@@ -129,7 +137,7 @@ def main(asked: IO[bytes], answers: IO[bytes]) -> None:
             return
         try:
             skins = skins or RandomSkins(request)
-            answer = getattr(skins, name)(*arguments)
+            answer = METHODS[name](skins, *arguments)
         except Exception as error:
             answer = f"{type(error).__name__}: {error}"
         pickle.dump(answer, answers)

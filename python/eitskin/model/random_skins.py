@@ -16,7 +16,7 @@ import numpy.typing as npt
 from eitskin.arrays import FloatArray
 from eitskin.core.constants_table import MAX_RATIO, MAX_ROW_GAIN, RATIO_DEFINED
 from eitskin.fem.cem import ForwardModel
-from eitskin.fem.deform import Deformation
+from eitskin.fem.deform import Deformation, Rim
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.sensitivity import element_fields
 from eitskin.fem.shaped_touch import ShapedTouch, TouchCover
@@ -49,6 +49,28 @@ class Request:
     data_kind: str
     projection: FloatArray
     uncertainty: Uncertainty
+
+
+def sensitivity_of(
+    request: Request,
+    forward: ForwardModel,
+    pairs: FloatArray,
+    v0: FloatArray,
+    elements: npt.NDArray[np.int64],
+) -> FloatArray:
+    """The change of the folded datum with the conductivity of ``elements`` (e,), (k, e): ``pairs``
+    are the fields of ``forward``, ``v0`` (k,) its voltages."""
+    patterns, fold = forward.patterns, request.fold
+    drive, measure = patterns.drive[fold.first], patterns.measure[fold.first]
+    sign = patterns.drive_sign[fold.first] * patterns.measure_sign[fold.first]
+    fields = pairs[elements]
+    products = (fields[:, :, drive] * fields[:, :, measure]).sum(axis=1)
+    scale = -request.protocol.current_a * forward.thickness_m * sign
+    columns = products.T * scale[:, None] * (forward.mesh.areas_mm2[elements] * 1e-6)
+    if request.data_kind == "normalised":
+        weak = np.abs(v0) < RATIO_DEFINED * np.sqrt(np.mean(v0**2))
+        columns = np.where(weak, 0.0, 1 / np.where(weak, 1.0, v0))[:, None] * columns
+    return np.asarray(columns)
 
 
 class RandomSkins:
@@ -156,18 +178,7 @@ class RandomSkins:
         return np.asarray(gain * (v - v0))
 
     def _sensitivity(self, elements: npt.NDArray[np.int64]) -> FloatArray:
-        """The change of the folded datum with the conductivity of ``elements`` (e,), (k, e)."""
-        patterns, fold = self.forward.patterns, self.request.fold
-        drive, measure = patterns.drive[fold.first], patterns.measure[fold.first]
-        sign = patterns.drive_sign[fold.first] * patterns.measure_sign[fold.first]
-        fields = self._pairs[elements]
-        products = (fields[:, :, drive] * fields[:, :, measure]).sum(axis=1)
-        scale = -self.request.protocol.current_a * self.forward.thickness_m * sign
-        columns = products.T * scale[:, None] * (self.request.mesh.areas_mm2[elements] * 1e-6)
-        if self.request.data_kind == "normalised":
-            weak = np.abs(self.v_ref) < RATIO_DEFINED * np.sqrt(np.mean(self.v_ref**2))
-            columns = np.where(weak, 0.0, 1 / np.where(weak, 1.0, self.v_ref))[:, None] * columns
-        return np.asarray(columns)
+        return sensitivity_of(self.request, self.forward, self._pairs, self.v_ref, elements)
 
     def _columns(self, disc: ShapedTouch) -> FloatArray:
         """What a small change of the disc's amplitude, x, y and radius adds to the datum, (k, 4),
@@ -196,9 +207,7 @@ class RandomSkins:
         shift = asked.electrode_position_sd * self.radius_mm * draw.standard_normal(count)
         widths = np.exp(asked.electrode_width_log_sd * draw.standard_normal(count))
         contacts = np.exp(asked.contact_log_sd * draw.standard_normal(count))
-        rim = self.deformation.rim
-        turns = 2 * np.pi * np.outer(HARMONICS, rim.arc_mm / rim.length_mm)
-        waves = np.vstack([np.cos(turns), np.sin(turns)]) / np.sqrt(2 * len(HARMONICS))
+        waves = rim_waves(self.deformation.rim) / np.sqrt(2 * len(HARMONICS))
         outwards = asked.out_of_round * self.radius_mm * (draw.standard_normal(len(waves)) @ waves)
         mesh = self.deformation.moved(shift, widths, outwards)
         field = self._random_field(draw, _uniform(draw, asked.background_length))
@@ -244,6 +253,12 @@ class RandomSkins:
                 )
             )
         return tuple(touches)
+
+
+def rim_waves(rim: Rim) -> FloatArray:
+    """The outline's harmonics at the rim's nodes, (2 h, B)."""
+    turns = 2 * np.pi * np.outer(HARMONICS, rim.arc_mm / rim.length_mm)
+    return np.vstack([np.cos(turns), np.sin(turns)])
 
 
 def _uniform(draw: np.random.Generator, ends: Range) -> float:

@@ -9,6 +9,7 @@ import pytest
 
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import ModelError
+from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.model import monte_carlo
 from eitskin.model.build import BuildSettings, build_model
@@ -17,6 +18,8 @@ from eitskin.model.model import DATA_KINDS, Model
 from eitskin.model.model_errors import HEAD, ModelErrors, as_covariance, decode_model_errors
 from eitskin.model.monte_carlo import draw_model_errors
 from eitskin.model.random_skins import RandomSkins, Request
+from eitskin.model.reduction import fold_rows
+from eitskin.model.tare_places import tare_places
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.protocol import adjacent
@@ -66,6 +69,7 @@ def test_any_number_of_processes_draws_the_same():
 
     again = draw_model_errors(request(), jobs=3, progress=progress)
     assert again.encode() == errors().encode()
+    assert again.places is not None and (again.places == errors().places).all()
     assert seen == [(k, 8) for k in range(1, 9)]
     other = RandomSkins(request(uncertainty=replace(FEW, seed=2))).sample(0)
     assert not np.array_equal(other, RandomSkins(request()).sample(0))
@@ -140,7 +144,7 @@ def test_it_is_read_as_written():
     model = decode_model(tiny_blob(), "tiny")
     assert model.model_errors is None and HEADER.unpack_from(tiny_blob())[2] == 3
     for row_gains in (True, False):
-        written = replace(errors(), row_gains=row_gains)
+        written = replace(errors(), row_gains=row_gains, places=None)
         blob = encode_model(replace(model, model_errors=written))
         assert HEADER.unpack_from(blob)[1:3] == (1, 4)
         assert len(blob) == len(tiny_blob()) + 16 + (16 + 2 * 4 * 15 + 15) // 16 * 16
@@ -149,6 +153,50 @@ def test_it_is_read_as_written():
         assert (read.error == errors().error).all() and (read.drift == errors().drift).all()
         assert read.row_gains == row_gains
         assert encode_model(decode_model(blob, "made")) == blob
+
+
+def test_what_the_tare_tells_of_places_is_read_as_written():
+    model = decode_model(tiny_blob(), "tiny")
+    bare, draw = replace(errors(), places=None), np.random.default_rng(3)
+    places = draw.normal(size=(3, len(model.fold.first))).astype(np.float32)
+    blob = encode_model(replace(model, model_errors=replace(bare, places=places)))
+    assert HEADER.unpack_from(blob)[1:3] == (1, 9)
+    read = decode_model(blob, "made").model_errors
+    assert read is not None and read.places is not None and (read.places == places).all()
+    for wrong, said in (
+        (places[:, :-1], "of a size that its rows do not ask for"),
+        (np.vstack([places] * 11), "of a size that its rows do not ask for"),
+        (places * 2e6, "a number in section 'GEOM' that is out of range"),
+    ):
+        bad = encode_model(replace(model, model_errors=replace(bare, places=wrong)))
+        with pytest.raises(ModelError, match=said):
+            decode_model(bad, "made")
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+def test_the_tare_tells_shifted_electrodes_from_an_uneven_sheet(data_kind):
+    """By the variance that each adds to a place, for references equally far from the model."""
+    asked = request(data_kind, replace(FEW, electrode_position_sd=0.02, background_log_sd=0.1))
+    skins = RandomSkins(asked)
+    places, draw = tare_places(skins), np.random.default_rng(4)
+    assert places.dtype == np.float32 and places.shape == (16, len(skins.v_ref))
+    apart = {}
+    for shifted in (True, False):
+        told = []
+        for _ in range(6):
+            mesh = asked.mesh
+            if shifted:
+                mesh = skins.deformation.moved(
+                    draw.normal(size=8), np.ones(8), np.zeros(len(skins.deformation.rim.nodes))
+                )
+            field = 0.0 if shifted else 0.05 * mesh.centroids_mm() @ draw.normal(size=2) / 50
+            v = fold_rows(
+                ForwardModel(mesh, SKIN, asked.protocol).voltages(0.02 * np.exp(field)), asked.fold
+            )
+            y = np.log(v / np.linalg.norm(v) / (skins.v_ref / np.linalg.norm(skins.v_ref)))
+            told.append(float(((places @ y) ** 2).sum() / np.mean(y**2)))
+        apart[shifted] = np.median(told)
+    assert apart[True] > 2 * apart[False]
 
 
 def test_the_core_takes_a_model_with_it():

@@ -133,7 +133,7 @@ def errors_of(seed: int) -> list[Any]:
     found = model_errors.ModelErrors(
         model_errors.as_covariance(of_all.T @ of_all),
         model_errors.as_covariance(of_drift.T @ of_drift),
-        *prebuilt_errors()[2:],
+        *prebuilt_errors()[2:5],
     )
     content = found.encode()
     return [content, model_errors.decode_model_errors(content, 6, "file")]

@@ -35,6 +35,7 @@ WORLDS = (
     "eight_at_4_radii",
     "eight_mild_errors",
     "uneven_20_percent",
+    "misplaced_3_mm",
     "drift_2_percent_light",
     "drift_2_percent_strong",
 )
@@ -134,6 +135,29 @@ def test_a_long_touch_has_no_other_beyond_it(name, k):
     count = agree({engine: one(engine, quiet_v, frame_v) for engine in ENGINES})
     assert count == len(scenes.scenes[k].touches)
     assert len(one("c", quiet_v, frame_v, touch_test=0).touches) > count
+
+
+def test_the_tare_tells_how_far_a_skin_moves_places():
+    """An uneven skin hardly does, misplaced electrodes do; by the distance of the reference from
+    the model, which is the same for both, ellipses would be as wide on either."""
+    model = prebuilt()[0]
+    assert model.model_errors is not None
+    untold = encode_model(replace(model, model_errors=replace(model.model_errors, places=None)))
+    least: dict[str, list[float]] = {}
+    for name in ("discs_1_to_3", "uneven_20_percent", "misplaced_3_mm"):
+        scenes = world(name, 6)
+        for content in (blob(), untold):
+            solver = Reconstructor(decode_model(content, "x"), blob=content)
+            variances = []
+            for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
+                solver.tare(quiet_v)
+                touches = solver.reconstruct(frame_v).touches
+                variances += [float(np.min(covariance_mm2(touch)[::2])) for touch in touches]
+            least.setdefault(name, []).append(float(np.median(variances)))
+    even, uneven, misplaced = least.values()
+    assert even[0] < 1.2 * even[1]
+    assert uneven[0] < 0.5 * uneven[1] and uneven[0] < 0.3 * misplaced[0]
+    assert misplaced[0] > 3 * even[0]
 
 
 @pytest.mark.parametrize("columns", [1, 60, 120])
