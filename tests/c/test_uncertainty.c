@@ -103,6 +103,24 @@ static void what_the_reference_tells_of_places_is_read_or_refused(void)
         CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), of_size[k][1]);
         small_model_free(&made);
     }
+    uint8_t errors[SIZE];
+    section_of(errors);
+    small_model whole = small_model_with_section(&bare, "UNCE", errors, SIZE);
+    memcpy(small_model_entry(&whole, "META"), "XTRA", 4); /* room for another */
+    const struct {
+        float value;
+        eits_status status;
+    } of_value[] = {{1e6f, EITS_OK}, {-2e6f, EITS_E_MODEL_VALUE}, {(float)NAN, EITS_E_MODEL_VALUE}};
+    for (size_t k = 0; k < sizeof of_value / sizeof of_value[0]; ++k) {
+        small_put_f32(bytes + FOLD, of_value[k].value);
+        small_model made = small_model_with_section(&whole, "GEOM", bytes, 2 * FOLD);
+        eits_model model;
+        CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), of_value[k].status);
+        CHECK(k > 0 || (model.uncertainty.place_rows == 2 &&
+                        model.uncertainty.places[SMALL_FOLDED] == of_value[k].value));
+        small_model_free(&made);
+    }
+    small_model_free(&whole);
     small_model_free(&bare);
 }
 
