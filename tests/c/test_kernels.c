@@ -320,12 +320,13 @@ TEST(products_with_few_rows)
             fill(v, STRIDE + 18, 0.2, &state);
             for (int b = 0; b < build_count; ++b) {
                 memset(dots, 0xFF, sizeof dots), memset(sums, 0xFF, sizeof sums);
+                memcpy(sums, v + 9, length * sizeof *sums); /* what is added to */
                 builds[b]->rows_dot(rows, STRIDE, count, length, v, dots);
-                builds[b]->rows_sum(rows, STRIDE, count, length, v, sums);
+                builds[b]->rows_add(rows, STRIDE, count, length, v, sums);
                 for (uint32_t k = 0; k < count; ++k)
                     CHECK(dots[k] == builds[b]->dot(rows + STRIDE * k, v, length));
                 for (size_t i = 0; i < length; ++i) {
-                    eits_real chain = 0;
+                    eits_real chain = v[9 + i];
                     for (uint32_t k = 0; k < count; ++k)
                         chain = eits_fma(v[k], rows[STRIDE * k + i], chain);
                     CHECK(sums[i] == chain);

@@ -57,7 +57,7 @@ typedef struct shares {
 } shares;
 
 /* Element j of row i of the errors' part, j <= i. */
-static eits_real error_at(const eits_context *ctx, shares of, uint32_t i, uint32_t j)
+static inline eits_real error_at(const eits_context *ctx, shares of, uint32_t i, uint32_t j)
 {
     const eits_uncertainty *u = &ctx->model->uncertainty;
     const size_t at = (size_t)i * (i + 1u) / 2u + j;
@@ -69,12 +69,16 @@ static eits_real error_at(const eits_context *ctx, shares of, uint32_t i, uint32
 static void covariance(const eits_context *ctx, shares of)
 {
     const size_t stride = EITS_STRIDE(ctx->model->rank);
+    const eits_uncertainty *u = &ctx->model->uncertainty;
     const eits_real *weight =
         ctx->whitening.form == EITS_WHITENING_DIAGONAL ? ctx->whitening.map : NULL;
-    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
+    const float *error = u->errors, *drift = u->drift; /* triangles row after row */
+    for (uint32_t i = 0; i < ctx->model->rank; error += i + 1u, drift += i + 1u, ++i) {
         eits_real *column = ctx->evidence.factor + i;
         for (uint32_t j = 0; j <= i; ++j)
-            column[stride * j] = error_at(ctx, of, i, j);
+            column[stride * j] = of.errors * (eits_real)error[j];
+        for (uint32_t j = 0; of.drift > 0 && j <= i; ++j)
+            column[stride * j] = eits_fma(of.drift, (eits_real)drift[j], column[stride * j]);
         column[stride * i] =
             eits_fma(of.noise, (eits_real)ctx->model->row_form.energy[i], column[stride * i]);
         for (uint32_t j = 0; weight != NULL && j <= i; ++j)
@@ -111,29 +115,32 @@ static uint64_t covariance_of_rest(const eits_context *ctx, const eits_scratch *
     return macs + (uint64_t)rank * rank * rank / 2u;
 }
 
-/* Sigma = R'R in the rows' place, each row taken from all below it at once (axpy over whole
- * vectors, as in frame/whitening.c). Returns log det Sigma; NaN where that is out of range (volts
+/* Sigma = R'R in the rows' place: of each row all above it at once, in the order in which one after
+ * the other would be taken. Returns log det Sigma; NaN where that is out of range (volts
  * or errors at the ends of it). */
-static eits_real factor(const eits_context *ctx, eits_real *diagonal)
+static eits_real factor(const eits_context *ctx, eits_real *minus)
 {
     const uint32_t rank = ctx->model->rank;
+    const size_t stride = EITS_STRIDE(rank);
     eits_real log_determinant = 0;
-    for (uint32_t i = 0; i < rank; ++i)
-        diagonal[i] = row_of_factor(ctx, i)[i];
     for (uint32_t i = 0; i < rank; ++i) {
         eits_real *row = row_of_factor(ctx, i);
-        const eits_real min = EITS_MIN_PIVOT * diagonal[i], pivot = row[i] > min ? row[i] : min,
+        const eits_real diagonal = row[i];
+        const uint32_t first = first_of(i);
+        for (uint32_t k = 0; k < i; ++k)
+            minus[k] = -row_of_factor(ctx, k)[i];
+        ctx->kernels->rows_add(ctx->evidence.factor + first, stride, i, stride - first, minus,
+                               row + first);
+        const eits_real min = EITS_MIN_PIVOT * diagonal, pivot = row[i] > min ? row[i] : min,
                         root = eits_sqrt(pivot), inverse = 1 / root;
         if (!(pivot > 0) || !eits_is_finite(pivot))
             return R(NAN);
         log_determinant += eits_log(pivot);
-        eits_zero(row + first_of(i), i - first_of(i));
-        eits_zero(row + rank, EITS_STRIDE(rank) - rank);
+        eits_zero(row + first, i - first);
+        eits_zero(row + rank, stride - rank);
         row[i] = root;
         for (uint32_t j = i + 1; j < rank; ++j)
             row[j] *= inverse;
-        for (uint32_t j = i + 1; j < rank; ++j)
-            add_row(ctx, j, row_of_factor(ctx, j), -row[j], row);
     }
     return log_determinant;
 }
@@ -167,10 +174,34 @@ int eits_factor_covariance(eits_context *ctx, const eits_scratch *scratch, int d
     return 1;
 }
 
+/* Eight numbers of R'^-1 v in the place of v's; and what they take from the rest of v, the other
+ * way round, in `minus`. */
+static void solve_eight(const eits_real *restrict rows, size_t stride, eits_real *restrict eight,
+                        eits_real *restrict minus)
+{
+    eits_real left[8];
+    for (uint32_t j = 0; j < 8; ++j)
+        left[j] = eight[j];
+    for (uint32_t i = 0; i < 8; ++i, rows += stride) {
+        eight[i] = left[i] / rows[i];
+        minus[i] = -eight[i];
+        for (uint32_t j = 0; j < 8; ++j) /* those up to i have done their part */
+            left[j] = eits_fma(minus[i], rows[j], left[j]);
+    }
+}
+
 uint64_t eits_whiten_errors(const eits_context *ctx, eits_real *v)
 {
     const uint32_t rank = ctx->model->rank;
-    for (uint32_t i = 0; i < rank; ++i) {
+    const size_t stride = EITS_STRIDE(rank);
+    uint32_t i = 0;
+    for (; i + 8 <= rank; i += 8) {
+        const eits_real *rows = row_of_factor(ctx, i) + i;
+        eits_real minus[8];
+        solve_eight(rows, stride, v + i, minus);
+        ctx->kernels->rows_add(rows + 8, stride, 8, stride - i - 8, minus, v + i + 8);
+    }
+    for (; i < rank; ++i) {
         const eits_real *row = row_of_factor(ctx, i), known = v[i] / row[i];
         add_row(ctx, i, v, -known, row);
         v[i] = known;

@@ -114,13 +114,13 @@ static void avx2_rows_dot(const eits_real *rows, size_t stride, uint32_t count, 
     }
 }
 
-static void avx2_rows_sum(const eits_real *rows, size_t stride, uint32_t count, size_t length,
+static void avx2_rows_add(const eits_real *rows, size_t stride, uint32_t count, size_t length,
                           const eits_real *value, eits_real *out)
 {
     for (size_t i = 0; i < length; i += 8) {
         vector sum[8 / LANES];
         for (int w = 0; w < 8 / LANES; ++w)
-            sum[w] = ZERO();
+            sum[w] = LOAD(out + i + w * LANES);
         for (uint32_t k = 0; k < count; ++k) {
             for (int w = 0; w < 8 / LANES; ++w)
                 sum[w] = FMA(SET1(value[k]), LOAD(rows + stride * k + i + w * LANES), sum[w]);

@@ -316,10 +316,9 @@ static void NAME(rows_dot)(const eits_real *rows, size_t stride, uint32_t count,
         out[k] = NAME(dot)(rows + stride * k, v, length);
 }
 
-static void NAME(rows_sum)(const eits_real *rows, size_t stride, uint32_t count, size_t length,
+static void NAME(rows_add)(const eits_real *rows, size_t stride, uint32_t count, size_t length,
                            const eits_real *value, eits_real *out)
 {
-    eits_zero(out, length);
     for (uint32_t k = 0; k < count; ++k)
         NAME(axpy)(out, value[k], rows + stride * k, length);
 }
@@ -352,7 +351,7 @@ static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restri
      .mul_t_panels = NAME(mul_t_panels), \
      .dots = NAME(dots),                 \
      .rows_dot = NAME(rows_dot),         \
-     .rows_sum = NAME(rows_sum),         \
+     .rows_add = NAME(rows_add),         \
      .unpack = NAME(unpack),             \
      .dot = NAME(dot),                   \
      .axpy = NAME(axpy),                 \

@@ -37,10 +37,10 @@ typedef struct eits_kernels {
     void (*dots)(const eits_matrix *matrix, const uint32_t *index, uint32_t count,
                  const eits_real *v, eits_real *out);
     /* Few rows of reals, `stride` apart, of `length` numbers, a multiple of 8: out_k = row_k . v,
-     * as dot does it; and out = sum over the rows, in their order, of value_k * row_k. */
+     * as dot does it; and out += value_k * row_k, row after row. */
     void (*rows_dot)(const eits_real *rows, size_t stride, uint32_t count, size_t length,
                      const eits_real *v, eits_real *out);
-    void (*rows_sum)(const eits_real *rows, size_t stride, uint32_t count, size_t length,
+    void (*rows_add)(const eits_real *rows, size_t stride, uint32_t count, size_t length,
                      const eits_real *value, eits_real *out);
     /* out = the `count` stored numbers from place `first` on, both multiples of 8, as floats
      * without scales. */

@@ -1,29 +1,48 @@
 /* Part of m7.c: dots, axpy, rows. Eight lanes are s16 to s23; a turn loads eight numbers of either
  * vector by one VLDM each. The rest beyond whole eights is done in C, by the same lanes. */
 
+#define EIGHTS                                                                                    \
+    "1:\n\t"                                                                                      \
+    "vldmia %[a]!, {s0-s7}\n\t"                                                                   \
+    "vldmia %[b]!, {s8-s15}\n\t"                                                                  \
+    "vfma.f32 s16, s0, s8\n\tvfma.f32 s17, s1, s9\n\tvfma.f32 s18, s2, s10\n\tvfma.f32 s19, s3, " \
+    "s11\n\t"                                                                                     \
+    "vfma.f32 s20, s4, s12\n\tvfma.f32 s21, s5, s13\n\tvfma.f32 s22, s6, s14\n\tvfma.f32 s23, "   \
+    "s7, s15\n\t"                                                                                 \
+    "subs %[turns], #1\n\t"                                                                       \
+    "bne 1b\n\t"
+
 /* Add `turns` times eight products to the lanes; `turns` is at least 1. */
 static void add_eights(const float *a, const float *b, uint32_t turns, float lane[8])
 {
-    __asm__ volatile("vldmia %[lane], {s16-s23}\n"
-                     "1:\n\t"
-                     "vldmia %[a]!, {s0-s7}\n\t"
-                     "vldmia %[b]!, {s8-s15}\n\t"
-                     "vfma.f32 s16, s0, s8\n\tvfma.f32 s17, s1, s9\n\tvfma.f32 s18, s2, "
-                     "s10\n\tvfma.f32 s19, s3, s11\n\t"
-                     "vfma.f32 s20, s4, s12\n\tvfma.f32 s21, s5, s13\n\tvfma.f32 s22, s6, "
-                     "s14\n\tvfma.f32 s23, s7, s15\n\t"
-                     "subs %[turns], #1\n\t"
-                     "bne 1b\n\t"
-                     "vstmia %[lane], {s16-s23}\n\t"
+    __asm__ volatile("vldmia %[lane], {s16-s23}\n" EIGHTS "vstmia %[lane], {s16-s23}\n\t"
                      : [a] "+r"(a), [b] "+r"(b), [turns] "+l"(turns)
                      : [lane] "r"(lane)
                      : LOW_S, MIDDLE_S, "cc", "memory");
 }
 
+/* The tree over lanes that begin at zero. */
+static float dot_of_eights(const float *a, const float *b, uint32_t turns)
+{
+    float sum;
+    __asm__ volatile(
+        "vldmia %[zeros], {s16-s23}\n" EIGHTS
+        "vadd.f32 s16, s16, s20\n\tvadd.f32 s18, s18, s22\n\tvadd.f32 s16, s16, s18\n\t"
+        "vadd.f32 s17, s17, s21\n\tvadd.f32 s19, s19, s23\n\tvadd.f32 s17, s17, s19\n\t"
+        "vadd.f32 %[sum], s16, s17\n\t"
+        : [a] "+r"(a), [b] "+r"(b), [turns] "+l"(turns), [sum] "=&t"(sum)
+        : [zeros] "r"(zeros)
+        : LOW_S, MIDDLE_S, "cc", "memory");
+    return sum;
+}
+
 static eits_real own_dot(const eits_real *a, const eits_real *b, size_t count)
 {
-    eits_real lane[8] = {0};
     const size_t whole = count / 8 * 8;
+    eits_real lane[8];
+    if (whole == count && count > 0)
+        return dot_of_eights(a, b, (uint32_t)(count / 8));
+    memcpy(lane, zeros, sizeof lane);
     if (whole > 0)
         add_eights(a, b, (uint32_t)(whole / 8), lane);
     for (size_t l = 0; l < count % 8; ++l)
@@ -88,10 +107,33 @@ static void own_rows_dot(const eits_real *rows, size_t stride, uint32_t count, s
         out[k] = own_dot(rows + stride * k, v, length);
 }
 
-static void own_rows_sum(const eits_real *rows, size_t stride, uint32_t count, size_t length,
+/* Sixteen numbers of the sum stay in registers while the rows pass, or eight; `count` is at least
+ * 1. */
+#define ADD_ROWS(NAME, SUMS, EIGHTS, SUMMED)                                                     \
+    static void NAME(const float *rows, size_t stride, const float *value, uint32_t count,       \
+                     float *out)                                                                 \
+    {                                                                                            \
+        const size_t next = (stride - (SUMMED - 8)) * sizeof *rows;                              \
+        __asm__ volatile("vldmia %[out], {" SUMS "}\n"                                           \
+                         "1:\n\t"                                                                \
+                         "vldmia %[value]!, {s8}\n\t" EIGHTS "add %[rows], %[rows], %[next]\n\t" \
+                         "subs %[count], #1\n\t"                                                 \
+                         "bne 1b\n\t"                                                            \
+                         "vstmia %[out], {" SUMS "}\n\t"                                         \
+                         : [rows] "+r"(rows), [value] "+r"(value), [count] "+l"(count)           \
+                         : [out] "r"(out), [next] "r"(next)                                      \
+                         : LOW_S, MIDDLE_S, HIGH_S, "cc", "memory");                             \
+    }
+ADD_ROWS(add_eight, "s16-s23",
+         "vldmia %[rows], {s0-s7}\n\t" FMA8(8, 16, 17, 18, 19, 20, 21, 22, 23), 8)
+ADD_ROWS(add_sixteen, "s16-s31", COLUMN(rows, 8), 16)
+
+static void own_rows_add(const eits_real *rows, size_t stride, uint32_t count, size_t length,
                          const eits_real *value, eits_real *out)
 {
-    eits_zero(out, length);
-    for (uint32_t k = 0; k < count; ++k)
-        own_axpy(out, value[k], rows + stride * k, length);
+    size_t i = 0;
+    for (; count > 0 && i + 16 <= length; i += 16)
+        add_sixteen(rows + i, stride, value, count, out + i);
+    for (; count > 0 && i + 8 <= length; i += 8)
+        add_eight(rows + i, stride, value, count, out + i);
 }

@@ -43,7 +43,8 @@ void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, ei
     const size_t stride = EITS_STRIDE(ctx->model->rank), length = EITS_STRIDE(count);
     eits_zero(b + count, length - count);
     ctx->kernels->rows_dot(ctx->solver.factor, stride, count, length, b, w);
-    ctx->kernels->rows_sum(ctx->solver.factor, stride, count, length, w, d);
+    eits_zero(d, length);
+    ctx->kernels->rows_add(ctx->solver.factor, stride, count, length, w, d);
 }
 
 /* The new row is what makes the new column orthonormal to the others: (1, -d) over the root of
@@ -77,7 +78,8 @@ static void drop_row(eits_context *ctx, uint32_t count, uint32_t place, eits_rea
     scratch[last] = scratch[last] < 0 ? -(norm + end) : norm + end;
     /* Householder's vector v = scratch; rows less twice v (v'rows) / |v|^2. */
     const eits_real twice = norm > 0 ? 1 / (norm * (norm + end)) : 0;
-    ctx->kernels->rows_sum(ctx->solver.factor, stride, count, length, scratch, more);
+    eits_zero(more, length);
+    ctx->kernels->rows_add(ctx->solver.factor, stride, count, length, scratch, more);
     for (uint32_t i = 0; i < last; ++i) {
         eits_real *r = row(ctx, i);
         eits_axpy(ctx->kernels, r, -twice * scratch[i], more, length);

@@ -10,9 +10,9 @@
  *     atom  = Q F S (c / w),      w the column weights, c the covers: the answer to 1 S/m
  *     slope = Q F S (dc / w),     dc / dx = ramp (x_pixel - x) / distance / pixel, and so on
  *
- * Costs: an atom takes rank multiply-accumulates a covered pixel and Q F on the sum, its three
- * slopes three times that; the walk over cells is small beside it. Discs of a fit move by parts of
- * a pixel, so the columns come from the cache where it has room. */
+ * Costs: an atom takes rank multiply-accumulates a covered pixel and Q F on the sum, each of its
+ * three slopes the same of the pixels under the rim; the walk over cells is small beside it. Discs
+ * of a fit move by parts of a pixel, so the columns come from the cache where it has room. */
 #include "touch/disc.h"
 
 #include "base/vec.h"
@@ -127,15 +127,32 @@ static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *va
     return (uint64_t)c->count * ctx->model->rank + eits_forward(ctx, out);
 }
 
+/* Only the pixels under the rim, whose cover changes. */
+static void keep_rim(covered *c)
+{
+    uint32_t kept = 0;
+    for (uint32_t k = 0; k < c->count; ++k) {
+        c->index[kept] = c->index[k];
+        c->ramp[kept] = c->ramp[k];
+        c->toward_x[kept] = c->toward_x[k];
+        c->toward_y[kept] = c->toward_y[k];
+        kept += c->ramp[k] != 0;
+    }
+    c->count = kept;
+}
+
 /* The cover changes where the rim of the disc lies within a pixel: there its derivative by the
  * distance of the centre is -1 a pixel, and by the radius 1; elsewhere 0. So the slopes need no
- * second look at the cells. */
+ * second look at the cells, and fewer columns. */
 uint64_t eits_disc_shape(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
                          eits_real *atom, eits_real *const *slope, eits_real *const *edge)
 {
     covered c = cover(ctx, scratch, disc);
     weigh(ctx, &c);
-    uint64_t macs = respond(ctx, &c, c.cover, atom);
+    uint64_t macs = atom != NULL ? respond(ctx, &c, c.cover, atom) : 0;
+    if (slope == NULL && edge == NULL)
+        return macs;
+    keep_rim(&c);
     for (uint32_t part = 0; edge != NULL && part < 2; ++part) {
         for (uint32_t k = 0; k < c.count; ++k) {
             const eits_real x = c.toward_x[k], y = c.toward_y[k];

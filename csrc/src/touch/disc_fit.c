@@ -18,8 +18,9 @@
  * Invariant: f->residual = data - sum of all discs' answers, kept by adding and taking away single
  * atoms; eits_fit_restart makes it exact again after discs or data were exchanged.
  *
- * Costs per move of one disc: an atom with its three slopes, at most three trial
- * atoms, 17 dots.
+ * The k-th disc's atom is at hand (eits_atom) wherever it stands.
+ *
+ * Costs per move of one disc: three slopes, at most three trial atoms, 17 dots.
  */
 #include "touch/disc_fit.h"
 
@@ -170,7 +171,7 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
               *target = f->residual;
     ++f->moves;
     eits_axpy(ctx->kernels, target, disc->change, atom, rank);
-    f->macs += eits_disc_atom(ctx, scratch, disc, atom, &scratch->row[5]);
+    f->macs += eits_disc_shape(ctx, scratch, disc, NULL, &scratch->row[5], NULL);
     disc->change = eits_best_change(ctx, disc, atom, target);
     for (uint32_t i = 0; i < rank; ++i)
         left[i] = eits_fma(-disc->change, atom[i], target[i]);

@@ -62,6 +62,13 @@ void eits_fit_explain(eits_context *ctx, eits_fit *f)
     }
 }
 
+/* The cell at `at` from the grid's origin, one of `count`; the nearest where it is beyond. */
+static uint32_t cell_of(eits_real at, eits_real pixel, uint32_t count)
+{
+    const eits_real cell = at / pixel, last = (eits_real)(count - 1u);
+    return cell > 0 ? (cell < last ? (uint32_t)cell : count - 1u) : 0;
+}
+
 /* Whether the disc stands out of the noise by the same test as the whole frame: S_j'(y - other
  * discs) at its pixel.
  *
@@ -79,20 +86,23 @@ static int stands_out(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     const eits_real *residual = eits_adjoint(ctx, f->residual, scratch->row[6]);
     eits_real best = 0;
     f->macs += 2u * eits_adjoint_macs(ctx);
-    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
-        const eits_pixel at = ctx->model->pixel[j];
-        const eits_real pixel = (eits_real)ctx->model->pixel_mm,
-                        near = EITS_STANDS_OUT_NEAR * pixel;
-        const eits_real dx =
-            eits_fma((eits_real)at.ix + R(0.5), pixel, (eits_real)ctx->model->origin_x_mm) -
-            disc->x_mm;
-        const eits_real dy =
-            eits_fma((eits_real)at.iy + R(0.5), pixel, (eits_real)ctx->model->origin_y_mm) -
-            disc->y_mm;
-        if (eits_fabs(dx) > near || eits_fabs(dy) > near)
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm, near = EITS_STANDS_OUT_NEAR * pixel;
+    const uint32_t x = cell_of(disc->x_mm - (eits_real)model->origin_x_mm, pixel, model->nx),
+                   y = cell_of(disc->y_mm - (eits_real)model->origin_y_mm, pixel, model->ny);
+    for (uint32_t place = 0; place < 25; ++place) { /* its cell and two to either side */
+        const uint32_t ix = x + place % 5u - 2u, iy = y + place / 5u - 2u; /* 0 - 1: none */
+        if (ix >= model->nx || iy >= model->ny)
             continue;
-        const eits_real *column = eits_column(&ctx->model->sensitivity, j, scratch->row[1]),
-                        scale = eits_column_scale(&ctx->model->sensitivity, j);
+        const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
+        const eits_real dx =
+            eits_fma((eits_real)ix + R(0.5), pixel, (eits_real)model->origin_x_mm) - disc->x_mm;
+        const eits_real dy =
+            eits_fma((eits_real)iy + R(0.5), pixel, (eits_real)model->origin_y_mm) - disc->y_mm;
+        if (j == EITS_NO_PIXEL || eits_fabs(dx) > near || eits_fabs(dy) > near)
+            continue;
+        const eits_real *column = eits_column(&model->sensitivity, j, scratch->row[1]),
+                        scale = eits_column_scale(&model->sensitivity, j);
         const eits_real seen =
             scale * eits_fma(disc->change, eits_dot(ctx->kernels, column, atom, rank),
                              eits_dot(ctx->kernels, column, residual, rank));
