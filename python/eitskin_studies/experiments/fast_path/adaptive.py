@@ -30,6 +30,13 @@ from eitskin_studies.harness.sessions import Progress
 
 FloatArray = npt.NDArray[np.float64]
 
+MEASURED = {
+    "with_false": "scenes with a false touch",
+    "missed": "fingers missed",
+    "first_ms": "report, ms",
+    "first_mm": "error then, mm",
+    "moving_mm": "error, mm",
+}
 TITLE = "Drives chosen as they are measured, against fixed orders at equal time"
 ROUND = 24  # each drive is measured at least once in so many
 BEFORE_S, HELD_S, AFTER_S, LATER_S = 0.04, 0.08, 0.05, 0.03
@@ -163,11 +170,18 @@ def compare(
 
 
 def table(found: list[dict[str, Any]]) -> Table:
-    """Of what was found."""
-    head = ("scene", "drives", "scenes", "with any false touch", "fingers missed",
-            "first report, ms: median, p95", "error then, mm",
-            "error while it moves, mm")  # fmt: skip
-    return Table("orders", head, tuple(tuple(map(_cell, one.values())) for one in found))
+    """Of what was found: a column an order, a row for each thing that was measured in a scene."""
+    names = list(dict.fromkeys(one["drives"] for one in found))
+    by_scene: dict[str, list[dict[str, Any]]] = {}
+    for one in found:
+        by_scene.setdefault(one["scene"], []).append(one)
+    rows = [
+        (f"{scene}: {title}", *(_cell(one[key]) for one in of))
+        for scene, of in by_scene.items()
+        for key, title in MEASURED.items()
+        if any(one[key] != () for one in of)
+    ]
+    return Table("orders", ("median, p95", *names), tuple(rows))
 
 
 def _press(places: FloatArray, from_s: float, *, rise_s: float) -> list[Finger]:
@@ -211,7 +225,7 @@ def _quantiles(values: FloatArray) -> tuple[float, ...]:
 
 def _cell(value: Any) -> str:
     if isinstance(value, tuple):
-        return ", ".join(f"{each:.2f}" for each in value) or "-"
+        return ", ".join(f"{each:.1f}" if each >= 4 else f"{each:.2f}" for each in value) or "-"
     return str(value)
 
 
