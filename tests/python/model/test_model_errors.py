@@ -167,6 +167,7 @@ def test_what_the_tare_tells_of_places_is_read_as_written():
         (places[:, :-1], "of a size that its rows do not ask for"),
         (np.vstack([places] * 11), "of a size that its rows do not ask for"),
         (places * 2e6, "a number in section 'GEOM' that is out of range"),
+        (np.full_like(places, np.nan), "GEOM"),
     ):
         bad = encode_model(replace(model, model_errors=replace(bare, places=wrong)))
         with pytest.raises(ModelError, match=said):
@@ -197,6 +198,20 @@ def test_the_tare_tells_shifted_electrodes_from_an_uneven_sheet(data_kind):
             told.append(float(((places @ y) ** 2).sum() / np.mean(y**2)))
         apart[shifted] = np.median(told)
     assert apart[True] > 2 * apart[False]
+
+
+def test_a_skin_thinner_than_the_step_tells_of_places():
+    """No place of the grid lies inside it; the mesh's own do."""
+    skin = Skin(
+        "thin",
+        polygon([(0, 0), (600, 0), (600, 1), (0, 1)]),
+        Electrodes(8, 1.0),
+        conductivity_s_per_m=0.02,
+        thickness_mm=5.0,
+    )
+    mesh = mesh_for_elements(skin, 600)
+    places = tare_places(RandomSkins(replace(request(), skin=skin, mesh=mesh)))
+    assert places.shape[0] == 16 and np.isfinite(places).all()
 
 
 def test_the_core_takes_a_model_with_it():
