@@ -1,17 +1,18 @@
 """Small scenes, boards before them, and transports that damage what goes through."""
 
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from itertools import count
+from typing import TypeVar
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
-from eitskin.device.wire.link_table import GetStats, PacketType
-from eitskin.device.wire.packets import BoardInfo, BoardStats
+from eitskin.device.wire.link_table import GetStats, PacketType, Stream
+from eitskin.device.wire.packets import BoardInfo, BoardStats, RawFrame
 from eitskin.device.wire.payloads import parse
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import Scene
@@ -19,6 +20,7 @@ from eitskin.scene.touch_path import Keyframe, TouchTrack
 from small_models import prebuilt
 
 _REQUESTS = count(2**31)  # above those of any Device
+Kind = TypeVar("Kind")
 QUIET = 8
 FRAMES = 10
 
@@ -110,9 +112,8 @@ def dropping(generator: random.Random, share: float) -> Callable[[bytes], bytes]
         if chance < share / 2:
             return b""
         place = generator.randrange(len(data))
-        return (
-            data[:place] + bytes([data[place] ^ (1 + generator.randrange(255))]) + data[place + 1 :]
-        )
+        changed = bytes([data[place] ^ (1 + generator.randrange(255))])
+        return data[:place] + changed + data[place + 1 :]
 
     return damage
 
@@ -139,3 +140,12 @@ def board_info(**changes: object) -> BoardInfo:
         "current_limit_ua_rms": 437,
     }  # fmt: skip
     return BoardInfo(**(values | changes))
+
+
+def of(kind: type[Kind], items: Iterable[object]) -> list[Kind]:
+    return [item for item in items if isinstance(item, kind)]
+
+
+def raw_frames(device: Device, frames: int = 0) -> list[RawFrame]:
+    """What a stream of raw frames gives, without events."""
+    return of(RawFrame, device.stream(Stream.RAW, frames=frames))

@@ -3,14 +3,15 @@ and replies."""
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import zip_longest
 
 import numpy as np
 import pytest
-from device_helpers import FRAMES, QUIET, frames, sim_board, sim_device
+from device_helpers import FRAMES, QUIET, frames, of, raw_frames, sim_board, sim_device
 
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
-from eitskin.device.simulated import SimBoard, SimTransport
+from eitskin.device.simulated import SimTransport
 from eitskin.device.wire import link_table as cmd
 from eitskin.device.wire.link_table import FaultCode, Quality, ReplyStatus, Stream
 from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches
@@ -22,10 +23,6 @@ from small_models import prebuilt
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
-def by_kind(items: list[object], kind: type) -> list[object]:
-    return [item for item in items if isinstance(item, kind)]
-
-
 def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
     model, blob = prebuilt()
     with sim_device() as device:
@@ -34,9 +31,7 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
         quiet = [device.next_item(0.0) for _ in range(QUIET)]
         device.start_scene()
         board, items = device.board, list(device.stream(ALL))
-    raws, images, touches = (
-        by_kind(items, kind) for kind in (RawFrame, SolvedImage, SolvedTouches)
-    )
+    raws, images, touches = (of(kind, items) for kind in (RawFrame, SolvedImage, SolvedTouches))
     assert len(raws) == len(images) == len(touches) == FRAMES
     assert [type(item) for item in items[:3]] == [RawFrame, SolvedImage, SolvedTouches]
     skin = Reconstructor(model, blob=blob, options=board_options(model, board))
@@ -48,15 +43,15 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
         assert image.solved.iterations == found.solved.iterations == result.info.iterations
         assert found.solved.macs == result.info.macs
         assert raw.frame == image.frame == found.frame
-    assert len(touches[-1].touches) == 1
-    assert np.hypot(touches[-1].touches[0].x_mm + 40, touches[-1].touches[0].y_mm - 10) < 3
+    (touch,) = touches[-1].touches
+    assert np.hypot(touch.x_mm + 40, touch.y_mm - 10) < 3
 
 
 def test_frames_are_the_scenes_but_for_a_converter_of_16_bits():
     with sim_device() as device:
         device.tare(QUIET)
         device.start_scene()
-        raws = by_kind(list(device.stream(Stream.RAW)), RawFrame)
+        raws = raw_frames(device)
         step_v = 1e-9 * device.info().volts_per_code_nv
     true = frames().voltage_v(prebuilt()[0].protocol)
     assert 2.0 < 65536 * step_v / np.abs(true).max() < 2.2
@@ -85,50 +80,37 @@ def test_two_runs_are_the_same_bytes():
 
 
 def test_boards_in_one_process_do_not_meet():
-    """Two runs in turns give what each gives alone."""
+    """Two runs in turns give what each gives alone, and alone the same again."""
 
-    def run(board: SimBoard, frames: int) -> Iterator[bytes]:
-        with Device(SimTransport("test", board)) as device:
-            device.tare(frames)
+    def run(count: int) -> Iterator[bytes]:
+        with sim_device() as device:
+            device.tare(count)
             device.start_scene()
-            for item in device.stream(Stream.RAW, frames=frames):
-                assert isinstance(item, RawFrame)
-                yield item.voltage_v.tobytes()
+            for raw in device.stream(Stream.RAW, frames=count):
+                assert isinstance(raw, RawFrame)
+                yield raw.voltage_v.tobytes()
 
-    alone = [list(run(sim_board(), frames)) for frames in (4, 8)]
-    first, second = run(sim_board(), 4), run(sim_board(), 8)
-    together: list[list[bytes]] = [[], []]
-    for k in range(8):
-        if k < 4:
-            together[0].append(next(first))
-        together[1].append(next(second))
-    assert together == alone
+    alone = list(run(4)), list(run(8))
+    together = list(zip_longest(run(4), run(8)))
+    assert ([one for one, _ in together[:4]], [two for _, two in together]) == alone
 
 
 def test_the_skin_is_untouched_until_the_scene_begins():
     with sim_device() as device:
-        quiet = [
-            item
-            for item in device.stream(Stream.RAW, frames=2 * QUIET)
-            if isinstance(item, RawFrame)
-        ]
-        for first, second in zip(quiet[:QUIET], quiet[QUIET:], strict=True):
-            assert np.abs(second.voltage_v - first.voltage_v).max() < 3e-5
+        quiet = np.array([raw.voltage_v for raw in raw_frames(device, 2 * QUIET)])
+        assert np.abs(quiet[QUIET:] - quiet[:QUIET]).max() < 3e-5
         device.tare(QUIET)
         device.start_scene()
-        touched = next(item for item in device.stream(Stream.RAW) if isinstance(item, RawFrame))
-    rms, change = (
-        float(np.sqrt(np.mean(quiet[0].voltage_v ** 2))),
-        np.abs(touched.voltage_v - quiet[0].voltage_v),
-    )
-    assert change.max() > 0.02 * rms > np.abs(quiet[1].voltage_v - quiet[0].voltage_v).max()
+        touched = raw_frames(device)[0].voltage_v
+    rms = float(np.sqrt(np.mean(quiet[0] ** 2)))
+    assert np.abs(touched - quiet[0]).max() > 0.02 * rms > np.abs(quiet[1] - quiet[0]).max()
 
 
 def test_board_time_is_the_scenes_and_the_scene_ends():
     with sim_device() as device:
         assert device.board.frame_period_us == 50_000
         device.start_scene()
-        raws = by_kind(list(device.stream(Stream.RAW)), RawFrame)
+        raws = raw_frames(device)
         assert [raw.time_us for raw in raws] == [20 + 50_000 * k for k in range(FRAMES)]
         assert [raw.frame for raw in raws] == list(range(FRAMES))
         assert device.transport.ended
@@ -141,7 +123,7 @@ def test_a_faster_scan_sees_scene_frames_more_than_once():
         device.scan(frame_period_us=0)
         assert device.board.frame_us == 20_800
         device.start_scene()
-        raws = by_kind(list(device.stream(Stream.RAW)), RawFrame)
+        raws = raw_frames(device)
     assert [raw.time_us for raw in raws] == [20 + 20_800 * k for k in range(len(raws))]
     true = frames().voltage_v(prebuilt()[0].protocol)[QUIET:]
     shown = [int(np.abs(true - raw.voltage_v).max(axis=1).argmin()) for raw in raws]
@@ -156,7 +138,7 @@ def test_masked_rows_are_left_out():
         device.tare(QUIET)
         device.start_scene()
         items = list(device.stream(ALL, frames=2))
-        raw, image = by_kind(items, RawFrame)[0], by_kind(items, SolvedImage)[0]
+        raw, image = of(RawFrame, items)[0], of(SolvedImage, items)[0]
         assert np.isnan(raw.voltage_v[5])
         assert raw.quality[5] == Quality.MASKED
         assert np.isfinite(np.delete(raw.voltage_v, 5)).all()
@@ -164,7 +146,7 @@ def test_masked_rows_are_left_out():
         assert np.isfinite(image.image).all()
         device.mask_row(5, masked=False)
         device.tare(4)
-        assert by_kind(list(device.stream(ALL, frames=1)), SolvedImage)[0].solved.masked == 0
+        assert of(SolvedImage, device.stream(ALL, frames=1))[0].solved.masked == 0
 
 
 def test_a_board_without_a_model():
@@ -211,8 +193,8 @@ def test_a_reset_begins_anew():
         assert device.info().tared == 1
         info = device.reset()
         assert (info.tared, info.streaming) == (0, 0)
-        assert device.counters.restarts == 1
-        assert device.counters.gaps == device.counters.stale == 0
+        counters = device.counters
+        assert (counters.restarts, counters.gaps, counters.stale) == (1, 0, 0)
         device.tare(1)
 
 
@@ -222,7 +204,7 @@ def test_options_of_the_solver_are_taken():
         device.tare(QUIET)
         device.start_scene()
         device.solver(replace(options, iterations=7, warm_start=True))
-        image = by_kind(list(device.stream(Stream.IMAGE, frames=1)), SolvedImage)[0]
+        image = of(SolvedImage, device.stream(Stream.IMAGE, frames=1))[0]
         assert image.solved.iterations == 7
         with pytest.raises(UsageError):
             device.solver(replace(options, iterations=0))
