@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.client import Device
+from eitskin.device.ports import Port
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.link_table import GetStats, PacketType, Stream
@@ -69,6 +70,11 @@ def stats_of(board: SimBoard) -> BoardStats:
 def sim_device(board: SimBoard | None = None) -> Iterator[Device]:
     with Device(SimTransport("test", board or sim_board())) as device:
         yield device
+
+
+def st_link(path: str, serial: str = "SERIAL1") -> Port:
+    """An ST-LINK's port, as pyserial lists it."""
+    return Port(path, "STM32 STLink", 0x0483, 0x374B, serial)
 
 
 class Damaging:

@@ -2,8 +2,10 @@
 recognised."""
 
 import random
+from collections.abc import Iterable
 
 import pytest
+from device_helpers import board_info
 
 from eitskin.device.wire.codec import Decoder, LinkCounters, encode
 from eitskin.device.wire.link_table import PacketType
@@ -13,113 +15,80 @@ from eitskin.device.wire.sequence import LATE_IN_A_ROW, REMEMBERED, SequenceChec
 TOP = 2**32
 
 
-def judged(
-    numbers: list[int], *, prints: list[int] | None = None
-) -> tuple[list[int | None], LinkCounters]:
-    """Verdicts on packets of these numbers; the same number has the same content unless ``prints``
-    says otherwise."""
+CUT = "the line is cut"
+Event = str | int | tuple[int, int, bool]  # (number, content, an INFO with request 0)
+
+
+def judged(events: list[Event]) -> tuple[list[int | None], dict[str, int]]:
+    """Verdicts on packets, a number alone for one whose content is its number; what is counted."""
     counters = LinkCounters()
-    check = SequenceCheck(counters)
-    return [check.admit(n % TOP, (prints or numbers)[k]) for k, n in enumerate(numbers)], counters
+    check, verdicts = SequenceCheck(counters), []
+    for event in events:
+        if isinstance(event, str):
+            check.link_lost()
+            continue
+        number, content, restart = event if isinstance(event, tuple) else (event, event, False)
+        verdicts.append(check.admit(number % TOP, content, restart=restart))
+    return verdicts, {name: count for name, count in vars(counters).items() if count}
 
 
-@pytest.mark.parametrize("start", [0, 5, TOP - 3, TOP - 1])
-def test_one_after_another(start):
-    verdicts, counters = judged([start + k for k in range(10)])
-    assert verdicts == [0] * 10
-    assert counters == LinkCounters()
+def new(numbers: Iterable[int], past: int) -> list[Event]:
+    """Packets of a new life: their content tells them from those of the old one."""
+    return [(n, past + n, False) for n in numbers]
 
 
-@pytest.mark.parametrize("start", [0, 17, TOP - 4])
-def test_gaps_are_counted_across_the_wrap(start):
-    verdicts, counters = judged([start, start + 3, start + 4, start + 10])
-    assert verdicts == [0, 2, 0, 5]
-    assert (counters.gaps, counters.missing) == (2, 7)
+LATE, FOUND_OUT = [None] * (LATE_IN_A_ROW - 1), {"restarts": 1}
+TOLD = [*range(100, 110), (0, 9000, True)]  # a restart that says so
+CASES: dict[str, tuple[list[Event], list[int | None], dict[str, int]]] = {
+    **{
+        f"one after another from {start}": ([start + k for k in range(10)], [0] * 10, {})
+        for start in (0, 5, TOP - 3, TOP - 1)
+    },
+    **{
+        f"gaps are counted from {start}": (
+            [start, start + 3, start + 4, start + 10], [0, 2, 0, 5], {"gaps": 2, "missing": 7}
+        )
+        for start in (0, 17, TOP - 4)
+    },
+    "duplicates and late packets are refused": (
+        [1, 2, 2, 5, 3, 6, 5, 1], [0, 0, None, 2, None, 0, None, None],
+        {"duplicates": 3, "stale": 1, "gaps": 1, "missing": 2},
+    ),
+    "duplicates across the wrap": (
+        [TOP - 1, TOP, TOP - 1, TOP, TOP + 1], [0, 0, None, None, 0], {"duplicates": 2}
+    ),
+    "a restart that says so": ([*TOLD, *new(range(1, 5), 9000)], [0] * 15, {"restarts": 1}),
+    "a loss right after a restart is a gap": (
+        [*TOLD, *new([4], 9000)], [0] * 11 + [3], {"restarts": 1, "gaps": 1, "missing": 3}
+    ),
+    # the line gives the board's first INFO twice, and more after it; at first it cannot be told
+    "the first INFO may be repeated": (
+        [(0, 7, True), *new(range(1, 6), 10), (0, 7, True), *new((1, 2, 6, 7, 8), 10)],
+        [0] * 7 + [None, None, 0, 0, 0], {"duplicates": 3},
+    ),
+    "late numbers one after another are a new life": (
+        [*range(1000, 1010), *new(range(1, 40), 9000)], [0] * 10 + LATE + [0] * (39 - len(LATE)),
+        FOUND_OUT,
+    ),
+    "a new life within the remembered numbers": (
+        [*range(30), *new(range(1, 30), 9000)], [0] * 30 + LATE + [0] * (29 - len(LATE)), FOUND_OUT
+    ),
+    "a long stretch that comes again is no restart": (
+        [*range(REMEMBERED), *range(REMEMBERED - 100, REMEMBERED), REMEMBERED],
+        [0] * REMEMBERED + [None] * 100 + [0], {"duplicates": 100},
+    ),
+    # the last gap is of a new life: how many are missing nobody knows
+    "a cut line counts one gap": (
+        [5, CUT, 6, CUT, 20, CUT, *new((3, 4), 30)], [0, 0, 13, 1, 0],
+        {"gaps": 2, "missing": 13, "restarts": 1},
+    ),
+}  # fmt: skip
 
 
-def test_duplicates_and_late_packets_are_refused():
-    verdicts, counters = judged([1, 2, 2, 5, 3, 6, 5, 1])
-    assert verdicts == [0, 0, None, 2, None, 0, None, None]
-    assert (counters.duplicates, counters.stale, counters.gaps, counters.missing) == (3, 1, 1, 2)
-
-
-def test_duplicates_across_the_wrap():
-    verdicts, counters = judged([TOP - 1, TOP, TOP - 1, TOP, TOP + 1])
-    assert verdicts == [0, 0, None, None, 0]
-    assert (counters.duplicates, counters.stale) == (2, 0)
-
-
-def test_a_restart_that_says_so():
-    counters = LinkCounters()
-    check = SequenceCheck(counters)
-    assert [check.admit(n, n) for n in range(100, 110)] == [0] * 10
-    assert check.admit(0, 9000, restart=True) == 0
-    assert [check.admit(n, 9000 + n) for n in range(1, 5)] == [0] * 4
-    assert (counters.restarts, counters.gaps, counters.duplicates, counters.stale) == (1, 0, 0, 0)
-
-
-def test_a_loss_right_after_a_restart_is_a_gap():
-    counters = LinkCounters()
-    check = SequenceCheck(counters)
-    for n in range(100, 110):
-        check.admit(n, n)
-    check.admit(0, 9000, restart=True)
-    assert check.admit(4, 9004) == 3
-    assert (counters.restarts, counters.gaps, counters.missing) == (1, 1, 3)
-
-
-def test_the_first_info_may_be_repeated():
-    """A board says once that it began; the line gives it twice, and more after it. Nothing is taken
-    twice."""
-    counters = LinkCounters()
-    check = SequenceCheck(counters)
-    assert check.admit(0, 7, restart=True) == 0
-    assert [check.admit(n, 10 + n) for n in range(1, 6)] == [0] * 5
-    assert check.admit(0, 7, restart=True) == 0  # it cannot be told yet
-    assert check.admit(1, 11) is None
-    assert check.admit(2, 12) is None
-    assert [check.admit(n, 10 + n) for n in range(6, 9)] == [0] * 3
-    assert (counters.restarts, counters.duplicates, counters.gaps, counters.missing) == (0, 3, 0, 0)
-
-
-def test_a_restart_whose_info_was_lost_is_found_out():
-    """Late numbers one after another are a new life, not a hundred late packets."""
-    verdicts, counters = judged([*range(1000, 1010), *range(1, 40)], prints=list(range(49)))
-    assert verdicts[:10] == [0] * 10
-    assert verdicts[10 : 10 + LATE_IN_A_ROW - 1] == [None] * (LATE_IN_A_ROW - 1)
-    assert verdicts[10 + LATE_IN_A_ROW - 1 :] == [0] * (40 - LATE_IN_A_ROW)
-    assert (counters.restarts, counters.gaps, counters.stale) == (1, 0, 0)
-
-
-def test_a_restart_within_the_remembered_numbers_is_found_out_too():
-    numbers = [*range(30), *range(1, 30)]
-    verdicts, counters = judged(numbers, prints=list(range(len(numbers))))
-    assert counters.restarts == 1
-    assert counters.duplicates == 0
-    assert verdicts[-1] == 0
-
-
-def test_a_long_stretch_that_comes_again_is_not_taken_for_a_restart():
-    numbers = [*range(REMEMBERED), *range(REMEMBERED - 100, REMEMBERED), REMEMBERED]
-    verdicts, counters = judged(numbers)
-    assert (counters.duplicates, counters.restarts, counters.gaps) == (100, 0, 0)
-    assert verdicts[-1] == 0
-
-
-def test_a_cut_line_counts_one_gap():
-    counters = LinkCounters()
-    check = SequenceCheck(counters)
-    check.admit(5, 5)
-    check.link_lost()
-    assert check.admit(6, 6) == 0
-    assert counters.gaps == 0
-    check.link_lost()
-    assert check.admit(20, 20) == 13
-    assert (counters.gaps, counters.missing) == (1, 13)
-    check.link_lost()
-    assert check.admit(3, 33) == 1  # begun again: how many, nobody knows
-    assert (counters.gaps, counters.missing, counters.restarts) == (2, 13, 1)
-    assert check.admit(4, 34) == 0
+@pytest.mark.parametrize("name", CASES)
+def test_packets_are_judged_by_their_numbers(name):
+    events, verdicts, counted = CASES[name]
+    assert judged(events) == (verdicts, counted)
 
 
 def test_nothing_of_a_new_life_is_lost_although_its_first_packets_seem_late():
@@ -139,8 +108,6 @@ def test_nothing_of_a_new_life_is_lost_although_its_first_packets_seem_late():
 
 
 def packet(number: int, *, restart: bool = False) -> bytes:
-    from device_helpers import board_info
-
     if restart:
         return encode(PacketType.INFO, number, pack(board_info(request=0)))
     return encode(PacketType.FAULT, number, number.to_bytes(8, "little") * 4)

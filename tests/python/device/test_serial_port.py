@@ -1,14 +1,18 @@
 """Serial ports on pseudo-terminals: a board behind one, ports that are not there, busy, forbidden,
 slow to be read, unplugged."""
 
+import errno
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
+from itertools import count, islice
 from pathlib import Path
 
 import pytest
-from device_helpers import empty_bank, scene, sim_board
+import serial
+from device_helpers import empty_bank, of, raw_frames, scene, sim_board, st_link
 
 from board_on_a_port import Wire
 from eitskin.device import ports as ports_module
@@ -27,11 +31,37 @@ from small_models import prebuilt
 SOON = Reconnect(tries=40, every_s=0.05)
 
 
+class Bench(ExitStack):
+    """Wires to boards, and the paths of those that the host finds when it looks."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.there: list[str] = []
+        self.looks = 0
+        self.on_look: Callable[[], object] = lambda: None
+
+    def plug(self, board: SimBoard, frame_s: float = 0.0) -> Wire:
+        wire = Wire(board, frame_s=frame_s)
+        self.callback(wire.unplug)
+        self.there[:] = [wire.path]
+        return wire
+
+    def ports(self) -> list[Port]:
+        self.looks += 1
+        self.on_look()
+        return [st_link(path) for path in self.there]
+
+
 @pytest.fixture
-def wire() -> Iterator[Wire]:
-    made = Wire(sim_board())
-    yield made
-    made.unplug()
+def bench(monkeypatch) -> Iterator[Bench]:
+    with Bench() as made:
+        monkeypatch.setattr(ports_module, "ports", made.ports)
+        yield made
+
+
+@pytest.fixture
+def wire(bench) -> Wire:
+    return bench.plug(sim_board())
 
 
 def quick(url: str, **more: object) -> Device:
@@ -42,12 +72,7 @@ def test_a_board_on_a_port(wire):
     with quick(f"serial:{wire.path}") as device:
         assert device.board.board == "simulated"
         device.tare(8)
-        frames = [
-            item.frame
-            for item in device.stream(Stream.RAW, frames=20)
-            if isinstance(item, RawFrame)
-        ]
-        assert len(frames) == 20
+        frames = [raw.frame for raw in raw_frames(device, 20)]
         assert frames == list(range(frames[0], frames[0] + 20))
         assert device.counters.gaps == device.counters.crc_errors == 0
         assert not device.transport.synchronous
@@ -60,144 +85,91 @@ def test_a_slow_reader_loses_the_oldest_whole_frames_and_knows_how_many(wire):
         end = time.monotonic() + 20
         while device.counters.dropped < 50 and time.monotonic() < end:
             time.sleep(0.01)
-        for _ in range(200):
-            items.append(next(stream))
+        items += islice(stream, 200)
         stats = device.stats()  # an answer is not lost among the frames
         counters = device.counters
         stream.close()
-        assert stats.frames_scanned > 200
-        told = sum(
-            item.missing for item in items if isinstance(item, LinkEvent) and item.kind == "dropped"
-        )
-        frames = [item.frame for item in items if isinstance(item, RawFrame)]
-        assert frames == sorted(set(frames))
-        assert told >= 50
-        assert frames[-1] - frames[0] + 1 - len(frames) == told  # exactly those that are missing
-        assert (
-            counters.gaps == counters.crc_errors == counters.framing_errors == 0
-        )  # the port itself never waited
+    assert stats.frames_scanned > 200
+    told = sum(event.missing for event in of(LinkEvent, items) if event.kind == "dropped")
+    frames = [item.frame for item in of(RawFrame, items)]
+    assert frames == sorted(set(frames))
+    assert told >= 50
+    assert frames[-1] - frames[0] + 1 - len(frames) == told  # exactly those that are missing
+    # the port itself never waited
+    assert counters.gaps == counters.crc_errors == counters.framing_errors == 0
 
 
-def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch):
+def test_unplugged_and_plugged_in_again_elsewhere(bench):
     board = sim_board()
-    first, there = Wire(board, frame_s=0.005), []
-
-    def ports() -> list[Port]:
-        return [Port(path, "STLink", 0x0483, 0x374B, "SERIAL1") for path in there]
-
-    monkeypatch.setattr(ports_module, "ports", ports)
-    there.append(first.path)
-    second: Wire | None = None
-    try:
-        with quick(f"serial:{first.path}") as device:
-            events, frames = [], []
-            for item in device.stream(Stream.RAW, frames=60):
-                if isinstance(item, LinkEvent):
-                    events.append(item.kind)
-                elif isinstance(item, RawFrame):
-                    frames.append(item.frame)
-                if len(frames) == 10 and second is None:
-                    there.clear()
-                    first.unplug()
-                    second = Wire(board, frame_s=0.005)
-                    there.append(second.path)
-            assert device.transport.name == second.path
-            assert events[:2] == ["unplugged", "reconnected"]
-            assert device.counters.reconnects == 1
-            assert frames == sorted(set(frames))
-            assert len(frames) >= 55
-    finally:
-        if second is not None:
-            second.unplug()
+    first = second = bench.plug(board, frame_s=0.005)
+    with quick(f"serial:{first.path}") as device:
+        events, frames = [], []
+        for item in device.stream(Stream.RAW, frames=60):
+            if isinstance(item, LinkEvent):
+                events.append(item.kind)
+            elif isinstance(item, RawFrame):
+                frames.append(item.frame)
+            if len(frames) == 10 and second is first:
+                bench.there.clear()
+                first.unplug()
+                second = bench.plug(board, frame_s=0.005)
+        assert device.transport.name == second.path
+        assert events[:2] == ["unplugged", "reconnected"]
+        assert device.counters.reconnects == 1
+        assert frames == sorted(set(frames)) and len(frames) >= 55
 
 
-def test_a_command_waits_for_a_board_that_is_away_longer_than_an_answer_may_take(
-    monkeypatch,
-):
+def test_a_command_waits_for_a_board_that_is_away_longer_than_an_answer_may_take(bench):
     """Answers may take 3 x 0.05 s here; the board is away for 25 looks, 0.02 s apart."""
-    board, there, looks = sim_board(), [], [0]
-    first = Wire(board)
-    second: Wire | None = None
-
-    def ports() -> list[Port]:
-        nonlocal second
-        if second is None and not there:
-            looks[0] += 1
-            if looks[0] == 25:
-                second = Wire(board)
-                there.append(second.path)
-        return [Port(path, "STLink", 0x0483, 0x374B, "SERIAL1") for path in there]
-
-    monkeypatch.setattr(ports_module, "ports", ports)
-    there.append(first.path)
-    try:
-        url, wait = f"serial:{first.path}", Reconnect(tries=1000, every_s=0.02)
-        with open_device(url, reconnect=wait) as device:
-            there.clear()
-            first.unplug()
-            answer = device.ask(GetInfo(), 0.05)
-            assert isinstance(answer, BoardInfo) and answer.serial == device.board.serial
-            assert device.counters.reconnects == 1 and looks[0] == 25
-    finally:
-        for wire in (first, second):
-            if wire is not None:
-                wire.unplug()
+    board = sim_board()
+    first = bench.plug(board)
+    url, wait = f"serial:{first.path}", Reconnect(tries=1000, every_s=0.02)
+    with open_device(url, reconnect=wait) as device:
+        bench.there.clear()
+        bench.looks = 0
+        bench.on_look = lambda: bench.plug(board) if bench.looks == 25 else None
+        first.unplug()
+        answer = device.ask(GetInfo(), 0.05)
+        assert isinstance(answer, BoardInfo) and answer.serial == device.board.serial
+        assert device.counters.reconnects == 1 and bench.looks == 25
 
 
-def test_a_port_that_comes_back_before_it_may_be_opened_is_tried_again(
-    monkeypatch,
-):
-    board, tries = sim_board(), [0]
-    wire = Wire(board)
-    opened = ports_module.open_port
+def test_a_port_that_comes_back_before_it_may_be_opened_is_tried_again(wire, monkeypatch):
+    tries, opened = count(1), ports_module.open_port
 
     def forbidden_at_first(path: str, baud: int) -> object:
-        tries[0] += 1
-        if tries[0] < 4:
+        if next(tries) < 4:
             raise DeviceError(f"{path}: no permission to open it")
         return opened(path, baud)
 
-    try:
-        wait = Reconnect(tries=1000, every_s=0.02)
-        with open_device(f"serial:{wire.path}", reconnect=wait) as device:
-            monkeypatch.setattr(ports_module, "open_port", forbidden_at_first)
-            monkeypatch.setattr(device.transport._port, "read", lambda count: os.read(-1, 1))
-            answer = device.ask(GetInfo(), 0.2)
-            assert isinstance(answer, BoardInfo) and tries[0] == 4
-    finally:
-        wire.unplug()
+    wait = Reconnect(tries=1000, every_s=0.02)
+    with open_device(f"serial:{wire.path}", reconnect=wait) as device:
+        monkeypatch.setattr(ports_module, "open_port", forbidden_at_first)
+        monkeypatch.setattr(device.transport._port, "read", lambda count: os.read(-1, 1))
+        answer = device.ask(GetInfo(), 0.2)
+        assert isinstance(answer, BoardInfo) and next(tries) == 5
 
 
-def test_another_board_in_its_place_is_refused(monkeypatch):
-    first, there = Wire(sim_board(), frame_s=0.005), []
-    monkeypatch.setattr(
-        ports_module, "ports", lambda: [Port(path, "", 0x0483, 0x374B, "SERIAL1") for path in there]
-    )
-    there.append(first.path)
+def test_another_board_in_its_place_is_refused(bench):
     other = BoardFrames(replace(scene(), name="other"))  # another scene, another serial number
-    second = Wire(SimBoard(other, [bank_bytes(prebuilt()[1], 1), empty_bank()]))
-    try:
-        with (
-            quick(f"serial:{first.path}") as device,
-            pytest.raises(DeviceError, match="another board came back"),
-        ):
-            for k, _ in enumerate(device.stream(Stream.RAW)):
-                if k == 5:
-                    there[:] = [second.path]
-                    first.unplug()
-                assert k < 1000
-    finally:
-        second.unplug()
+    second = SimBoard(other, [bank_bytes(prebuilt()[1], 1), empty_bank()])
+    first = bench.plug(sim_board(), frame_s=0.005)
+    with (
+        quick(f"serial:{first.path}") as device,
+        pytest.raises(DeviceError, match="another board came back"),
+    ):
+        for k, _ in enumerate(device.stream(Stream.RAW)):
+            if k == 5:
+                bench.plug(second)
+                first.unplug()
+            assert k < 1000
 
 
-def test_unplugged_for_good_is_an_error_and_no_hang():
-    wire = Wire(sim_board())
+def test_unplugged_for_good_is_an_error_and_no_hang(wire):
+    said = r"the port is gone .*; it did not come back within 0\.06 s: plug it in"
     with open_device(f"serial:{wire.path}", reconnect=Reconnect(tries=3, every_s=0.02)) as device:
         began = time.monotonic()
-        with pytest.raises(
-            DeviceError,
-            match=r"the port is gone .*; it did not come back within 0\.06 s: plug it in",
-        ):
+        with pytest.raises(DeviceError, match=said):
             for k, _ in enumerate(device.stream(Stream.RAW)):
                 if k == 3:
                     wire.unplug()
@@ -206,23 +178,18 @@ def test_unplugged_for_good_is_an_error_and_no_hang():
             device.info()
 
 
-def test_a_board_that_dies_on_a_port_that_stays():
-    wire = Wire(sim_board())
-    try:
-        with open_device(f"serial:{wire.path}") as device:
-            wire._stop.set()
-            wire._thread.join(5)
-            with pytest.raises(DeviceError, match="has fallen silent: TARE is not answered within"):
-                device.send_command(Tare(4), 0.1)
-    finally:
-        wire.unplug()
+def test_a_board_that_dies_on_a_port_that_stays(wire):
+    with open_device(f"serial:{wire.path}") as device:
+        wire._stop.set()
+        wire._thread.join(5)
+        with pytest.raises(DeviceError, match="has fallen silent: TARE is not answered within"):
+            device.send_command(Tare(4), 0.1)
 
 
 def test_a_port_that_is_not_there(monkeypatch):
     monkeypatch.setattr(ports_module, "ports", lambda: [Port("/dev/ttyS9", "old thing")])
-    with pytest.raises(
-        DeviceError, match=r"/dev/ttyNONE: no such port; there are: /dev/ttyS9 \(old thing\)"
-    ):
+    said = r"/dev/ttyNONE: no such port; there are: /dev/ttyS9 \(old thing\)"
+    with pytest.raises(DeviceError, match=said):
         open_device("serial:/dev/ttyNONE")
 
 
@@ -238,9 +205,6 @@ def test_a_busy_port(wire):
 
 def test_a_port_without_permission(wire, monkeypatch):
     """Superusers may open anything, so the refusal itself is put in by hand."""
-    import errno
-
-    import serial
 
     def refuse(*args: object, **kinds: object) -> None:
         raise serial.SerialException(errno.EACCES, "could not open port: Permission denied")
@@ -265,7 +229,7 @@ def test_what_is_no_serial_port(kind, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-BOARD = Port("/dev/ttyACM0", "STM32 STLink", 0x0483, 0x374B, "A")
+BOARD, SECOND = st_link("/dev/ttyACM0", "A"), st_link("/dev/ttyACM1", "C")
 OTHER = Port("/dev/ttyUSB0", "adapter", 0x0403, 0x6001, "B")
 
 
@@ -274,10 +238,7 @@ OTHER = Port("/dev/ttyUSB0", "adapter", 0x0403, 0x6001, "B")
     [
         ([], r"no ST-LINK port is there \(serial ports: none\)"),
         ([OTHER], r"no ST-LINK port is there \(serial ports: /dev/ttyUSB0 \(adapter\)\)"),
-        (
-            [BOARD, Port("/dev/ttyACM1", "STM32 STLink", 0x0483, 0x374E, "C"), OTHER],
-            r"several boards .*ttyACM0.*ttyACM1",
-        ),
+        ([BOARD, replace(SECOND, product=0x374E), OTHER], r"several boards .*ttyACM0.*ttyACM1"),
     ],
 )
 def test_auto_needs_exactly_one_board(found, message, monkeypatch):
@@ -287,9 +248,7 @@ def test_auto_needs_exactly_one_board(found, message, monkeypatch):
 
 
 def test_auto_takes_the_one_board(wire, monkeypatch):
-    monkeypatch.setattr(
-        ports_module, "ports", lambda: [OTHER, Port(wire.path, "STLink", 0x0483, 0x374B, "A")]
-    )
+    monkeypatch.setattr(ports_module, "ports", lambda: [OTHER, st_link(wire.path)])
     with open_device("auto") as device:
         assert device.transport.name == wire.path
 
