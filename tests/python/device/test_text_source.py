@@ -7,17 +7,20 @@ import socket
 import threading
 import tty
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
 import pytest
-from device_helpers import frames
+from device_helpers import frames, of
 
+from eitskin.device import source as source_module
 from eitskin.device.link import LinkEvent, Reconnect
 from eitskin.device.open import open_device
 from eitskin.device.text_port import FileLines
 from eitskin.device.text_source import TextSource
+from eitskin.device.wire.codec import LinkCounters
 from eitskin.device.wire.link_table import FaultCode, Stream
 from eitskin.device.wire.packets import Fault, RawFrame, SolvedTouches
 from eitskin.errors import ConfigError, DeviceError, EitskinError, FrameError, UsageError
@@ -60,52 +63,62 @@ def lines(values: np.ndarray | None = None) -> list[str]:
 
 @pytest.fixture
 def layout(tmp_path) -> Path:
-    path = tmp_path / "layout.toml"
-    path.write_text(LAYOUT)
-    return path
+    return layout_file(tmp_path, LAYOUT)
 
 
-def written(tmp_path: Path, text: str | bytes) -> Path:
-    path = tmp_path / "lines.csv"
+def layout_file(folder: Path, text: str) -> Path:
+    (folder / "layout.toml").write_text(text)
+    return folder / "layout.toml"
+
+
+def url_of(folder: Path, layout: Path, text: str | bytes) -> str:
+    """The device of these lines."""
+    path = folder / "lines.csv"
     path.write_bytes(text.encode() if isinstance(text, str) else text)
-    return path
+    return f"text:{path}?layout={layout}"
 
 
-def streamed(url: str, what: Stream = Stream.RAW, *, tare: int = 8, count: int = 0) -> list:
+def piped(folder: Path, data: bytes) -> Path:
+    """A fifo that someone writes ``data`` to."""
+    fifo = folder / "fifo"
+    os.mkfifo(fifo)
+    threading.Thread(target=fifo.write_bytes, args=(data,), daemon=True).start()
+    return fifo
+
+
+def streamed(url: str, *, tare: int = 8) -> tuple[list[object], LinkCounters]:
+    """The raw frames after a tare and what else was told; what was counted."""
     with open_device(url) as device:
         device.tare(tare)
-        items = list(device.stream(what, frames=count))
-        return [*items, device.counters]
+        return list(device.stream(Stream.RAW)), device.counters
+
+
+def voltages(items: list[object]) -> np.ndarray:
+    return np.array([raw.voltage_v for raw in of(RawFrame, items)])
 
 
 def test_a_file_of_lines_is_streamed_as_a_board_is(tmp_path, layout):
-    path = written(tmp_path, "\r\n".join(lines()))
-    url = f"text:{path}?layout={layout}"
-    with open_device(url) as device:
+    with open_device(url_of(tmp_path, layout, "\r\n".join(lines()))) as device:
         assert device.board.board == "text" and device.board.frames_given
         assert device.board.frame_period_us == 20_000
         device.tare(8)
         items = list(device.stream(Stream.RAW | Stream.TOUCHES))
         with pytest.raises(DeviceError, match="its frames are another instrument's"):
             device.scan(samples=40)
-    raw = [item for item in items if isinstance(item, RawFrame)]
-    assert np.allclose([one.voltage_v for one in raw], volts()[8:], rtol=1e-5, atol=2e-9)
-    assert np.diff([one.time_us for one in raw]).tolist() == [20_000] * 9
-    touches = [item for item in items if isinstance(item, SolvedTouches)][-1].touches
-    assert len(touches) == 1
-    assert np.hypot(touches[0].x_mm + 40, touches[0].y_mm - 10) < 3
+    assert np.allclose(voltages(items), volts()[8:], rtol=1e-5, atol=2e-9)
+    assert np.diff([one.time_us for one in of(RawFrame, items)]).tolist() == [20_000] * 9
+    (touch,) = of(SolvedTouches, items)[-1].touches
+    assert np.hypot(touch.x_mm + 40, touch.y_mm - 10) < 3
 
 
 def test_a_voltage_reaches_the_core_as_it_was_written(tmp_path):
     """No converter stands between: float32 of the line's number, whatever its size."""
     given = volts() * 1e-6
     given[:, 7] = 1.234567e-9
-    (tmp_path / "l.toml").write_text("[lines]\ncells = 208\n[port]\nrate_hz = 1\n")
-    path = written(tmp_path, "\n".join(" ".join(map(repr, row)) for row in given.tolist()))
-    (tmp_path / "l.toml").write_text('[lines]\ndelimiter = "space"\n[port]\nrate_hz = 1\n')
-    *items, _ = streamed(f"text:{path}?layout={tmp_path / 'l.toml'}")
-    got = np.array([item.voltage_v for item in items if isinstance(item, RawFrame)])
-    assert np.array_equal(np.abs(got), np.abs(given[8:].astype(np.float32)))
+    layout = layout_file(tmp_path, '[lines]\ndelimiter = "space"\n[port]\nrate_hz = 1\n')
+    text = "\n".join(" ".join(map(repr, row)) for row in given.tolist())
+    items, _ = streamed(url_of(tmp_path, layout, text))
+    assert np.array_equal(np.abs(voltages(items)), np.abs(given[8:].astype(np.float32)))
 
 
 def test_lines_that_are_no_frames_are_counted_told_once_and_skipped(tmp_path, layout):
@@ -114,25 +127,20 @@ def test_lines_that_are_no_frames_are_counted_told_once_and_skipped(tmp_path, la
     holes = good[12].split(",")
     holes[3], holes[40], holes[41], holes[42] = "nan", "", "-inf", "7..5"
     bad = ["Board ready", "\xff\xfe\x00 garbage", short[0], short[1], "", "# a comment"]
-    path = written(
-        tmp_path, "\r\n".join([*good[:11], *bad, ",".join(holes), *good[13:]]).encode("latin-1")
-    )
-    *items, counters = streamed(f"text:{path}?layout={layout}")
-    events = [item for item in items if isinstance(item, LinkEvent)]
-    raw = [item for item in items if isinstance(item, RawFrame)]
+    text = "\r\n".join([*good[:11], *bad, ",".join(holes), *good[13:]]).encode("latin-1")
+    items, counters = streamed(url_of(tmp_path, layout, text))
+    events = of(LinkEvent, items)
     assert counters.lines_skipped == 4
     assert [event.kind for event in events] == ["skipped", "skipped"]
     assert "has 1 numbers where 209" in events[0].text
     assert "line 14 has 208 numbers where 209 should be" in events[1].text
-    assert len(raw) == 9
-    unusable = [np.flatnonzero(np.isnan(one.voltage_v)).tolist() for one in raw]
-    assert unusable[:3] == [[], [], []] and len(unusable[3]) == 4 and unusable[4:] == [[]] * 5
+    unusable = np.isnan(voltages(items)).sum(axis=1).tolist()
+    assert unusable == [0, 0, 0, 4, 0, 0, 0, 0, 0]
 
 
 def test_a_tare_of_too_few_lines_is_refused_and_does_not_hang(tmp_path, layout):
-    path = written(tmp_path, "\n".join(lines()[:5]))
     with pytest.raises(DeviceError, match="too few frames"):
-        streamed(f"text:{path}?layout={layout}", tare=16)
+        streamed(url_of(tmp_path, layout, "\n".join(lines()[:5])), tare=16)
 
 
 class Board:
@@ -159,6 +167,8 @@ class Board:
                 continue
 
     def unplug(self) -> None:
+        if self._stop.is_set():
+            return
         self._stop.set()
         self._thread.join(5)
         self._path.unlink(missing_ok=True)
@@ -168,16 +178,14 @@ class Board:
 
 @pytest.fixture
 def boards() -> Iterator[Callable[..., Board]]:
-    made: list[Board] = []
+    with ExitStack() as stack:
 
-    def make(*words: object, **more: object) -> Board:
-        made.append(Board(*words, **more))
-        return made[-1]
+        def make(*words: object, **more: object) -> Board:
+            made = Board(*words, **more)
+            stack.callback(made.unplug)
+            return made
 
-    yield make
-    for board in made:
-        if not board._stop.is_set():
-            board.unplug()
+        yield make
 
 
 def test_a_board_on_a_port_that_goes_away_and_comes_back(tmp_path, layout, boards):
@@ -200,10 +208,9 @@ def test_a_board_on_a_port_that_goes_away_and_comes_back(tmp_path, layout, board
 
 
 def test_a_silent_board_is_a_fault_and_no_hang(tmp_path, layout, monkeypatch):
-    from eitskin.device import source
 
-    monkeypatch.setattr(source, "SILENT_S", 0.02)
-    monkeypatch.setattr(source, "SILENT_PERIODS", 0)
+    monkeypatch.setattr(source_module, "SILENT_S", 0.02)
+    monkeypatch.setattr(source_module, "SILENT_PERIODS", 0)
     layout.write_text(LAYOUT + "[port]\nrate_hz = 1000\n")
     fifo, over = tmp_path / "fifo", threading.Event()
     os.mkfifo(fifo)
@@ -235,11 +242,9 @@ def test_a_silent_board_is_a_fault_and_no_hang(tmp_path, layout, monkeypatch):
     ids=("garbage", "words", "nothing"),
 )
 def test_nothing_of_use_comes(tmp_path, layout, sent, said):
-    fifo = tmp_path / "fifo"
-    os.mkfifo(fifo)
-    threading.Thread(target=fifo.write_bytes, args=(sent,), daemon=True).start()
+    fifo, wait_s = piped(tmp_path, sent), 10 if sent else 0.05
     with pytest.raises(DeviceError, match=said) as caught:
-        open_device(f"text:{fifo}?layout={layout}&wait={0.05 if not sent else 10}")
+        open_device(f"text:{fifo}?layout={layout}&wait={wait_s}")
     assert "\n" not in str(caught.value)
 
 
@@ -276,11 +281,9 @@ def test_a_connection_and_a_fifo(tmp_path, layout):
     with open_device(f"text:socket://127.0.0.1:{port}?layout={layout}") as device:
         assert device.board.tared == 0
     server.close()
-    fifo = tmp_path / "fifo"
-    os.mkfifo(fifo)
-    threading.Thread(target=fifo.write_bytes, args=(data,), daemon=True).start()
-    *items, _ = streamed(f"text:{fifo}?layout={layout}")  # what nobody wanted yet has waited
-    assert sum(isinstance(item, RawFrame) for item in items) == 10
+    fifo = piped(tmp_path, data)
+    items, _ = streamed(f"text:{fifo}?layout={layout}")  # what nobody wanted yet has waited
+    assert len(of(RawFrame, items)) == 10
     with pytest.raises(DeviceError, match="no connection"):
         open_device(f"text:socket://127.0.0.1:{port}?layout={layout}")
 
@@ -300,7 +303,9 @@ def test_boards_of_others_as_their_sources_print(tmp_path, name, kind, line):
     given = np.round(np.random.default_rng(1).uniform(0.5, 2.0, (4, count)), 4)
     layout = load_layout(EXAMPLES / f"{name}.toml")
     text = "\r\n".join(["OpenEIT", "mode 3: imaging", *map(line, given), ""])
-    source = TextSource(FileLines(str(written(tmp_path, text))), layout, name)
+    path = tmp_path / "lines.txt"
+    path.write_text(text, newline="")
+    source = TextSource(FileLines(str(path)), layout, name)
     source.use_model(model)
     got = [frame.voltage_v for _ in range(6) for frame in source.read(0.0)]
     scale = layout.options.source.scale or 1.0
@@ -318,21 +323,16 @@ def model_v(model) -> np.ndarray:
 
 
 def test_the_example_of_a_source_is_one(monkeypatch):
-    from eitskin.device import source
 
     monkeypatch.syspath_prepend(EXAMPLES)
-    points = {
-        "breathing": "own_source:open_source",
-        "broken": "own_source:absent",
-        "wrong": "builtins:str",
-    }
+    points = [("breathing", "own_source:open_source"), ("broken", "own_source:absent"),
+              ("wrong", "builtins:str")]  # fmt: skip
 
     def found(*, group: str, name: str | None = None) -> list[EntryPoint]:
         assert group == "eitskin.sources"
-        named = {key: value for key, value in points.items() if name in (None, key)}
-        return [EntryPoint(key, value, group) for key, value in named.items()]
+        return [EntryPoint(key, value, group) for key, value in points if name in (None, key)]
 
-    monkeypatch.setattr(source, "entry_points", found)
+    monkeypatch.setattr(source_module, "entry_points", found)
     with open_device("breathing:500") as device:
         assert (device.board.board, device.board.frame_period_us) == ("breathing", 2000)
         device.tare(8)
@@ -372,11 +372,9 @@ def test_the_example_of_a_source_is_one(monkeypatch):
     ],
 )
 def test_a_layout_that_does_not_fit_is_one_line(tmp_path, content, said):
-    path = tmp_path / "l.toml"
-    path.write_text(content)
-    source = written(tmp_path, "\n".join(line.partition(",")[2] for line in lines()[:3]))
+    text = "\n".join(line.partition(",")[2] for line in lines()[:3])
     with pytest.raises((ConfigError, FrameError, UsageError, DeviceError), match=said) as caught:
-        open_device(f"text:{source}?layout={path}")
+        open_device(url_of(tmp_path, layout_file(tmp_path, content), text))
     assert "\n" not in str(caught.value)
 
 
@@ -398,27 +396,22 @@ def test_a_url_that_cannot_be_is_one_line(layout, url, said):
 
 
 def test_a_layout_comes_back_as_it_was_saved(tmp_path, layout):
-    given = load_layout(layout)
-    save_layout(tmp_path / "again.toml", given)
-    assert load_layout(tmp_path / "again.toml") == given
-    for path in sorted(EXAMPLES.glob("*.toml")):
-        save_layout(tmp_path / "again.toml", load_layout(path))
-        again, before = load_layout(tmp_path / "again.toml"), load_layout(path)
+    path = tmp_path / "again.toml"
+    for given in (load_layout(layout), Layout()):
+        save_layout(path, given)
+        assert load_layout(path) == given
+    for before in map(load_layout, sorted(EXAMPLES.glob("*.toml"))):
+        save_layout(path, before)
+        again = load_layout(path)
         assert (again.options, again.send, again.baud) == (before.options, before.send, before.baud)
-    save_layout(tmp_path / "empty.toml", Layout())
-    assert load_layout(tmp_path / "empty.toml") == Layout()
 
 
 def test_magnitudes_and_phases_are_turned_as_a_board_turns_them(tmp_path):
     """Pairs with a common phase of 40 degrees: the application finds it at the tare."""
     z = volts() * np.exp(1j * np.deg2rad(40.0))
     pairs = np.stack([np.abs(z), np.rad2deg(np.angle(z))], axis=2).reshape(len(z), -1)
-    path = written(tmp_path, "\n".join("\t".join(map(repr, row)) for row in pairs.tolist()))
-    layout = tmp_path / "polar.toml"
-    layout.write_text(
-        '[lines]\ndelimiter = "tab"\ncells = 416\npairs = "magnitude-degrees"\n'
-        'complex_part = "in-phase"\n'
-    )
-    *items, _ = streamed(f"text:{path}?layout={layout}")
-    got = np.array([item.voltage_v for item in items if isinstance(item, RawFrame)])
-    assert np.allclose(got, volts()[8:], rtol=1e-4, atol=1e-7)
+    text = '[lines]\ndelimiter = "tab"\ncells = 416\npairs = "magnitude-degrees"\n'
+    layout = layout_file(tmp_path, text + 'complex_part = "in-phase"\n')
+    content = "\n".join("\t".join(map(repr, row)) for row in pairs.tolist())
+    items, _ = streamed(url_of(tmp_path, layout, content))
+    assert np.allclose(voltages(items), volts()[8:], rtol=1e-4, atol=1e-7)
