@@ -1,5 +1,6 @@
 """Running the command line in this process, and the files that it is given."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,19 @@ def refused(tmp_path, capsys) -> Refused:
 
 
 @pytest.fixture
+def ran(capsys) -> Callable[..., tuple[str, str]]:
+    """Run the command; it must give ``code``. Returns what it printed, on stdout and stderr."""
+
+    def run(code: int, *arguments: object) -> tuple[str, str]:
+        capsys.readouterr()
+        assert main(words(*arguments)) == code
+        out, err = capsys.readouterr()
+        return out, err
+
+    return run
+
+
+@pytest.fixture
 def done(capsys) -> Callable[..., str]:
     """Run the command; it must succeed in silence on stderr. Returns what it printed."""
 
@@ -80,3 +94,14 @@ def done(capsys) -> Callable[..., str]:
         return out
 
     return run
+
+
+@pytest.fixture
+def told(done) -> Callable[..., Any]:
+    """What the command says with ``--json``, in JSON as the standard has it: NaN and Infinity are
+    none."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} is no JSON")
+
+    return lambda *arguments: json.loads(done(*arguments, "--json"), parse_constant=refuse)

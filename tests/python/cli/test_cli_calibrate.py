@@ -21,6 +21,7 @@ from eitskin.device.wire.link_table import Stream
 from eitskin.model.eitm import decode_model, load_model
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import load_scene
+from fresh_python import words
 from small_models import prebuilt
 
 GRAMS = (50, 80, 100, 150, 200)
@@ -62,30 +63,26 @@ def folder(tmp_path_factory) -> Path:
         scene, weights = bench(name, presses)
         (path / f"{name}.toml").write_text(scene)
         (path / f"{name}.csv").write_text(weights)
-        assert (
-            main(["scene", "run", str(path / f"{name}.toml"), "-o", str(path / f"{name}.npz")]) == 0
-        )
+        assert not main(words("scene run", path / f"{name}.toml", "-o", path / f"{name}.npz"))
     frames, listed, out = (str(path / name) for name in ("weights.npz", "weights.csv", "skin.eitm"))
     assert main(["calibrate", frames, "--weights", listed, "-o", out]) == 0
     return path
 
 
-def test_presses_that_it_never_saw_read_their_load(folder, done):
-    told = json.loads(
-        done("reconstruct", folder / "new.npz", "--model", folder / "skin.eitm", "--json")
-    )
-    for frame, (place, grams) in zip(told["frames"], NEW, strict=True):
+def test_presses_that_it_never_saw_read_their_load(folder, done, told):
+    said = told(f"reconstruct {folder / 'new.npz'} --model {folder / 'skin.eitm'}")
+    for frame, (place, grams) in zip(said["frames"], NEW, strict=True):
         (touch,) = frame["touches"]
         assert np.hypot(touch["x_mm"] - place[0], touch["y_mm"] - place[1]) < 1
         assert touch["force_n"] / NEWTONS_PER_GRAM == pytest.approx(grams, rel=SOME)
-    text = done("reconstruct", folder / "new.npz", "--model", folder / "skin.eitm")
+    text = done(f"reconstruct {folder / 'new.npz'} --model {folder / 'skin.eitm'}")
     assert "load g" in text.splitlines()[0]
-    assert "load g" not in done("reconstruct", folder / "new.npz").splitlines()[0]
+    assert "load g" not in done(f"reconstruct {folder / 'new.npz'}").splitlines()[0]
 
 
-def test_it_says_what_it_found(folder, done):
+def test_it_says_what_it_found(folder, done, told):
     arguments = ("calibrate", folder / "weights.npz", "--weights", folder / "weights.csv")
-    facts = json.loads(done(*arguments, "--json"))
+    facts = told(*arguments)
     model = load_model(folder / "skin.eitm")[0]
     assert (facts["presses"], facts["places"], facts["left_out"]) == (50, 10, [])
     assert model.meta["calibration"] == {key: facts[key] for key in model.meta["calibration"]}
@@ -93,10 +90,10 @@ def test_it_says_what_it_found(folder, done):
     lines = done(*arguments).splitlines()
     assert lines[0] == "50 presses at 10 places, 200.0 g the greatest"
     assert lines[-1] == "not stored; name a model with -o"
-    info = done("model", "info", folder / "skin.eitm")
+    info = done(f"model info {folder / 'skin.eitm'}")
     assert "loads to 200.0 g, 95 % within" in info
-    assert "none; touches have no load" in done("model", "info")
-    done("model", "verify", folder / "skin.eitm")
+    assert "none; touches have no load" in done("model info")
+    done(f"model verify {folder / 'skin.eitm'}")
 
 
 def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
@@ -131,7 +128,7 @@ def test_a_board_with_that_model_sends_the_same_load_bits(folder, tmp_path):
     assert (check.touches, check.different) == (len(NEW), [])
 
 
-def test_a_recorded_run_calibrates_too(folder, tmp_path, done):
+def test_a_recorded_run_calibrates_too(folder, tmp_path, done, told):
     path, listed = tmp_path / "run.eits", tmp_path / "run.toml"
     live = recorded(folder, prebuilt()[1], path)
     tables = [
@@ -139,7 +136,7 @@ def test_a_recorded_run_calibrates_too(folder, tmp_path, done):
         for frame, ((x_mm, y_mm), grams) in zip(live, NEW, strict=True)
     ]
     listed.write_text("\n".join(tables))
-    facts = json.loads(done("calibrate", path, "--weights", listed, "--json"))
+    facts = told(f"calibrate {path} --weights {listed}")
     assert (facts["presses"], facts["places"], facts["gain_order"]) == (4, 4, 0)
     assert "4 places: the gain is taken to be the same everywhere" in facts["notes"][0]
     both = (
@@ -155,8 +152,7 @@ def test_a_recorded_run_calibrates_too(folder, tmp_path, done):
     assert json.loads(done(*both))["presses"] == 54
 
 
-def test_weights_that_do_not_show_are_named(folder, tmp_path, capsys):
-    from eitskin.cli.main import main
+def test_weights_that_do_not_show_are_named(folder, tmp_path, ran):
 
     rows = (folder / "weights.csv").read_text().splitlines()
     elsewhere = [
@@ -166,10 +162,8 @@ def test_weights_that_do_not_show_are_named(folder, tmp_path, capsys):
     ]  # that one stands near the rim
     (tmp_path / "w.csv").write_text("\n".join(elsewhere))
     assert (
-        main(["calibrate", str(folder / "weights.npz"), "--weights", str(tmp_path / "w.csv")]) == 0
-    )
-    assert (
-        "weights.npz: frames 49 to 49: 0 of 1 show the weight; left out" in capsys.readouterr().err
+        "weights.npz: frames 49 to 49: 0 of 1 show the weight; left out"
+        in ran(0, f"calibrate {folder / 'weights.npz'} --weights {tmp_path / 'w.csv'}")[1]
     )
 
 
@@ -188,7 +182,7 @@ def test_refusals(folder, refused, tmp_path):
     )
     assert (
         "no such frames file"
-        in refused(3, "calibrate", tmp_path / "none.npz", "--weights", listed).lower()
+        in refused(3, f"calibrate {tmp_path / 'none.npz'} --weights {listed}").lower()
     )
     assert "--seed -1 must be 0 or above" in refused(
         2, f"calibrate {frames} --weights {listed} --seed -1"

@@ -11,12 +11,11 @@ import pytest
 from board_cases import board_of, write_scene
 
 from board_on_a_port import behind_a_port
-from eitskin.cli.main import main
 from eitskin.device.ports import Port
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.frames.frames import load_frames
 from eitskin.model.model import Model
-from fresh_python import run_python, words
+from fresh_python import run_python
 from small_models import prebuilt, small_blob
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -48,7 +47,7 @@ def json_lines(text: str) -> list[dict[str, Any]]:
 def test_two_touches_within_two_millimetres_of_the_scene(done, tmp_path, monkeypatch):
     """The issue's own words, before the simulated board; the emulated one has the same test."""
     monkeypatch.chdir(tmp_path)
-    out = done("stream", "--device", "sim:two_touch.toml", "--frames", "20", "-v")
+    out = done("stream --device sim:two_touch.toml --frames 20 -v")
     lines = out.splitlines()
     assert len(lines) == 22
     for line in lines[:20]:
@@ -69,9 +68,7 @@ def test_image_places_and_picture(done, tmp_path):
 
 
 def test_stream_for_programs(done, scene):
-    *frames, last = json_lines(
-        done("stream", "--device", f"sim:{scene}", "--mode", "raw,image,touches", "--json")
-    )
+    *frames, last = json_lines(done(f"stream --device sim:{scene} --mode raw,image,touches --json"))
     assert len(frames) == FRAMES
     numbers = [frame["frame"] for frame in frames]
     assert numbers == list(range(numbers[0], numbers[0] + FRAMES))
@@ -89,7 +86,7 @@ def test_stream_for_programs(done, scene):
 
 
 def test_raw_lines_tell_of_the_scan(done, scene):
-    full = done("stream", "--device", f"sim:{scene}", "--mode", "raw", "--frames", "2").splitlines()
+    full = done(f"stream --device sim:{scene} --mode raw --frames 2").splitlines()
     assert all("raw: 208 rows in 20.78 ms" in line and "copied" not in line for line in full[:2])
     halved = done(f"stream --device sim:{scene} --mode raw --frames 2 --reciprocal 0 --tare 4")
     assert halved.count("raw: 208 rows in 10.38 ms") == halved.count("104 copied") == 2
@@ -106,11 +103,11 @@ def test_raw_lines_tell_of_the_scan(done, scene):
         ("--full", {"check_every": 1}),
     ],
 )
-def test_scan_options_reach_the_board(options, expected, done, scene, tmp_path):
+def test_scan_options_reach_the_board(options, expected, done, told, scene, tmp_path):
     """What a recording says of the board was asked after the scan was set."""
     run = tmp_path / "run.eits"
-    done("record", "--device", f"sim:{scene}", "-o", run, "--frames", "1", options)
-    board = strict(done("info", "--device", f"file:{run}", "--json"))["board"]
+    done(f"record --device sim:{scene} -o {run} --frames 1", options)
+    board = told(f"info --device file:{run}")["board"]
     assert {name: board[name] for name in expected} == expected
 
 
@@ -118,7 +115,7 @@ def test_solver_options_reach_the_board(done, scene):
     def infos(*options: str) -> list[dict[str, Any]]:
         # a press that fades, solved coarsely, may be called crowded
         quietly = () if "--ignore" in options else ("--ignore", "crowded")
-        lines = json_lines(done("stream", "--device", f"sim:{scene}", "--json", *options, *quietly))
+        lines = json_lines(done(f"stream --device sim:{scene} --json", *options, *quietly))
         return [line["info"] for line in lines[:-1]]
 
     assert {info["iterations"] for info in infos("--iterations", "7")} == {7}
@@ -131,12 +128,11 @@ def test_solver_options_reach_the_board(done, scene):
     assert all(info["diagnostics"] == [] for info in other)
 
 
-def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene, capsys):
+def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene, ran):
     """Touches that conduct, where what insulates is looked for, are what a stale reference
     gives."""
     arguments = ["stream", "--device", f"sim:{scene}", "--sign", "decrease"]
-    assert main([*arguments, "--json"]) == 0
-    out, err = capsys.readouterr()
+    out, err = ran(0, *arguments, "--json")
     frames = json_lines(out)[:-1]
     shown = [
         frame["frame"] for frame in frames if "stale reference" in frame["info"]["diagnostics"]
@@ -147,15 +143,13 @@ def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene, capsys)
         f"eitskin: stale reference, frame {shown[2]}: the skin has changed since it was taken;"
         " leave it untouched and run  eitskin tare"
     ]
-    assert main([*arguments, "--ignore", "stale-reference,crowded"]) == 0
-    out, err = capsys.readouterr()
+    out, err = ran(0, *arguments, "--ignore stale-reference,crowded")
     assert "stale" not in out + err
-    assert main([*arguments, "--ignore", "stale"]) == 2
-    assert "--ignore stale: " in capsys.readouterr().err
+    assert "--ignore stale: " in ran(2, *arguments, "--ignore stale")[1]
 
 
 def test_every_other_frame(done, scene):
-    frames = json_lines(done("stream", "--device", f"sim:{scene}", "--every", "2", "--json"))[:-1]
+    frames = json_lines(done(f"stream --device sim:{scene} --every 2 --json"))[:-1]
     assert np.diff([frame["frame"] for frame in frames]).tolist() == [2] * (FRAMES // 2 - 1)
 
 
@@ -170,51 +164,47 @@ def test_another_model_than_the_prebuilt_one(done, scene, tmp_path):
         "--ignore",
         "model-mismatch",
     )  # the coarse model does not fit the scene well
-    frames = json_lines(done("stream", *given, "--mode", "image", "--json"))
+    frames = json_lines(done("stream", *given, "--mode image --json"))
     assert len(frames) == FRAMES + 1 and len(frames[0]["image_s_per_m"]) < 812
 
 
 # ---- a serial port ----
 
 
-def test_a_board_on_a_port(scene, capsys):
+def test_a_board_on_a_port(scene, ran):
     board = board_of(scene)
     with behind_a_port(board) as port:
         device = f"serial:{port}"
-        assert main(["stream", "--device", device, "--frames", "3", "-v"]) == 0
-        out, err = capsys.readouterr()
+        out, err = ran(0, f"stream --device {device} --frames 3 -v")
         assert "leave the skin untouched: taking the reference from 16 frames" in err
         assert "touch it" in err
         assert all(
             line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (below-threshold)")
             for line in out.splitlines()[:3]
         )
-        assert (
-            main(["stream", "--device", device, "--frames", "3"]) == 0
-        )  # it has its reference already
-        out, err = capsys.readouterr()
+        out, err = ran(0, f"stream --device {device} --frames 3")
         assert err == "" and out.startswith("  time s  touch    x mm    y mm")
         assert [line.split()[1] for line in out.splitlines()[1:4]] == 3 * ["-"]
-        assert main(["tare", "--device", device, "--frames", "4", "--json"]) == 0
-        assert strict(capsys.readouterr().out) == {"device": device, "frames": 4, "tared": True}
-        assert main(["info", "--device", device, "--json"]) == 0
-        facts = strict(capsys.readouterr().out)
+        assert strict(ran(0, f"tare --device {device} --frames 4 --json")[0]) == {
+            "device": device,
+            "frames": 4,
+            "tared": True,
+        }
+        facts = strict(ran(0, f"info --device {device} --json")[0])
         assert facts["board"]["tared"] == 1 and facts["statistics"]["frames_scanned"] >= 26
         assert facts["device"] == device
 
 
-def test_a_slow_line_is_not_overrun(scene, capsys):
+def test_a_slow_line_is_not_overrun(scene, ran):
     with behind_a_port(board_of(scene)) as port:
-        assert (
-            main(words(f"stream --device serial:{port}?baud=115200 --mode image --frames 4 --json"))
-            == 0
+        out, err = ran(
+            0, f"stream --device serial:{port}?baud=115200 --mode image --frames 4 --json"
         )
-        out, err = capsys.readouterr()
         assert "the line carries one frame in 7 of image; name another number with  --every" in err
         assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
 
 
-def test_devices_asks_only_what_looks_like_a_board(scene, done, monkeypatch, tmp_path):
+def test_devices_asks_only_what_looks_like_a_board(scene, done, told, monkeypatch, tmp_path):
     with behind_a_port(board_of(scene)) as path:
         found = [
             Port("/dev/ttyS0", "n/a"),
@@ -223,9 +213,9 @@ def test_devices_asks_only_what_looks_like_a_board(scene, done, monkeypatch, tmp
         ]
         monkeypatch.setattr("eitskin.device.open.ports", lambda: found)
         monkeypatch.setattr("eitskin.device.ports.ports", lambda: found)
-        listed = strict(done("devices", "--json"))
+        listed = told("devices")
         text = done("devices")
-        quiet = done("devices", "--quiet")
+        quiet = done("devices --quiet")
     by_path = {port["path"]: port for port in listed["ports"]}
     assert by_path[path]["board"]["board"] == "simulated" and by_path[path]["why"] is None
     assert by_path["/dev/ttyS0"]["board"] is by_path["/dev/ttyS0"]["why"] is None
@@ -245,44 +235,42 @@ def test_no_port_at_all(done, monkeypatch):
 # ---- info, tare ----
 
 
-def test_info_of_a_simulated_board(done):
-    text = done("info", "--device", "sim:two_touch")
+def test_info_of_a_simulated_board(done, told):
+    text = done("info --device sim:two_touch")
     assert "board       simulated" in text and "812 pixels, rank 64, f32" in text
     assert "reference   none; leave the skin untouched and run  eitskin tare" in text
-    facts = strict(done("info", "--device", "sim:two_touch", "--json"))
+    facts = told("info --device sim:two_touch")
     assert facts["board"]["protocol_hash"] == f"{prebuilt()[0].protocol.hash:016x}"
     found = set(facts["statistics"]["stages"])
     assert found == {"scan", "demodulate", "solve", "touches", "send", "frame"}
 
 
 def test_tare(done, scene):
-    found = done("tare", "--device", f"sim:{scene}", "--frames", "4")
+    found = done(f"tare --device sim:{scene} --frames 4")
     assert found == f"sim:{scene}: reference taken from 4 frames\n"
 
 
 # ---- model upload ----
 
 
-def test_model_upload(scene, tmp_path, capsys):
+def test_model_upload(scene, tmp_path, ran):
     model, board = tmp_path / "small.eitm", board_of(scene)
     model.write_bytes(small_blob())
     with behind_a_port(board) as port:
-        assert main(["model", "upload", str(model), "--device", f"serial:{port}", "--json"]) == 0
-        facts = strict(capsys.readouterr().out)
+        facts = strict(ran(0, f"model upload {model} --device serial:{port} --json")[0])
         assert (facts["bank"], facts["bytes"]) == (1, len(small_blob()))
-        assert main(["info", "--device", f"serial:{port}", "--json"]) == 0
-        assert strict(capsys.readouterr().out)["board"]["model_crc"] == facts["model_crc"]
+        assert (
+            strict(ran(0, f"info --device serial:{port} --json")[0])["board"]["model_crc"]
+            == facts["model_crc"]
+        )
         # what needs its pixels now needs the file
         assert (
-            main(["stream", "--device", f"serial:{port}", "--mode", "image", "--frames", "1"]) == 12
+            "needs the board's model"
+            in ran(12, f"stream --device serial:{port} --mode image --frames 1")[1]
         )
-        assert "needs the board's model" in capsys.readouterr().err
-        assert (
-            main(words(f"stream --device serial:{port} --mode image --frames 1 --model {model}"))
-            == 0
-        )
+        ran(0, f"stream --device serial:{port} --mode image --frames 1 --model {model}")
         # touches are millimetres already
-        assert main(["stream", "--device", f"serial:{port}", "--frames", "1"]) == 0
+        ran(0, f"stream --device serial:{port} --frames 1")
 
 
 # ---- flash ----
@@ -304,16 +292,14 @@ def image_file(path: Path) -> Path:
     return path
 
 
-def test_flash_prints_what_it_runs_and_runs_it(tmp_path, monkeypatch, capsys):
+def test_flash_prints_what_it_runs_and_runs_it(tmp_path, monkeypatch, ran):
     log, image = fake_tool(tmp_path, "st-flash"), image_file(tmp_path / "firmware.bin")
     monkeypatch.setenv("PATH", str(tmp_path) + os.pathsep + "/bin")
     flash = ["flash", "--image", str(image), "--tool", "st-flash"]
-    assert main([*flash, "--dry-run"]) == 0
-    planned = capsys.readouterr().out.splitlines()
+    planned = ran(0, *flash, "--dry-run")[0].splitlines()
     assert not log.exists() and str(image) in planned[0] and "0x08000000" in planned[0]
     assert "0x08040000" in planned[1]
-    assert main(flash) == 0
-    out, err = capsys.readouterr()
+    out, err = ran(0, *flash)
     folders = re.compile(r"/eitskin-flash-\w+/")  # of each run its own
     assert not any(Path(folder).exists() for folder in re.findall(r"\S+/eitskin-flash-\w+/", err))
     planned = [folders.sub("/", line) for line in planned]
@@ -321,27 +307,23 @@ def test_flash_prints_what_it_runs_and_runs_it(tmp_path, monkeypatch, capsys):
     assert "eitskin info" in out
     run = [folders.sub("/", f"st-flash {line}") for line in log.read_text().splitlines()]
     assert run == planned
-    assert main([*flash, "--no-model", "--dry-run", "--json"]) == 0
-    assert len(strict(capsys.readouterr().out)["commands"]) == 1
+    assert len(strict(ran(0, *flash, "--no-model --dry-run --json")[0])["commands"]) == 1
     fake_tool(tmp_path, "st-flash", code=3)
-    assert main(flash) == 12
-    assert "ended with 3" in capsys.readouterr().err.splitlines()[-1]
+    assert "ended with 3" in ran(12, *flash)[1].splitlines()[-1]
 
 
 # ---- doctor ----
 
 
-def test_doctor_on_a_healthy_board(done, scene):
-    facts = strict(done("doctor", "--device", f"sim:{scene}", "--frames", "8", "--json"))
+def test_doctor_on_a_healthy_board(told, scene):
+    facts = told(f"doctor --device sim:{scene} --frames 8")
     assert facts["healthy"] and facts["source"] == f"sim:{scene}"
     assert facts["measured"]["quiet_frames"] == 8 and facts["measured"]["board_frames_scanned"] == 8
-    touched = strict(
-        done("doctor", "--device", f"sim:{scene}", "--frames", "6", "--touch=-40,10,9", "--json")
-    )
+    touched = told(f"doctor --device sim:{scene} --frames 6 --touch=-40,10,9")
     assert touched["healthy"] and "numbering_by_touch" in touched["measured"]
 
 
-def test_doctor_on_a_board_that_reports_a_fault(done, scene, monkeypatch, capsys):
+def test_doctor_on_a_board_that_reports_a_fault(done, scene, monkeypatch, ran):
     as_it_is = BoardInfo.fault_codes.fget
     assert as_it_is is not None
     monkeypatch.setattr(
@@ -349,8 +331,7 @@ def test_doctor_on_a_board_that_reports_a_fault(done, scene, monkeypatch, capsys
         "fault_codes",
         property(lambda info: as_it_is(type(info)(**{**vars(info), "faults": 1 << 2}))),
     )
-    assert main(["doctor", "--device", f"sim:{scene}", "--frames", "4", "--json"]) == 11
-    findings = strict(capsys.readouterr().out)["findings"]
+    findings = strict(ran(11, f"doctor --device sim:{scene} --frames 4 --json")[0])["findings"]
     assert [finding["name"] for finding in findings] == ["board-electrode-open"]
     assert findings[0]["repair"] == ""
 
@@ -375,17 +356,17 @@ def test_only_the_named_command_is_imported():
     assert run_python(code).stdout.strip() == "['eitskin.cli.cmd_tare']"
 
 
-def test_frames_of_a_recording_give_the_boards_touches(done, scene, tmp_path):
+def test_frames_of_a_recording_give_the_boards_touches(done, told, scene, tmp_path):
     run, exported = tmp_path / "run.eits", tmp_path / "run.npz"
-    done("record", "--device", f"sim:{scene}", "-o", run)
-    assert done("replay", run, "--frames", exported) == f"{exported}: {FRAMES} frames, 16 quiet\n"
+    done(f"record --device sim:{scene} -o {run}")
+    assert done(f"replay {run} --frames {exported}") == f"{exported}: {FRAMES} frames, 16 quiet\n"
     frames = load_frames(exported)
     assert frames.n_frames == FRAMES and len(frames.reference_voltage_v) == 16
     model: Model = prebuilt()[0]
     assert frames.protocol.hash == model.protocol.hash
     assert frames.meta["board"]["board"] == "simulated"
-    board = json_lines(done("replay", run, "--json"))[:-1]
-    host = strict(done("reconstruct", exported, "--track", "--json"))["frames"]
+    board = json_lines(done(f"replay {run} --json"))[:-1]
+    host = told(f"reconstruct {exported} --track")["frames"]
     assert [[t["x_mm"] for t in f["touches"]] for f in host] == [
         [t["x_mm"] for t in f["touches"]] for f in board
     ]

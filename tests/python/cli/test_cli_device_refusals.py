@@ -13,7 +13,7 @@ from eitskin.device.wire.codec import encode
 from fresh_python import MAIN, run_python, without
 from small_models import small_blob
 
-USAGE, FILE, CONFIG, MODEL, FRAME, EXTRA, DEVICE = 2, 3, 4, 6, 8, 9, 12
+USAGE, FILE, FRAME, EXTRA, DEVICE = 2, 3, 8, 9, 12
 
 
 @pytest.fixture(scope="module")
@@ -136,20 +136,20 @@ def test_a_recording_is_not_written_over(refused, scene, tmp_path):
     path = tmp_path / "run.eits"
     path.write_bytes(b"precious")
     for command in (["record", "-o"], ["stream", "--record"]):
-        assert "exists already" in refused(FILE, *command, path, "--device", f"sim:{scene}")
+        assert "exists already" in refused(FILE, *command, f"{path} --device sim:{scene}")
     assert path.read_bytes() == b"precious"
 
 
-def test_a_recording_takes_no_settings(refused, scene, tmp_path):
+def test_a_recording_takes_no_settings(refused, ran, scene, tmp_path):
     path = tmp_path / "run.eits"
-    assert main(["record", "--device", f"sim:{scene}", "-o", str(path), "--frames", "1"]) == 0
+    ran(0, f"record --device sim:{scene} -o {path} --frames 1")
     for options in (["--samples", "40"], ["--iterations", "3"], ["--tare", "4"], ["--cold"]):
-        assert "is a recording" in refused(USAGE, "stream", "--device", f"file:{path}", *options)
+        assert "is a recording" in refused(USAGE, f"stream --device file:{path}", *options)
     assert "is a recording already" in refused(
         USAGE, f"record --device file:{path} -o {tmp_path / 'again.eits'}"
     )
     for command in (["tare"], ["model", "upload", write_model(tmp_path)]):
-        assert "is a recording" in refused(DEVICE, *command, "--device", f"file:{path}")
+        assert "is a recording" in refused(DEVICE, *command, f"--device file:{path}")
 
 
 def write_model(folder: Path) -> Path:
@@ -158,29 +158,27 @@ def write_model(folder: Path) -> Path:
     return path
 
 
-def test_settings_of_a_recorded_board_are_shown(refused, scene, tmp_path, capsys):
+def test_settings_of_a_recorded_board_are_shown(refused, scene, tmp_path, ran):
     path = tmp_path / "run.eits"
-    assert main(["record", "--device", f"sim:{scene}", "--frames", "1", "-o", str(path)]) == 0
-    assert main(["board", "--device", f"file:{path}"]) == 0
-    assert "settings  none" in capsys.readouterr().out
-    assert "is a recording" in refused(DEVICE, "board", "--lock", "--device", f"file:{path}")
+    ran(0, f"record --device sim:{scene} --frames 1 -o {path}")
+    assert "settings  none" in ran(0, f"board --device file:{path}")[0]
+    assert "is a recording" in refused(DEVICE, f"board --lock --device file:{path}")
 
 
-def test_a_recording_without_raw_frames(refused, scene, tmp_path):
+def test_a_recording_without_raw_frames(refused, ran, scene, tmp_path):
     path = tmp_path / "run.eits"
-    assert main(["record", "--device", f"sim:{scene}", "-o", str(path), "--mode", "touches"]) == 0
-    assert "nothing to compare" in refused(FRAME, "replay", path, "--check")
-    assert "no raw frames" in refused(FRAME, "replay", path, "--frames", tmp_path / "x.npz")
+    ran(0, f"record --device sim:{scene} -o {path} --mode touches")
+    assert "nothing to compare" in refused(FRAME, f"replay {path} --check")
+    assert "no raw frames" in refused(FRAME, f"replay {path} --frames {tmp_path / 'x.npz'}")
 
 
 # ---- ports ----
 
 
-def test_a_board_without_a_model(scene, capsys):
+def test_a_board_without_a_model(scene, capsys, ran):
     with behind_a_port(board_of(scene, b"")) as port:
         device = f"serial:{port}"
-        assert main(["info", "--device", device]) == 0
-        assert "none; upload one with  eitskin model upload" in capsys.readouterr().out
+        assert "none; upload one with  eitskin model upload" in ran(0, f"info --device {device}")[0]
         for command in (
             ["stream"],
             ["stream", "--mode", "image"],
@@ -195,25 +193,22 @@ def test_a_board_without_a_model(scene, capsys):
             assert line.startswith(f"eitskin: {port}: ") and "eitskin model upload" in line, line
 
 
-def test_a_model_that_is_not_the_boards(scene, tmp_path, capsys):
+def test_a_model_that_is_not_the_boards(scene, tmp_path, ran):
     model = write_model(tmp_path)
     with behind_a_port(board_of(scene)) as port:
-        assert (
-            main(["stream", "--device", f"serial:{port}", "--model", str(model), "--mode", "image"])
-            == DEVICE
-        )
-        line = capsys.readouterr().err
+        line = ran(DEVICE, f"stream --device serial:{port} --model {model} --mode image")[1]
         assert "checksum" in line and "eitskin model upload" in line and line.count("\n") == 1
     with behind_a_port(board_of(scene, small_blob())) as port:
-        assert main(["stream", "--device", f"serial:{port}", "--mode", "image"]) == DEVICE
-        assert "--model FILE" in capsys.readouterr().err
-        assert main(["stream", "--device", f"serial:{port}", "--iterations", "5"]) == DEVICE
-        assert "changing the solver needs the defaults" in capsys.readouterr().err
+        assert "--model FILE" in ran(DEVICE, f"stream --device serial:{port} --mode image")[1]
+        assert (
+            "changing the solver needs the defaults"
+            in ran(DEVICE, f"stream --device serial:{port} --iterations 5")[1]
+        )
 
 
 def test_what_the_board_refuses(refused, scene):
     device = ["--device", f"sim:{scene}"]
-    assert "the nearest that are: 80" in refused(DEVICE, "stream", *device, "--samples", "79")
+    assert "the nearest that are: 80" in refused(DEVICE, "stream", *device, "--samples 79")
     assert "frame period of at least 20800 us" in refused(
         DEVICE, "stream", *device, "--frame-period-us 10000"
     )

@@ -20,7 +20,7 @@ needs_image = pytest.mark.skipif(
 @needs_image
 def test_two_touches_within_two_millimetres_of_the_scene(done, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    lines = done("stream", "--device", "emu:two_touch.toml", "--frames", "20", "-v").splitlines()
+    lines = done("stream --device emu:two_touch.toml --frames 20 -v").splitlines()
     for line in lines[:20]:
         errors = [float(error) for error in OFF_BY.findall(line)]
         assert len(errors) == 2 and max(errors) < 2.0, line
@@ -36,7 +36,7 @@ def test_two_touches_within_two_millimetres_of_the_scene(done, tmp_path, monkeyp
 def test_a_scene_ends_by_itself(done, tmp_path):
     scene = tmp_path / "short.toml"
     scene.write_text('[scene]\nname = "short"\nframes = 4\nelements = 900\n', encoding="utf-8")
-    *frames, _ = map(json.loads, done("stream", "--device", f"emu:{scene}", "--json").splitlines())
+    *frames, _ = map(json.loads, done(f"stream --device emu:{scene} --json").splitlines())
     assert 5 <= len(frames) <= 10 and frames[-1]["time_s"] < 0.2
 
 

@@ -39,8 +39,8 @@ SUMMARY = {
 
 
 @pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
-def test_json(engine, done, frames_file):
-    facts = json.loads(done("reconstruct", frames_file, "--engine", engine, "--json"))
+def test_json(engine, told, frames_file):
+    facts = told(f"reconstruct {frames_file} --engine {engine}")
     found = facts["model"], facts["engine"], len(facts["frames"])
     assert found == ("prebuilt paper skin", engine, 20)
     for number, frame in enumerate(facts["frames"]):
@@ -81,10 +81,8 @@ def test_what_is_found_is_said(done, frames_file, tmp_path, capsys):
     assert "found: electrode 5 open" in capsys.readouterr().out
 
 
-def test_what_it_says_is_what_the_reconstructor_does(done, frames_file):
-    facts = json.loads(
-        done("reconstruct", frames_file, "--json", "--iterations", "25", "--sign", "both")
-    )
+def test_what_it_says_is_what_the_reconstructor_does(told, frames_file):
+    facts = told(f"reconstruct {frames_file} --iterations 25 --sign both")
     reconstructor = Reconstructor(*prebuilt()[:1], blob=prebuilt()[1])
     reconstructor.with_options(iterations=25, sign="both")
     reconstructor.tare(session().quiet_v)
@@ -95,10 +93,9 @@ def test_what_it_says_is_what_the_reconstructor_does(done, frames_file):
         assert [(t["x_mm"], t["y_mm"]) for t in listed] == [(t.x_mm, t.y_mm) for t in touches]
 
 
-def test_threads_change_nothing(done, frames_file, capsys):
+def test_threads_change_nothing(told, frames_file, ran):
     one, three = (
-        json.loads(done("reconstruct", frames_file, "--json", *threads))
-        for threads in ((), ("--threads", "3"))
+        told(f"reconstruct {frames_file}", *threads) for threads in ((), ("--threads", "3"))
     )
     for frame in (*one["frames"], *three["frames"]):
         del frame["info"]["solve_us"], frame["info"]["touch_us"]
@@ -109,34 +106,25 @@ def test_threads_change_nothing(done, frames_file, capsys):
         (("--threads", "2", "--track"), "--track needs one frame after another"),
         (("--threads", "2", "--engine", "numpy"), "the numpy engine has one"),
     ):
-        assert main(["reconstruct", str(frames_file), *arguments]) == 2
-        assert text in capsys.readouterr().err
+        assert text in ran(2, f"reconstruct {frames_file}", *arguments)[1]
 
 
-def test_options_reach_the_solver(done, frames_file, changed_frames):
-    facts = json.loads(
-        done("reconstruct", frames_file, "--json", "--gap", "0.001", "--iterations", "5000")
-    )
+def test_options_reach_the_solver(told, frames_file, changed_frames):
+    facts = told(f"reconstruct {frames_file} --gap 0.001 --iterations 5000")
     assert {frame["info"]["stop"] for frame in facts["frames"]} == {"gap"}
     assert all(frame["info"]["gap_rel"] <= 0.001 for frame in facts["frames"])
     infos = {}
     for solver in SOLVERS:
-        facts = json.loads(
-            done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--solver", solver)
-        )
+        facts = told(f"reconstruct {frames_file} --only test-s3-0 --solver {solver}")
         infos[solver] = facts["frames"][0]["info"]
     assert infos["working-set"]["macs"] < 0.25 * infos["fista"]["macs"]
     assert infos["active-set"]["stop"] == "optimum" and infos["active-set"]["gap_rel"] < 1e-5
-    facts = json.loads(
-        done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--mac-limit", "200000")
-    )
+    facts = told(f"reconstruct {frames_file} --only test-s3-0 --mac-limit 200000")
     assert facts["frames"][0]["info"]["stop"] == "macs"
     assert facts["frames"][0]["info"]["macs"] <= 200000
     resting = changed_frames(voltage_v=np.repeat(session().frames_v[:1], 20, axis=0))
-    cold = json.loads(done("reconstruct", resting, "--json", "--iterations", "10"))["frames"]
-    warm = json.loads(done("reconstruct", resting, "--json", "--iterations", "10", "--warm"))[
-        "frames"
-    ]
+    cold = told(f"reconstruct {resting} --iterations 10")["frames"]
+    warm = told(f"reconstruct {resting} --iterations 10 --warm")["frames"]
     assert (
         cold[0]["info"]["gap"]
         == warm[0]["info"]["gap"]
@@ -146,15 +134,15 @@ def test_options_reach_the_solver(done, frames_file, changed_frames):
     assert len({frame["touches"][0]["id"] for frame in warm}) == 1
     assert cold[5]["touches"][0]["id"] != cold[0]["touches"][0]["id"]
     limit = str(0.999 * np.abs(session().frames_v).max())
-    masked = json.loads(done("reconstruct", frames_file, "--json", "--saturation-v", limit))
+    masked = told(f"reconstruct {frames_file} --saturation-v {limit}")
     assert max(frame["info"]["masked"] for frame in masked["frames"]) >= 1
-    some = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-4,test-s3-11"))
+    some = told(f"reconstruct {frames_file} --only test-s3-4,test-s3-11")
     assert [frame["frame"] for frame in some["frames"]] == [4, 11]
     assert some["summary"]["frames"] == 2
 
 
 def test_for_people(done, frames_file):
-    text = done("reconstruct", frames_file)
+    text = done(f"reconstruct {frames_file}")
     lines = text.splitlines()
     found = " ".join(lines[0].split())
     assert found == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
@@ -164,7 +152,7 @@ def test_for_people(done, frames_file):
     assert sum(line.startswith("test-s3-") for line in lines) == 20
 
 
-def test_quiet_frames_show_nothing(done, changed_frames):
+def test_quiet_frames_show_nothing(done, told, changed_frames):
     quiet = session().quiet_v
     empty = dict.fromkeys(
         ["touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign"]
@@ -173,19 +161,17 @@ def test_quiet_frames_show_nothing(done, changed_frames):
     path = changed_frames(
         voltage_v=quiet[:8], reference_voltage_v=quiet[8:], frame_name=names, **empty
     )
-    text = done("reconstruct", path)
+    text = done(f"reconstruct {path}")
     assert text.count("none (no change above the noise)") >= 7
     assert "against the truth" not in text
-    facts = json.loads(done("reconstruct", path, "--json"))
+    facts = told(f"reconstruct {path}")
     assert "summary" not in facts
     assert {frame["info"]["stop"] for frame in facts["frames"]} <= {"below-threshold", "iterations"}
 
 
-def test_output_and_picture(done, frames_file, tmp_path):
+def test_output_and_picture(told, frames_file, tmp_path):
     output, picture = tmp_path / "out.npz", tmp_path / "out.png"
-    facts = json.loads(
-        done("reconstruct", frames_file, "-o", output, "--picture", picture, "--json")
-    )
+    facts = told(f"reconstruct {frames_file} -o {output} --picture {picture}")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out.npz", "out.png"]
     assert picture.read_bytes()[:8] == PNG and picture.stat().st_size > 20_000
     with np.load(output, allow_pickle=False) as saved:
@@ -194,14 +180,13 @@ def test_output_and_picture(done, frames_file, tmp_path):
         assert len(saved["touch_frame"]) == sum(len(frame["touches"]) for frame in facts["frames"])
 
 
-def test_a_bad_frame_among_good_ones(changed_frames, tmp_path, capsys):
+def test_a_bad_frame_among_good_ones(changed_frames, tmp_path, ran):
     """The others are done, written and listed; the exit code says that not all were."""
     voltage = session().frames_v.copy()
     voltage[3, :150] = np.nan
     voltage[5] = 0
     path, output = changed_frames(voltage_v=voltage), tmp_path / "out.npz"
-    assert main(["reconstruct", str(path), "--json", "-o", str(output)]) == 8
-    out, err = capsys.readouterr()
+    out, err = ran(8, f"reconstruct {path} --json -o {output}")
     facts = json.loads(out)
     assert [frame["refused"] is None for frame in facts["frames"]].count(False) == 2
     assert "too many channels" in facts["frames"][3]["refused"]
@@ -212,19 +197,18 @@ def test_a_bad_frame_among_good_ones(changed_frames, tmp_path, capsys):
         assert saved["frame"].tolist() == [k for k in range(20) if k not in (3, 5)]
 
 
-def test_a_reference_of_another_skin_is_warned_of(changed_frames, capsys):
+def test_a_reference_of_another_skin_is_warned_of(changed_frames, ran):
     order = np.random.default_rng(1).permutation(208)
     path = changed_frames(
         voltage_v=session().frames_v[:, order], reference_voltage_v=session().quiet_v[:, order]
     )
-    assert main(["reconstruct", str(path)]) == 0
-    err = capsys.readouterr().err
+    err = ran(0, f"reconstruct {path}")[1]
     assert err.startswith("eitskin: warning: the reference correlates with the model by 0.")
     assert err.count("\n") == 1
     assert f"eitskin doctor {path}" in err
 
 
-def test_the_whole_way(done, tmp_path):
+def test_the_whole_way(done, told, tmp_path):
     """A description to a model to simulated frames to touches, with one's own skin: an L with 24
     electrodes."""
     skin_file = tmp_path / "hand.toml"
@@ -235,9 +219,9 @@ def test_the_whole_way(done, tmp_path):
         " 5.0\n[protocol]\nkind = 'skip'\nskip = 2\n"
     )
     model_file, frames_path = tmp_path / "hand.eitm", tmp_path / "frames.npz"
-    done("model", "build", skin_file, "-o", model_file, "--samples", "4")
-    assert json.loads(done("model", "info", model_file, "--json"))["skin"] == "hand"
-    done("model", "verify", model_file)
+    done(f"model build {skin_file} -o {model_file} --samples 4")
+    assert told(f"model info {model_file}")["skin"] == "hand"
+    done(f"model verify {model_file}")
     skin, protocol = load_skin(skin_file)
     rules = TouchRules(count=(1, 2), radius_mm=(7, 10), gap_mm=20, rim_margin_mm=8)
     save_frames(
@@ -245,12 +229,7 @@ def test_the_whole_way(done, tmp_path):
         simulate(skin, protocol, random_touches(skin.outline, 5, 12, rules=rules)).as_frames(),
     )
     output, picture = tmp_path / "out.npz", tmp_path / "out.png"
-    facts = json.loads(
-        done(
-            f"reconstruct {frames_path} --model {model_file} -o {output} --picture {picture}",
-            "--json",
-        )
-    )
+    facts = told(f"reconstruct {frames_path} --model {model_file} -o {output} --picture {picture}")
     assert facts["model"] == str(model_file)
     summary = facts["summary"]
     assert summary["found"] >= 0.85 * summary["true"] and summary["false"] <= 2
@@ -264,9 +243,8 @@ def test_the_whole_way(done, tmp_path):
     assert load_frames(frames_path).n_frames == 12
 
 
-def test_the_demo(tmp_path, capsys):
-    assert main(["demo", "--picture", str(tmp_path / "demo.png"), "--json"]) == 0
-    out, err = capsys.readouterr()
+def test_the_demo(tmp_path, ran):
+    out, err = ran(0, f"demo --picture {tmp_path / 'demo.png'} --json")
     facts = json.loads(out)
     assert [line[:4] for line in err.splitlines()] == ["1/4 ", "2/4 ", "3/4 ", "4/4 "]
     assert (facts["hits"], facts["false"]) == (3, 0)
@@ -276,13 +254,13 @@ def test_the_demo(tmp_path, capsys):
     assert 0 < difference["C float32 to numpy"] < 1e-4 and difference["C float64 to numpy"] < 1e-12
 
 
-def test_tracked_frames_keep_ids_and_confirm_births(done, tmp_path):
+def test_tracked_frames_keep_ids_and_confirm_births(told, tmp_path):
     """A finger that moves 2 mm a frame keeps one id; each frame by itself counts on."""
     moving = tuple(TouchScene(str(k), (Put(-20.0 + 2 * k, 30.0, 9.0, 5.0),)) for k in range(8))
     made = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, moving)).as_frames()
     save_frames(tmp_path / "moving.npz", made)
     alone, tracked = (
-        json.loads(done("reconstruct", tmp_path / "moving.npz", "--json", *more))["frames"]
+        told(f"reconstruct {tmp_path / 'moving.npz'}", *more)["frames"]
         for more in ((), ("--track",))
     )
     ids = [[touch["id"] for touch in frame["touches"]] for frame in tracked]
@@ -293,14 +271,14 @@ def test_tracked_frames_keep_ids_and_confirm_births(done, tmp_path):
     assert tracked[7]["touches"][0]["x_mm"] == pytest.approx(-6.0, abs=2.0)
 
 
-def test_frames_with_times_are_a_stream(done, tmp_path):
+def test_frames_with_times_are_a_stream(told, tmp_path):
     frames = session().as_frames()
     timed, alone = tmp_path / "timed.npz", tmp_path / "alone.npz"
     save_frames(timed, replace(frames, time_s=np.arange(frames.n_frames) / 48))
     save_frames(alone, frames)
 
     def touches(path: Path, *more: str) -> list[list[dict[str, float]]]:
-        facts = json.loads(done("reconstruct", path, "--json", *more))
+        facts = told(f"reconstruct {path}", *more)
         return [frame["touches"] for frame in facts["frames"]]
 
     assert touches(timed) == touches(alone, "--track") != touches(alone)

@@ -20,7 +20,7 @@ from eitskin.cli.main import main
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import PacketType
 from eitskin.model.prebuilt import load_prebuilt
-from fresh_python import INTERRUPTIBLE, MAIN, run_python, without
+from fresh_python import INTERRUPTIBLE, MAIN, run_python, without, words
 
 Change = Callable[[Packet], bytes | None]
 
@@ -40,7 +40,7 @@ def scene(tmp_path_factory) -> Path:
 def run(scene, tmp_path_factory) -> Path:
     """A recording of everything."""
     path = tmp_path_factory.mktemp("run") / "run.eits"
-    assert main(["record", "--device", f"sim:{scene}", "-o", str(path)]) == 0
+    assert main(words(f"record --device sim:{scene} -o {path}")) == 0
     return path
 
 
@@ -77,58 +77,51 @@ def flipped(place: int) -> Callable[[bytes], bytes]:
 
 def test_replay_shows_what_was_seen_live(done, scene, tmp_path):
     path = tmp_path / "run.eits"
-    live = done("stream", "--device", f"sim:{scene}", "--mode", "image,touches", "--record", path)
-    assert done("replay", path, "--mode", "image,touches") == live
-    lines = done("replay", path, "--mode", "image,touches", "--first", "2").splitlines()
+    live = done(f"stream --device sim:{scene} --mode image,touches --record {path}")
+    assert done(f"replay {path} --mode image,touches") == live
+    lines = done(f"replay {path} --mode image,touches --first 2").splitlines()
     assert lines[:2] == live.splitlines()[:2] and lines[2].startswith("2 frames")
 
 
 def test_gestures_of_a_recording_that_has_touches_alone(done, tmp_path):
     path, tap = tmp_path / "run.eits", ("--device", "sim:tap", "--ignore", "all")
     live = [line for line in done("stream", *tap).splitlines() if "tap" in line]
-    done("record", *tap, "--mode", "touches", "-o", path)
-    *shown, _ = done("replay", path, "--mode", "events").splitlines()
+    done("record", *tap, f"--mode touches -o {path}")
+    *shown, _ = done(f"replay {path} --mode events").splitlines()
     assert len(live) == 1 and shown[-1:] == live
     assert not any(line.split()[1].isdigit() for line in shown)
 
 
-def test_a_recording_is_a_device_too(done, run):
+def test_a_recording_is_a_device_too(done, told, run):
     shown, replayed = (
         done(*command).splitlines()[0]
         for command in (("stream", "-v", "--device", f"file:{run}"), ("replay", "-v", run))
     )
     assert shown == replayed and ", off by " in shown
-    facts = json.loads(done("info", "--device", f"file:{run}", "--json"))
+    facts = told(f"info --device file:{run}")
     sha256 = hashlib.sha256(load_prebuilt()[1]).hexdigest()
     assert facts["statistics"] is None and facts["sha256"] == {"model": sha256, "firmware": None}
-    assert sha256 in done("info", "--device", f"file:{run}")
-    assert (
-        json.loads(done("doctor", "--device", f"file:{run}", "--json"))["measured"]["quiet_frames"]
-        == 16
-    )
+    assert sha256 in done(f"info --device file:{run}")
+    assert told(f"doctor --device file:{run}")["measured"]["quiet_frames"] == 16
 
 
-def test_record_says_how_much(done, scene, tmp_path):
+def test_record_says_how_much(told, scene, tmp_path):
     path = tmp_path / "run.eits"
-    facts = json.loads(
-        done("record", "--device", f"sim:{scene}", "-o", path, "--frames", "3", "--json")
-    )
+    facts = told(f"record --device sim:{scene} -o {path} --frames 3")
     assert facts["frames"] == 3 and facts["bytes"] >= path.stat().st_size > 10_000
     assert facts["packets"] == sum(p.type not in (PacketType.RECORDING,) for p in packets(path)) - 1
     assert len([p for p in packets(path) if p.type == PacketType.RAW]) == 16 + 3
-    again = json.loads(
-        done(f"record --device sim:{scene} -o {path} --seconds 0.1 --overwrite --json")
-    )
+    again = told(f"record --device sim:{scene} -o {path} --seconds 0.1 --overwrite")
     assert again["frames"] == 3
 
 
 # ---- the same bits ----
 
 
-def test_the_hosts_images_are_the_boards(done, run):
-    found = done("replay", run, "--check")
+def test_the_hosts_images_are_the_boards(done, told, run):
+    found = done(f"replay {run} --check")
     assert found == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
-    facts = json.loads(done("replay", run, "--check", "--json"))
+    facts = told(f"replay {run} --check")
     assert facts["same_bits"] and facts["solver_noted"]
     assert (facts["same"], facts["untold"]) == (FRAMES, 0)
 
@@ -137,10 +130,10 @@ def test_the_hosts_images_are_the_boards(done, run):
     "options",
     ["--cold", "--no-track", "--iterations 9", "--sign both", "--tare 1", "--reciprocal 0"],
 )
-def test_whatever_the_solver_was_told(options, done, scene, tmp_path):
+def test_whatever_the_solver_was_told(options, done, told, scene, tmp_path):
     path = tmp_path / "run.eits"
-    done("record", "--device", f"sim:{scene}", "-o", path, *QUIETLY, options)
-    assert json.loads(done("replay", path, "--check", "--json"))["same"] == FRAMES
+    done(f"record --device sim:{scene} -o {path}", *QUIETLY, options)
+    assert told(f"replay {path} --check")["same"] == FRAMES
 
 
 @pytest.mark.parametrize(
@@ -151,11 +144,10 @@ def test_whatever_the_solver_was_told(options, done, scene, tmp_path):
         (PacketType.RAW, RAW_HEAD + 4 * 60 + 1),
     ],
 )
-def test_one_bit_that_differs_is_found(kind, place, run, tmp_path, capsys):
+def test_one_bit_that_differs_is_found(kind, place, run, tmp_path, ran):
     number = 16 + 2 if kind == PacketType.RAW else 2
     other = changed(run, tmp_path / "other.eits", nth(kind, number, flipped(place)))
-    assert main(["replay", str(other), "--check", "--json"]) == 10
-    out, err = capsys.readouterr()
+    out, err = ran(10, f"replay {other} --check --json")
     facts = json.loads(out)
     different = facts["different"]
     # what the host makes of a changed raw frame it begins the next one from
@@ -164,86 +156,85 @@ def test_one_bit_that_differs_is_found(kind, place, run, tmp_path, capsys):
     assert err == f"eitskin: {other}: this host's images are not the board's\n"
 
 
-def test_a_changed_bit_in_the_reference_shows_everywhere(run, tmp_path, capsys):
+def test_a_changed_bit_in_the_reference_shows_everywhere(run, tmp_path, ran):
     other = changed(
         run, tmp_path / "other.eits", nth(PacketType.RAW, 3, flipped(RAW_HEAD + 4 * 60 + 2))
     )
-    assert main(["replay", str(other), "--check", "--json"]) == 10
-    assert len(json.loads(capsys.readouterr().out)["different"]) == FRAMES
+    assert len(json.loads(ran(10, f"replay {other} --check --json")[0])["different"]) == FRAMES
 
 
-def test_frames_after_a_loss_are_not_called_different(done, scene, tmp_path):
+def test_frames_after_a_loss_are_not_called_different(done, told, scene, tmp_path):
     """A warm solve begins from the last one: without it, the host's has other bits and nobody's
     fault it is."""
     run = tmp_path / "warm.eits"
-    done("record", "--device", f"sim:{scene}", "-o", run, "--warm")
+    done(f"record --device sim:{scene} -o {run} --warm")
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
-    facts = json.loads(done("replay", other, "--check", "--json"))
+    facts = told(f"replay {other} --check")
     assert facts["different"] == [] and facts["same"] == 1 and facts["untold"] == FRAMES - 2
     assert facts["alone"] == 1
 
 
-def test_touches_after_a_loss_are_not_called_different(done, run, scene, tmp_path):
+def test_touches_after_a_loss_are_not_called_different(done, told, run, scene, tmp_path):
     """Touches that are followed in time began from the frame that is lost; without tracking, every
     frame can be judged."""
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
-    facts = json.loads(done("replay", other, "--check", "--json"))
+    facts = told(f"replay {other} --check")
     assert facts["different"] == [] and facts["alone"] == 1 and facts["untold"] > 0
     assert facts["same"] + facts["untold"] == FRAMES - 1
     alone = tmp_path / "alone.eits"
-    done("record", "--device", f"sim:{scene}", "-o", alone, "--no-track")
+    done(f"record --device sim:{scene} -o {alone} --no-track")
     other = changed(
         alone, tmp_path / "others.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None)
     )
-    facts = json.loads(done("replay", other, "--check", "--json"))
+    facts = told(f"replay {other} --check")
     assert facts["different"] == []
     assert (facts["same"], facts["untold"], facts["alone"]) == (FRAMES - 1, 0, 1)
 
 
-def test_an_image_after_a_loss_is_judged_all_the_same(run, tmp_path, capsys):
+def test_an_image_after_a_loss_is_judged_all_the_same(run, tmp_path, ran):
     """Tracking changes touches only: an image that differs is told, whatever was lost before."""
     lost = changed(run, tmp_path / "lost.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
     other = changed(
         lost, tmp_path / "other.eits", nth(PacketType.IMAGE, 3, flipped(SOLVED_HEAD + 4 * 400))
     )
-    assert main(["replay", str(other), "--check", "--json"]) == 10
-    assert len(json.loads(capsys.readouterr().out)["different"]) == 1
+    assert len(json.loads(ran(10, f"replay {other} --check --json")[0])["different"]) == 1
 
 
-def test_a_loss_in_the_tare_leaves_nothing_to_compare(run, tmp_path, capsys):
+def test_a_loss_in_the_tare_leaves_nothing_to_compare(run, tmp_path, ran):
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 5, lambda payload: None))
-    assert main(["replay", str(other), "--check"]) == 8
-    assert "nothing to compare" in capsys.readouterr().err
+    assert "nothing to compare" in ran(8, f"replay {other} --check")[1]
 
 
-def test_without_its_note_the_models_own_options_are_taken(done, scene, run, tmp_path, capsys):
+def test_without_its_note_the_models_own_options_are_taken(done, told, scene, run, tmp_path, ran):
     without = changed(
         run, tmp_path / "plain.eits", nth(PacketType.RECORDING, 1, lambda payload: None)
     )
-    facts = json.loads(done("replay", without, "--check", "--json"))
+    facts = told(f"replay {without} --check")
     assert facts["same"] == FRAMES and not facts["solver_noted"]
     odd = tmp_path / "odd.eits"
-    done("record", "--device", f"sim:{scene}", "-o", odd, *QUIETLY, "--iterations", "5")
+    done(f"record --device sim:{scene} -o {odd}", *QUIETLY, "--iterations 5")
     without = changed(
         odd, tmp_path / "plain2.eits", nth(PacketType.RECORDING, 1, lambda payload: None)
     )
-    assert main(["replay", str(without), "--check"]) == 10
-    assert "the recording does not note the solver's options" in capsys.readouterr().err
+    assert (
+        "the recording does not note the solver's options"
+        in ran(10, f"replay {without} --check")[1]
+    )
 
 
 # ---- export ----
 
 
-def test_rows_that_could_not_be_measured_are_not_exported(done, run, tmp_path):
+def test_rows_that_could_not_be_measured_are_not_exported(done, told, run, tmp_path):
     def with_nan(payload: bytes) -> bytes:
         return payload[:RAW_HEAD] + np.float32(np.nan).tobytes() + payload[RAW_HEAD + 4 :]
 
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 3, with_nan))
     exported = tmp_path / "run.npz"
-    facts = json.loads(done("replay", other, "--frames", exported, "--json"))
+    facts = told(f"replay {other} --frames {exported}")
     assert (facts["frames"], facts["quiet_frames"], facts["left_out"]) == (FRAMES - 1, 16, 1)
-    assert done("reconstruct", exported).count("\n") == FRAMES - 1 + 2
-    raw = done("replay", other, "--mode", "raw").splitlines()[3]
+    assert done(f"reconstruct {exported}").count("\n") == FRAMES - 1 + 2
+    raw = done(f"replay {other} --mode raw").splitlines()[3]
     assert "1 not usable" in raw
 
 

@@ -104,7 +104,7 @@ def test_models_that_cannot_be_read(kind, command, refused, tmp_path, frames_fil
     assert str(path) in line and text in line and ";" in line
 
 
-def test_a_golden_image_of_other_bits_fails_verification(tmp_path, capsys):
+def test_a_golden_image_of_other_bits_fails_verification(tmp_path, ran):
     """One bit of the stored image: read without complaint, but not what this core gives."""
     blob = bytearray(small_blob())
     place = sections_of(blob)["GOLD"]
@@ -113,8 +113,7 @@ def test_a_golden_image_of_other_bits_fails_verification(tmp_path, capsys):
     blob[at] ^= 1
     path = tmp_path / "bits.eitm"
     path.write_bytes(sealed(blob))
-    assert main(["model", "verify", str(path)]) == VERIFICATION
-    out, err = capsys.readouterr()
+    out, err = ran(VERIFICATION, f"model verify {path}")
     assert "does not give the golden image's bits" in err and err.count("\n") == 1
     assert "C float32" in out
 
@@ -143,13 +142,12 @@ def with_nan(count: int) -> np.ndarray:
 def test_frames_that_cannot_be_used(
     voltage, text, engine, tmp_path,
     changed_frames,
-    capsys,
+    ran,
 ):  # fmt: skip
     """The frame is named on its one line; nothing is written where nothing could be done."""
     path = changed_frames(first=1, voltage_v=voltage)
     outputs = ["-o", str(tmp_path / "out.npz"), "--picture", str(tmp_path / "out.png")]
-    assert main(["reconstruct", str(path), "--engine", engine, *outputs]) == FRAME
-    err = capsys.readouterr().err
+    err = ran(FRAME, f"reconstruct {path} --engine {engine}", *outputs)[1]
     assert err.startswith(f"eitskin: {path}: frame 0 (test-s3-0) refused: ")
     assert err.count("\n") == 1
     assert text in err
@@ -171,7 +169,7 @@ def test_references_that_cannot_be_used(value, text, refused, changed_frames, tm
     else:
         quiet[:] = 0
     path = changed_frames(first=1, reference_voltage_v=quiet)
-    line = refused(FRAME, "reconstruct", path, "-o", tmp_path / "out.npz")
+    line = refused(FRAME, f"reconstruct {path} -o {tmp_path / 'out.npz'}")
     assert text in line and line.endswith(f"run  eitskin doctor {path}")
 
 
@@ -217,13 +215,13 @@ def test_frames_files_that_cannot_be_read(
 def test_what_is_no_frames_file(content, refused, tmp_path):
     path = tmp_path / "x.npz"
     path.write_bytes(content)
-    assert str(path) in refused(FILE, "reconstruct", path)
+    assert str(path) in refused(FILE, f"reconstruct {path}")
 
 
 def test_another_protocol_names_both_hashes_and_files(refused, changed_frames, tmp_path):
     rows = prebuilt()[0].protocol.drive_measure[::-1].copy()
     path = changed_frames(drive_measure=rows)
-    line = refused(PROTOCOL, "reconstruct", path, "-o", tmp_path / "out.npz")
+    line = refused(PROTOCOL, f"reconstruct {path} -o {tmp_path / 'out.npz'}")
     assert str(path) in line and "prebuilt paper skin" in line
     assert f"{prebuilt()[0].protocol.hash:016x}" in line
     assert line.count("(16 electrodes, 208 rows)") == 2
@@ -252,16 +250,16 @@ def test_skins_that_cannot_be(kind, refused, tmp_path):
     content, code, text = SKINS[kind]
     path = tmp_path / "skin.toml"
     path.write_text(content)
-    line = refused(code, "model", "build", path, "-o", tmp_path / "out.eitm")
+    line = refused(code, f"model build {path} -o {tmp_path / 'out.eitm'}")
     assert line.startswith(str(path)) and text in line
 
 
 def test_a_description_that_is_no_text(refused, tmp_path):
     path = tmp_path / "skin.toml"
     path.write_bytes(b"[skin]\nname = '\xff\xfe'\n")
-    assert "not UTF-8" in refused(CONFIG, "model", "build", path, "-o", tmp_path / "out.eitm")
+    assert "not UTF-8" in refused(CONFIG, f"model build {path} -o {tmp_path / 'out.eitm'}")
     path.write_bytes("[skin]\nname = 'x'\n".encode("utf-16"))
-    assert "not UTF-8" in refused(CONFIG, "model", "build", path, "-o", tmp_path / "out.eitm")
+    assert "not UTF-8" in refused(CONFIG, f"model build {path} -o {tmp_path / 'out.eitm'}")
 
 
 # ---- files ----
@@ -272,11 +270,11 @@ def test_missing_files(refused, tmp_path, frames_file):
     assert "no such skin description; check the path" in refused(
         FILE, f"model build {none} -o {output}"
     )
-    assert "no such model; check the path" in refused(FILE, "model", "info", none)
-    assert "no such model" in refused(FILE, "model", "verify", none)
-    assert "no such frames file; check the path" in refused(FILE, "reconstruct", none)
+    assert "no such model; check the path" in refused(FILE, f"model info {none}")
+    assert "no such model" in refused(FILE, f"model verify {none}")
+    assert "no such frames file; check the path" in refused(FILE, f"reconstruct {none}")
     assert "no such model" in refused(FILE, f"reconstruct {frames_file} --model {none} -o {output}")
-    assert "no such skin description" in refused(FILE, "compare", "--skin", none)
+    assert "no such skin description" in refused(FILE, f"compare --skin {none}")
 
 
 def test_folders_instead_of_files(refused, tmp_path, frames_file):
@@ -303,7 +301,7 @@ def test_outputs_are_checked_before_the_work(place, refused, tmp_path, frames_fi
     ):
         assert text in refused(FILE, *arguments)
     if place != ".":
-        assert text in refused(FILE, "compare", "--csv", output)
+        assert text in refused(FILE, f"compare --csv {output}")
 
 
 def test_a_disk_that_is_full(refused, tmp_path, frames_file, monkeypatch):
@@ -312,13 +310,13 @@ def test_a_disk_that_is_full(refused, tmp_path, frames_file, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", full)
     output = tmp_path / "out.npz"
-    line = refused(FILE, "reconstruct", frames_file, "-o", output)
+    line = refused(FILE, f"reconstruct {frames_file} -o {output}")
     assert line == f"{output}: cannot write it (No space left on device)"
 
 
 def test_a_folder_without_permission_is_refused_before_the_work(refused, tmp_path, monkeypatch):
     monkeypatch.setattr("eitskin.fileio.os.access", lambda path, how: False)
-    line = refused(FILE, "reconstruct", "unread.npz", "-o", tmp_path / "out.npz")
+    line = refused(FILE, f"reconstruct unread.npz -o {tmp_path / 'out.npz'}")
     assert "cannot write there (Permission denied)" in line
 
 
@@ -350,7 +348,7 @@ def test_a_folder_that_cannot_be_written(refused, tmp_path, monkeypatch):
     skin = tmp_path / "skin.toml"
     skin.write_text(DISK)
     small = ("--elements", 800, "--pixels", 8, "--samples", 0)
-    line = refused(FILE, "model", "build", skin, "-o", tmp_path / "out.eitm", *small)
+    line = refused(FILE, f"model build {skin} -o {tmp_path / 'out.eitm'}", *small)
     assert "cannot write there (Permission denied)" in line
 
 
@@ -373,7 +371,7 @@ def test_a_folder_that_cannot_be_written(refused, tmp_path, monkeypatch):
     ],
 )
 def test_options_of_reconstruct(arguments, text, refused, frames_file):
-    assert text in refused(USAGE, "reconstruct", frames_file, arguments)
+    assert text in refused(USAGE, f"reconstruct {frames_file}", arguments)
 
 
 @pytest.mark.parametrize(
@@ -403,7 +401,7 @@ def test_neither_a_skin_nor_the_paper(refused, tmp_path):
 
 @pytest.mark.parametrize("arguments", ["--snr-db -30", "--snr-db nan", "--seed -1"])
 def test_options_of_the_demo(arguments, refused, tmp_path):
-    assert "demo:" in refused(USAGE, "demo", "--picture", tmp_path / "out.png", arguments)
+    assert "demo:" in refused(USAGE, f"demo --picture {tmp_path / 'out.png'}", arguments)
 
 
 # ---- extras ----
@@ -464,7 +462,7 @@ def test_an_interrupt_is_said_and_coded(refused, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("eitskin.model.prebuilt.load_prebuilt", interrupted)
-    assert refused(130, "model", "info") == "stopped"
+    assert refused(130, "model info") == "stopped"
 
 
 def test_a_reader_that_stops_is_no_error(monkeypatch):

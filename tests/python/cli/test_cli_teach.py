@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eitskin.cli.main import main
 from eitskin.model.eitm import save_model
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
@@ -130,7 +129,7 @@ def test_presses_that_cannot_teach(refused, files, name):
         ("fit", bad, "--skin", files / "skin.toml"),
         ("update", files / "taught.eitm", bad),
     ):
-        line = refused(code, "teach", *arguments, "-o", out)
+        line = refused(code, "teach", *arguments, f"-o {out}")
         assert words in line and str(bad if code == FRAME else "") in line
 
 
@@ -138,24 +137,23 @@ def test_presses_that_cannot_teach(refused, files, name):
 def test_a_model_from_physics_is_none_to_adapt(refused, files, action):
     save_model(files / "physics.eitm", load_prebuilt()[0])
     out = ("-o", files / "new.eitm") if action == "update" else ()
-    line = refused(MODEL, "teach", action, files / "physics.eitm", files / "good.npz", *out)
+    line = refused(MODEL, f"teach {action} {files / 'physics.eitm'} {files / 'good.npz'}", *out)
     assert line.endswith("no press has taught; make one with  eitskin teach fit")
 
 
-def test_frames_without_a_press_leave_the_old_file(files, frames_file, capsys):
+def test_frames_without_a_press_leave_the_old_file(files, frames_file, ran):
     plan, old = files / "plan.csv", (files / "good.npz").read_bytes()
     plan.write_text("x_mm,y_mm\n1,2\n500,0\n")
     given = ["--plan", plan, "-o", files / "good.npz", "--frames", frames_file, "--overwrite"]
     skin = ["--skin", files / "skin.toml"]
-    assert main(list(map(str, ["teach", "record", *given, *skin]))) == FRAME
-    said = capsys.readouterr().err.splitlines()
+    said = ran(FRAME, "teach record", *given, *skin)[1].splitlines()
     assert said[0].endswith("off the skin 'small': places 2 of 2; are they in mm?")
     assert said[1].endswith("as the frames ended before any press of the plan was held")
     assert (files / "good.npz").read_bytes() == old
 
 
 def test_frames_of_another_protocol_check_nothing(refused, files, frames_file):
-    line = refused(PROTOCOL, "teach", "check", files / "taught.eitm", frames_file)
+    line = refused(PROTOCOL, f"teach check {files / 'taught.eitm'} {frames_file}")
     assert line.endswith("give the model of this skin")
 
 
@@ -163,5 +161,5 @@ def test_a_board_of_other_electrodes_is_told_before_any_press(refused, files):
     plan = files / "plan.csv"
     plan.write_text("x_mm,y_mm\n1,2\n")
     given = ("--plan", plan, "-o", files / "new.npz", "--skin", files / "skin.toml")
-    line = refused(PROTOCOL, "teach", "record", *given, "--device", "sim:hydrogel")
+    line = refused(PROTOCOL, "teach record", *given, "--device sim:hydrogel")
     assert "8 electrodes, but the board scans 16; give it a model of this skin first" in line

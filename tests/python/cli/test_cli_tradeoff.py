@@ -6,7 +6,6 @@ import pytest
 from board_cases import write_scene
 
 import eitskin
-from eitskin.cli.main import main
 from eitskin.errors import UsageError
 from eitskin.model.eitm import load_model
 from eitskin.skin.protocol import adjacent
@@ -33,14 +32,14 @@ def test_run_writes_tables_and_pictures(done, tmp_path):
     assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     assert len(load_front(tmp_path / "out" / "front.json").points) == 3
     front = tmp_path / "small.json"
-    assert "MIoU" in done("recommend", "--front", front, "--budget", "1s", "--board", "host")
+    assert "MIoU" in done(f"recommend --front {front} --budget 1s --board host")
 
 
-def test_the_recommended_model_is_the_measured_one(done, tmp_path, monkeypatch):
+def test_the_recommended_model_is_the_measured_one(told, tmp_path, monkeypatch):
     """But for its model errors, of 300 random skins."""
     monkeypatch.setattr("eitskin.model.build.with_model_errors", lambda model, *_, **__: model)
     path = tmp_path / "model.eitm"
-    facts = json.loads(done("recommend", "--budget", "5ms", "-o", path, "--json"))
+    facts = told(f"recommend --budget 5ms -o {path}")
     assert facts["solve_us"] <= 5000 < facts["frame_us"] == facts["acquisition_us"] == 20_800
     assert facts["options"] == ["--samples 80", "--full"]
     model, _ = load_model(path)
@@ -56,23 +55,20 @@ def test_the_recommended_model_is_the_measured_one(done, tmp_path, monkeypatch):
     assert (measured.projection == model.projection).all()
 
 
-def test_recommendations_name_what_bounds_the_rate(done):
-    slow = done("recommend", "--accuracy", "0.88", "--board", "f767")
+def test_recommendations_name_what_bounds_the_rate(done, told):
+    slow = done("recommend --accuracy 0.88 --board f767")
     assert "an estimate" in slow and "frames a second" in slow
-    assert "measuring bounds the rate" in done("recommend", "--budget", "2ms")
+    assert "measuring bounds the rate" in done("recommend --budget 2ms")
     assert "host: solve and touches median" in done("recommend --budget 1ms --board host")
-    facts = json.loads(done("recommend", "--budget", "10ms", "--period", "11ms", "--json"))
+    facts = told("recommend --budget 10ms --period 11ms")
     assert facts["acquisition_us"] <= 11_000 and facts["configuration"]["scan"] == "reciprocal"
-    discs = json.loads(done("recommend", "--budget", "10ms", "--by", "discs", "--json"))
+    discs = told("recommend --budget 10ms --by discs")
     assert discs["judged"].startswith("discs") and discs["accuracy"] > 0.9
 
 
 @pytest.mark.parametrize("board", ["f767", "host"])
-def test_presets_are_dearer_and_better_from_fast_to_accurate(done, board):
-    chosen = [
-        json.loads(done("recommend", "--preset", name, "--board", board, "--json"))
-        for name in PRESETS
-    ]
+def test_presets_are_dearer_and_better_from_fast_to_accurate(told, board):
+    chosen = [told(f"recommend --preset {name} --board {board}") for name in PRESETS]
     assert [one["accuracy"] for one in chosen] == sorted(one["accuracy"] for one in chosen)
     assert chosen[0]["report_us"] < 0.5 * chosen[2]["report_us"]
     assert chosen[0]["accuracy"] >= 0.84
@@ -103,10 +99,9 @@ def test_refusals(refused, code, arguments, said):
     assert said in refused(code, arguments)
 
 
-def test_reconstruct_within_a_budget(done, frames_file, capsys):
-    usual = json.loads(done("reconstruct", frames_file, "--json"))
-    assert main(["reconstruct", str(frames_file), "--accuracy", "0.87", "--json"]) == 0
-    out, err = capsys.readouterr()
+def test_reconstruct_within_a_budget(told, frames_file, ran):
+    usual = told(f"reconstruct {frames_file}")
+    out, err = ran(0, f"reconstruct {frames_file} --accuracy 0.87 --json")
     fine = json.loads(out)
     assert "settings of" in err and fine["settings"]["rank"] == prebuilt()[0].rank
     point = next(one for one in load_front().points if one.name == fine["settings"]["name"])
@@ -119,8 +114,7 @@ def test_reconstruct_within_a_budget(done, frames_file, capsys):
         f["info"]["solve_us"] > 0 and f["info"]["touch_us"] >= 0
         for f in fine["frames"] + usual["frames"]
     )
-    assert main(["reconstruct", str(frames_file), "--budget", "600kMACs", "--json"]) == 0
-    quick = json.loads(capsys.readouterr().out)
+    quick = json.loads(ran(0, f"reconstruct {frames_file} --budget 600kMACs --json")[0])
     assert sum(f["info"]["macs"] for f in quick["frames"]) < sum(
         f["info"]["macs"] for f in usual["frames"]
     )
@@ -140,7 +134,7 @@ def test_reconstruct_within_a_budget(done, frames_file, capsys):
     ],
 )
 def test_reconstruct_refuses(refused, frames_file, arguments, said):
-    assert said in refused(2, "reconstruct", frames_file, arguments)
+    assert said in refused(2, f"reconstruct {frames_file}", arguments)
 
 
 def test_a_model_that_nothing_was_measured_with(refused, done, frames_file, tmp_path):
@@ -151,10 +145,9 @@ def test_a_model_that_nothing_was_measured_with(refused, done, frames_file, tmp_
     )
 
 
-def test_boards_are_told_the_settings(tmp_path, capsys):
+def test_boards_are_told_the_settings(tmp_path, ran):
     scene = write_scene(tmp_path / "one.toml", frames=2, elements=900)
-    assert main(["stream", "--device", f"sim:{scene}", "--accuracy", "0.87", "--json"]) == 0
-    out, err = capsys.readouterr()
+    out, err = ran(0, f"stream --device sim:{scene} --accuracy 0.87 --json")
     assert "on the F767 (an estimate)" in err
     frames = [json.loads(line) for line in out.splitlines()][:2]
     assert "at most 1200000 MACs" in err
@@ -162,17 +155,17 @@ def test_boards_are_told_the_settings(tmp_path, capsys):
         frame["info"]["stop"] == "macs" and frame["info"]["macs"] <= 1_200_000 for frame in frames
     )
     assert all(frame["info"]["gap_rel"] > 0 for frame in frames)
-    assert main(["stream", "--device", f"sim:{scene}", "--budget", "8.7ms", "-v"]) == 0
-    line = capsys.readouterr().out.splitlines()[0]
+    line = ran(0, f"stream --device sim:{scene} --budget 8.7ms -v")[0].splitlines()[0]
     assert "30 iterations (iterations), gap" in line and "MMAC" in line
 
 
-def test_a_preset_sets_the_boards_scan_too(tmp_path, capsys):
+def test_a_preset_sets_the_boards_scan_too(tmp_path, ran):
     scene, run = write_scene(tmp_path / "one.toml", frames=2, elements=900), tmp_path / "run.eits"
-    assert main(["record", "--device", f"sim:{scene}", "-o", str(run), "--preset", "fast"]) == 0
-    assert "20 samples, reciprocal scan; measured" in capsys.readouterr().err
-    assert main(["info", "--device", f"file:{run}", "--json"]) == 0
-    board = json.loads(capsys.readouterr().out)["board"]
+    assert (
+        "20 samples, reciprocal scan; measured"
+        in ran(0, f"record --device sim:{scene} -o {run} --preset fast")[1]
+    )
+    board = json.loads(ran(0, f"info --device file:{run} --json")[0])["board"]
     assert (board["samples"], board["check_every"]) == (20, 0)
 
 
@@ -192,15 +185,14 @@ def test_python_takes_a_preset(tmp_path):
 def test_boards_refuse(refused, tmp_path):
     scene = write_scene(tmp_path / "one.toml", frames=1)
     assert "--iterations" in refused(2, f"stream --device sim:{scene} --budget 5ms --iterations 9")
-    assert "takes" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "1ms")
-    assert "--budget x" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "x")
+    assert "takes" in refused(2, f"stream --device sim:{scene} --budget 1ms")
+    assert "--budget x" in refused(2, f"stream --device sim:{scene} --budget x")
 
 
-def test_a_recording_takes_no_budget_but_keeps_what_it_chose(refused, tmp_path, capsys):
+def test_a_recording_takes_no_budget_but_keeps_what_it_chose(refused, tmp_path, ran):
     scene, run = write_scene(tmp_path / "one.toml", frames=2, elements=900), tmp_path / "run.eits"
-    assert main(["record", "--device", f"sim:{scene}", "-o", str(run), "--accuracy", "0.87"]) == 0
-    assert main(["replay", str(run), "--check"]) == 0
-    assert main(["replay", str(run), "--json"]) == 0
-    first = json.loads(capsys.readouterr().out.splitlines()[-2])
+    ran(0, f"record --device sim:{scene} -o {run} --accuracy 0.87")
+    ran(0, f"replay {run} --check")
+    first = json.loads(ran(0, f"replay {run} --json")[0].splitlines()[-2])
     assert first["info"]["stop"] == "macs"
-    assert "recording" in refused(2, "stream", "--device", f"file:{run}", "--budget", "5ms")
+    assert "recording" in refused(2, f"stream --device file:{run} --budget 5ms")

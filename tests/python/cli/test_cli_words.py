@@ -4,7 +4,6 @@ import subprocess
 
 import pytest
 
-from eitskin.cli.main import main
 from eitskin.cli.progress import lines
 from eitskin.config import listed, nearest
 
@@ -27,9 +26,8 @@ def test_long_lists_are_cut():
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
-def test_completion_knows_the_commands(shell, capsys):
-    assert main(["completion", shell]) == 0
-    script = capsys.readouterr().out
+def test_completion_knows_the_commands(shell, ran):
+    script = ran(0, f"completion {shell}")[0]
     assert "reconstruct" in script and "stream" in script and "picture" in script
     if shell == "bash":
         subprocess.run(["bash", "-n"], input=script, text=True, check=True)

@@ -74,5 +74,5 @@ def test_resistors_are_of_the_series():
 
 
 def test_a_resistance_below_zero_is_a_mistake(refused):
-    said = refused(2, "model", "voltages", "--paper", "--resistor-ring", "-5")
+    said = refused(2, "model voltages --paper --resistor-ring -5")
     assert "--resistor-ring -5 is out of range" in said
