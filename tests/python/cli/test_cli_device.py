@@ -12,7 +12,6 @@ from board_cases import board_of, write_scene
 
 from board_on_a_port import behind_a_port
 from eitskin.device.ports import Port
-from eitskin.device.wire.packets import BoardInfo
 from eitskin.frames.frames import load_frames
 from eitskin.model.model import Model
 from fresh_python import run_python
@@ -28,17 +27,8 @@ def scene(tmp_path_factory) -> Path:
     return write_scene(tmp_path_factory.mktemp("scene") / "one.toml", FRAMES)
 
 
-def strict(text: str) -> Any:
-    """JSON as the standard has it: NaN and Infinity are none."""
-
-    def refuse(name: str) -> None:
-        raise AssertionError(f"{name} is no JSON")
-
-    return json.loads(text, parse_constant=refuse)
-
-
 def json_lines(text: str) -> list[dict[str, Any]]:
-    return [strict(line) for line in text.splitlines()]
+    return [json.loads(line) for line in text.splitlines()]
 
 
 # ---- stream ----
@@ -131,21 +121,17 @@ def test_solver_options_reach_the_board(done, scene):
 def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene, ran):
     """Touches that conduct, where what insulates is looked for, are what a stale reference
     gives."""
-    arguments = ["stream", "--device", f"sim:{scene}", "--sign", "decrease"]
-    out, err = ran(0, *arguments, "--json")
+    command = f"stream --device sim:{scene} --sign decrease"
+    out, err = ran(0, command, "--json")
     frames = json_lines(out)[:-1]
-    shown = [
-        frame["frame"] for frame in frames if "stale reference" in frame["info"]["diagnostics"]
-    ]
-    lines = [line for line in err.splitlines() if "stale reference" in line]
+    shown = [f["frame"] for f in frames if "stale reference" in f["info"]["diagnostics"]]
     assert len(shown) > 3
-    assert lines == [
+    assert [line for line in err.splitlines() if "stale reference" in line] == [
         f"eitskin: stale reference, frame {shown[2]}: the skin has changed since it was taken;"
         " leave it untouched and run  eitskin tare"
     ]
-    out, err = ran(0, *arguments, "--ignore stale-reference,crowded")
-    assert "stale" not in out + err
-    assert "--ignore stale: " in ran(2, *arguments, "--ignore stale")[1]
+    assert "stale" not in "".join(ran(0, command, "--ignore stale-reference,crowded"))
+    assert "--ignore stale: " in ran(2, command, "--ignore stale")[1]
 
 
 def test_every_other_frame(done, scene):
@@ -154,54 +140,42 @@ def test_every_other_frame(done, scene):
 
 
 def test_another_model_than_the_prebuilt_one(done, scene, tmp_path):
+    """A coarse one, which does not fit the scene well."""
     model = tmp_path / "small.eitm"
     model.write_bytes(small_blob())
-    given = (
-        "--device",
-        f"sim:{scene}",
-        "--model",
-        model,
-        "--ignore",
-        "model-mismatch",
-    )  # the coarse model does not fit the scene well
-    frames = json_lines(done("stream", *given, "--mode image --json"))
+    given = f"--device sim:{scene} --model {model} --ignore model-mismatch"
+    frames = json_lines(done("stream", given, "--mode image --json"))
     assert len(frames) == FRAMES + 1 and len(frames[0]["image_s_per_m"]) < 812
 
 
 # ---- a serial port ----
 
 
-def test_a_board_on_a_port(scene, ran):
-    board = board_of(scene)
-    with behind_a_port(board) as port:
+def test_a_board_on_a_port(scene, ran, told):
+    with behind_a_port(board_of(scene)) as port:
         device = f"serial:{port}"
         out, err = ran(0, f"stream --device {device} --frames 3 -v")
         assert "leave the skin untouched: taking the reference from 16 frames" in err
         assert "touch it" in err
-        assert all(
-            line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (below-threshold)")
-            for line in out.splitlines()[:3]
-        )
-        out, err = ran(0, f"stream --device {device} --frames 3")
-        assert err == "" and out.startswith("  time s  touch    x mm    y mm")
-        assert [line.split()[1] for line in out.splitlines()[1:4]] == 3 * ["-"]
-        assert strict(ran(0, f"tare --device {device} --frames 4 --json")[0]) == {
-            "device": device,
-            "frames": 4,
-            "tared": True,
-        }
-        facts = strict(ran(0, f"info --device {device} --json")[0])
+        for line in out.splitlines()[:3]:
+            assert line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (below-threshold)")
+        # it has its reference already
+        out = ran(0, f"stream --device {device} --frames 3")
+        assert out[1] == "" and out[0].startswith("  time s  touch    x mm    y mm")
+        assert [line.split()[1] for line in out[0].splitlines()[1:4]] == 3 * ["-"]
+        tared = json.loads(ran(0, f"tare --device {device} --frames 4 --json")[0])
+        assert tared == {"device": device, "frames": 4, "tared": True}
+        facts = told(f"info --device {device}")
         assert facts["board"]["tared"] == 1 and facts["statistics"]["frames_scanned"] >= 26
         assert facts["device"] == device
 
 
 def test_a_slow_line_is_not_overrun(scene, ran):
     with behind_a_port(board_of(scene)) as port:
-        out, err = ran(
-            0, f"stream --device serial:{port}?baud=115200 --mode image --frames 4 --json"
-        )
-        assert "the line carries one frame in 7 of image; name another number with  --every" in err
-        assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
+        device = f"serial:{port}?baud=115200"
+        out, err = ran(0, f"stream --device {device} --mode image --frames 4 --json")
+    assert "the line carries one frame in 7 of image; name another number with  --every" in err
+    assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
 
 
 def test_devices_asks_only_what_looks_like_a_board(scene, done, told, monkeypatch, tmp_path):
@@ -253,24 +227,19 @@ def test_tare(done, scene):
 # ---- model upload ----
 
 
-def test_model_upload(scene, tmp_path, ran):
-    model, board = tmp_path / "small.eitm", board_of(scene)
+def test_model_upload(scene, tmp_path, ran, told):
+    model = tmp_path / "small.eitm"
     model.write_bytes(small_blob())
-    with behind_a_port(board) as port:
-        facts = strict(ran(0, f"model upload {model} --device serial:{port} --json")[0])
+    with behind_a_port(board_of(scene)) as port:
+        to = f"--device serial:{port}"
+        facts = told(f"model upload {model} {to}")
         assert (facts["bank"], facts["bytes"]) == (1, len(small_blob()))
-        assert (
-            strict(ran(0, f"info --device serial:{port} --json")[0])["board"]["model_crc"]
-            == facts["model_crc"]
-        )
-        # what needs its pixels now needs the file
-        assert (
-            "needs the board's model"
-            in ran(12, f"stream --device serial:{port} --mode image --frames 1")[1]
-        )
-        ran(0, f"stream --device serial:{port} --mode image --frames 1 --model {model}")
-        # touches are millimetres already
-        ran(0, f"stream --device serial:{port} --frames 1")
+        assert told(f"info {to}")["board"]["model_crc"] == facts["model_crc"]
+        # what needs its pixels now needs the file; touches are millimetres already
+        said = ran(12, f"stream {to} --mode image --frames 1")[1]
+        assert "needs the board's model" in said
+        ran(0, f"stream {to} --mode image --frames 1 --model {model}")
+        ran(0, f"stream {to} --frames 1")
 
 
 # ---- flash ----
@@ -307,7 +276,7 @@ def test_flash_prints_what_it_runs_and_runs_it(tmp_path, monkeypatch, ran):
     assert "eitskin info" in out
     run = [folders.sub("/", f"st-flash {line}") for line in log.read_text().splitlines()]
     assert run == planned
-    assert len(strict(ran(0, *flash, "--no-model --dry-run --json")[0])["commands"]) == 1
+    assert len(json.loads(ran(0, *flash, "--no-model --dry-run --json")[0])["commands"]) == 1
     fake_tool(tmp_path, "st-flash", code=3)
     assert "ended with 3" in ran(12, *flash)[1].splitlines()[-1]
 
@@ -323,37 +292,21 @@ def test_doctor_on_a_healthy_board(told, scene):
     assert touched["healthy"] and "numbering_by_touch" in touched["measured"]
 
 
-def test_doctor_on_a_board_that_reports_a_fault(done, scene, monkeypatch, ran):
-    as_it_is = BoardInfo.fault_codes.fget
-    assert as_it_is is not None
-    monkeypatch.setattr(
-        BoardInfo,
-        "fault_codes",
-        property(lambda info: as_it_is(type(info)(**{**vars(info), "faults": 1 << 2}))),
-    )
-    findings = strict(ran(11, f"doctor --device sim:{scene} --frames 4 --json")[0])["findings"]
-    assert [finding["name"] for finding in findings] == ["board-electrode-open"]
-    assert findings[0]["repair"] == ""
-
-
 # ---- start-up ----
 
 
-def test_help_imports_nothing_heavy():
-    code = (
-        "import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser('')\nprint([name for"
-        " name in ('numpy', 'scipy', 'serial', 'cffi', 'matplotlib', 'unicorn') if name in"
-        " sys.modules])"
-    )
-    assert run_python(code).stdout.strip() == "[]"
-
-
-def test_only_the_named_command_is_imported():
-    code = (
-        "import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser('tare')\nprint([name"
-        " for name in sys.modules if '.cmd_' in name])"
-    )
-    assert run_python(code).stdout.strip() == "['eitskin.cli.cmd_tare']"
+@pytest.mark.parametrize(
+    ("command", "names", "imported"),
+    [
+        ("", "'numpy', 'scipy', 'serial', 'cffi', 'matplotlib', 'unicorn'", "[]"),
+        ("tare", "*(n for n in sys.modules if '.cmd_' in n),", "['eitskin.cli.cmd_tare']"),
+    ],
+    ids=["help: nothing heavy", "only the named command"],
+)
+def test_little_is_imported(command, names, imported):
+    code = f"import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser({command!r})\n"
+    code += f"print([name for name in ({names}) if name in sys.modules])"
+    assert run_python(code).stdout.strip() == imported
 
 
 def test_frames_of_a_recording_give_the_boards_touches(done, told, scene, tmp_path):
@@ -362,6 +315,7 @@ def test_frames_of_a_recording_give_the_boards_touches(done, told, scene, tmp_pa
     assert done(f"replay {run} --frames {exported}") == f"{exported}: {FRAMES} frames, 16 quiet\n"
     frames = load_frames(exported)
     assert frames.n_frames == FRAMES and len(frames.reference_voltage_v) == 16
+    assert np.allclose(frames.time_s, 0.05 * np.arange(FRAMES))
     model: Model = prebuilt()[0]
     assert frames.protocol.hash == model.protocol.hash
     assert frames.meta["board"]["board"] == "simulated"

@@ -94,8 +94,8 @@ def test_gestures_of_a_recording_that_has_touches_alone(done, tmp_path):
 
 def test_a_recording_is_a_device_too(done, told, run):
     shown, replayed = (
-        done(*command).splitlines()[0]
-        for command in (("stream", "-v", "--device", f"file:{run}"), ("replay", "-v", run))
+        done(f"{command}{run}").splitlines()[0]
+        for command in ("stream -v --device file:", "replay -v ")
     )
     assert shown == replayed and ", off by " in shown
     facts = told(f"info --device file:{run}")
@@ -137,89 +137,68 @@ def test_whatever_the_solver_was_told(options, done, told, scene, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("kind", "place"),
+    ("kind", "number", "place", "different"),
     [
-        (PacketType.IMAGE, SOLVED_HEAD + 4 * 400),
-        (PacketType.TOUCHES, SOLVED_HEAD + 4),
-        (PacketType.RAW, RAW_HEAD + 4 * 60 + 1),
+        (PacketType.IMAGE, 2, SOLVED_HEAD + 4 * 400, 1),
+        (PacketType.TOUCHES, 2, SOLVED_HEAD + 4, 1),
+        # what the host makes of a changed raw frame it begins the next one from
+        (PacketType.RAW, 16 + 2, RAW_HEAD + 4 * 60 + 1, None),
+        (PacketType.RAW, 3, RAW_HEAD + 4 * 60 + 2, FRAMES),
     ],
+    ids=["image", "touches", "raw", "reference: every frame"],
 )
-def test_one_bit_that_differs_is_found(kind, place, run, tmp_path, ran):
-    number = 16 + 2 if kind == PacketType.RAW else 2
+def test_one_bit_that_differs_is_found(kind, number, place, different, run, tmp_path, ran):
     other = changed(run, tmp_path / "other.eits", nth(kind, number, flipped(place)))
     out, err = ran(10, f"replay {other} --check --json")
     facts = json.loads(out)
-    different = facts["different"]
-    # what the host makes of a changed raw frame it begins the next one from
-    assert not facts["same_bits"] and different[0] == 18
-    assert len(different) == 1 or kind == PacketType.RAW
+    assert not facts["same_bits"] and facts["different"][0] == (18 if number != 3 else 16)
+    assert different in (None, len(facts["different"]))
     assert err == f"eitskin: {other}: this host's images are not the board's\n"
 
 
-def test_a_changed_bit_in_the_reference_shows_everywhere(run, tmp_path, ran):
-    other = changed(
-        run, tmp_path / "other.eits", nth(PacketType.RAW, 3, flipped(RAW_HEAD + 4 * 60 + 2))
-    )
-    assert len(json.loads(ran(10, f"replay {other} --check --json")[0])["different"]) == FRAMES
+def lost(run: Path, target: Path, number: int = 16 + 1) -> Path:
+    """The recording without one of its raw frames."""
+    return changed(run, target, nth(PacketType.RAW, number, lambda payload: None))
 
 
-def test_frames_after_a_loss_are_not_called_different(done, told, scene, tmp_path):
-    """A warm solve begins from the last one: without it, the host's has other bits and nobody's
-    fault it is."""
-    run = tmp_path / "warm.eits"
-    done(f"record --device sim:{scene} -o {run} --warm")
-    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
-    facts = told(f"replay {other} --check")
-    assert facts["different"] == [] and facts["same"] == 1 and facts["untold"] == FRAMES - 2
-    assert facts["alone"] == 1
-
-
-def test_touches_after_a_loss_are_not_called_different(done, told, run, scene, tmp_path):
-    """Touches that are followed in time began from the frame that is lost; without tracking, every
+@pytest.mark.parametrize(
+    ("how", "same"), [("--warm", 1), ("", None), ("--no-track", FRAMES - 1)],
+    ids=["warm", "tracked", "each by itself"],
+)  # fmt: skip
+def test_frames_after_a_loss_are_not_called_different(how, same, done, told, scene, tmp_path):
+    """A warm solve begins from the last one, and touches that are followed in time began from the
+    frame that is lost: the host's have other bits and nobody's fault it is. Without tracking, every
     frame can be judged."""
-    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
-    facts = told(f"replay {other} --check")
-    assert facts["different"] == [] and facts["alone"] == 1 and facts["untold"] > 0
+    run = tmp_path / "run.eits"
+    done(f"record --device sim:{scene} -o {run}", how)
+    facts = told(f"replay {lost(run, tmp_path / 'other.eits')} --check")
+    assert facts["different"] == [] and facts["alone"] == 1
     assert facts["same"] + facts["untold"] == FRAMES - 1
-    alone = tmp_path / "alone.eits"
-    done(f"record --device sim:{scene} -o {alone} --no-track")
-    other = changed(
-        alone, tmp_path / "others.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None)
-    )
-    facts = told(f"replay {other} --check")
-    assert facts["different"] == []
-    assert (facts["same"], facts["untold"], facts["alone"]) == (FRAMES - 1, 0, 1)
+    assert same in (None, facts["same"]) and (facts["untold"] > 0) == (how != "--no-track")
 
 
 def test_an_image_after_a_loss_is_judged_all_the_same(run, tmp_path, ran):
     """Tracking changes touches only: an image that differs is told, whatever was lost before."""
-    lost = changed(run, tmp_path / "lost.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
-    other = changed(
-        lost, tmp_path / "other.eits", nth(PacketType.IMAGE, 3, flipped(SOLVED_HEAD + 4 * 400))
-    )
+    image = nth(PacketType.IMAGE, 3, flipped(SOLVED_HEAD + 4 * 400))
+    other = changed(lost(run, tmp_path / "lost.eits"), tmp_path / "other.eits", image)
     assert len(json.loads(ran(10, f"replay {other} --check --json")[0])["different"]) == 1
 
 
 def test_a_loss_in_the_tare_leaves_nothing_to_compare(run, tmp_path, ran):
-    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 5, lambda payload: None))
+    other = lost(run, tmp_path / "other.eits", 5)
     assert "nothing to compare" in ran(8, f"replay {other} --check")[1]
 
 
 def test_without_its_note_the_models_own_options_are_taken(done, told, scene, run, tmp_path, ran):
-    without = changed(
-        run, tmp_path / "plain.eits", nth(PacketType.RECORDING, 1, lambda payload: None)
-    )
-    facts = told(f"replay {without} --check")
+    def unnoted(run: Path, name: str) -> Path:
+        return changed(run, tmp_path / name, nth(PacketType.RECORDING, 1, lambda payload: None))
+
+    facts = told(f"replay {unnoted(run, 'plain.eits')} --check")
     assert facts["same"] == FRAMES and not facts["solver_noted"]
     odd = tmp_path / "odd.eits"
     done(f"record --device sim:{scene} -o {odd}", *QUIETLY, "--iterations 5")
-    without = changed(
-        odd, tmp_path / "plain2.eits", nth(PacketType.RECORDING, 1, lambda payload: None)
-    )
-    assert (
-        "the recording does not note the solver's options"
-        in ran(10, f"replay {without} --check")[1]
-    )
+    said = ran(10, f"replay {unnoted(odd, 'plain2.eits')} --check")[1]
+    assert "the recording does not note the solver's options" in said
 
 
 # ---- export ----
@@ -259,24 +238,15 @@ def test_a_recording_needs_no_extra(run):
 
 def test_ctrl_c_stops_the_board_and_sums_up(scene):
     board = board_of(scene)
+    environment = {**os.environ, "PYTHONPATH": str(Path(eitskin.__file__).parents[1])}
     with behind_a_port(board) as port:
-        source = str(Path(eitskin.__file__).parents[1])
-        command = [
-            sys.executable,
-            "-c",
-            INTERRUPTIBLE,
-            "stream",
-            "--device",
-            f"serial:{port}",
-            "-v",
-            "--tare",
-            "4",
-        ]
-        environment = {**os.environ, "PYTHONPATH": source, "OPENBLAS_NUM_THREADS": "1"}
+        command = words(f"stream --device serial:{port} -v --tare 4")
         with subprocess.Popen(
-            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        ) as process:
-            assert process.stdout is not None and process.stderr is not None
+            [sys.executable, "-c", INTERRUPTIBLE, *command],
+            env=environment | {"OPENBLAS_NUM_THREADS": "1"},
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        ) as process:  # fmt: skip
+            assert process.stdout is not None
             for _ in range(5):
                 assert "no touch" in process.stdout.readline()
             process.send_signal(signal.SIGINT)

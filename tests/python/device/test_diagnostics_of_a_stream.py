@@ -7,9 +7,9 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from device_helpers import QUIET, Damaging, empty_bank, same, scene, sim_device
+from device_helpers import QUIET, Damaging, empty_bank, of, same, scene, sim_device
 
-from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
+from eitskin.core.diagnostics_table import DIAGNOSTICS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.events import Events
@@ -35,14 +35,9 @@ ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 @cache
 def wobbling() -> BoardFrames:
     """One touch, and electrode 5 off from the scene's frame 3 until frame 6."""
-    off = {
-        "electrodes": [OFF],
-        "from_s": (FROM_FRAME - 0.5) / 20,
-        "until_s": (UNTIL_FRAME - 0.5) / 20,
-    }
-    return BoardFrames(
-        replace(scene(), frames=FRAMES, effects={**scene().effects, "detached": off})
-    )
+    times = {"from_s": (FROM_FRAME - 0.5) / 20, "until_s": (UNTIL_FRAME - 0.5) / 20}
+    effects = {**scene().effects, "detached": {"electrodes": [OFF], **times}}
+    return BoardFrames(replace(scene(), frames=FRAMES, effects=effects))
 
 
 def board() -> SimBoard:
@@ -50,44 +45,36 @@ def board() -> SimBoard:
 
 
 def heads(items: Iterable[object]) -> list[Solved]:
-    return [item.solved for item in items if isinstance(item, SolvedTouches)]
+    return [item.solved for item in of(SolvedTouches, items)]
 
 
 def faults(items: Iterable[object]) -> list[tuple[int, bool, int, int]]:
-    return [
-        (item.code, item.raised, item.index, item.frame)
-        for item in items
-        if isinstance(item, Fault)
-    ]
+    return [(item.code, item.raised, item.index, item.frame) for item in of(Fault, items)]
 
 
 @pytest.mark.parametrize("every", [1, 4])
-def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_it_is_back(
-    every,
-):
+def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_it_is_back(every):
     with sim_device(board()) as device:
         device.tare(QUIET)
         device.start_scene()
         items = list(device.stream(Stream.TOUCHES, every=every))
-        first = heads(items)[0].frame
-        assert [head.open_electrodes for head in heads(items)] == [
-            (OFF,) if FROM_FRAME <= head.frame - first < UNTIL_FRAME else ()
-            for head in heads(items)
-        ]
-        told = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
-        gone = first + UNTIL_FRAME + FAULT_CLEAR_FRAMES - 1
-        assert told == [
-            (FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME),
-            (FaultCode.ELECTRODE_OPEN, False, OFF, gone),
-        ]
-        if every == 1:
-            at = next(k for k, item in enumerate(items) if isinstance(item, Fault))
-            assert (
-                heads(items[at:])[0].frame == first + FROM_FRAME
-            )  # the fault comes before the frame that it is of
-            row = prebuilt()[0].protocol.drive_measure
-            assert heads(items)[FROM_FRAME].masked == int((row == OFF).any(axis=1).sum())
         assert device.info().faults == 0
+    first = heads(items)[0].frame
+    assert [head.open_electrodes for head in heads(items)] == [
+        (OFF,) if FROM_FRAME <= head.frame - first < UNTIL_FRAME else () for head in heads(items)
+    ]
+    told = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
+    gone = first + UNTIL_FRAME + FAULT_CLEAR_FRAMES - 1
+    assert told == [
+        (FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME),
+        (FaultCode.ELECTRODE_OPEN, False, OFF, gone),
+    ]
+    if every == 1:
+        at = next(k for k, item in enumerate(items) if isinstance(item, Fault))
+        # the fault comes before the frame that it is of
+        assert heads(items[at:])[0].frame == first + FROM_FRAME
+        row = prebuilt()[0].protocol.drive_measure
+        assert heads(items)[FROM_FRAME].masked == int((row == OFF).any(axis=1).sum())
 
 
 def test_it_is_told_though_nobody_wants_images():
@@ -99,22 +86,7 @@ def test_it_is_told_though_nobody_wants_images():
     assert found == [(FaultCode.ELECTRODE_OPEN, True, OFF), (FaultCode.ELECTRODE_OPEN, False, OFF)]
 
 
-def test_what_is_not_looked_for_is_not_found():
-    with sim_device(board()) as device:
-        device.tare(QUIET)
-        open_bit = 1 << DIAGNOSTICS.index("electrode open")
-        device.solver(
-            replace(
-                board_options(prebuilt()[0], device.board), diagnostics=ALL_DIAGNOSTICS & ~open_bit
-            )
-        )
-        device.start_scene()
-        items = list(device.stream(Stream.TOUCHES))
-    assert not any(head.open_electrodes or head.diagnostics & open_bit for head in heads(items))
-    assert FaultCode.ELECTRODE_OPEN not in {fault[0] for fault in faults(items)}
-
-
-def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_path):
+def test_the_check_finds_what_the_board_found(tmp_path):
     path = tmp_path / "run.eits"
     with sim_device(board()) as device:
         options = board_options(prebuilt()[0], device.board)
@@ -122,22 +94,10 @@ def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_p
         with Recorder(path, device, options):
             take_reference(device, QUIET, streamed=True)
             device.start_scene()
-            live = list(follow(device, ALL))
-    with open_device(f"file:{path}") as device:
-        again = [
-            item
-            for item in follow(device, ALL)
-            if isinstance(item, LiveFrame) and item.solved is not None
-        ]
-    assert [frame.solved for frame in again] == [
-        f.solved for f in live if isinstance(f, LiveFrame) and f.solved is not None
-    ]
-    assert any(
-        frame.solved is not None and frame.solved.open_electrodes == (OFF,) for frame in again
-    )
+            live = of(LiveFrame, follow(device, ALL))
+    assert (OFF,) in {frame.solved.open_electrodes for frame in live if frame.solved is not None}
     check, noted = check_recording(path, None)
-    assert noted
-    assert (check.same, check.different) == (FRAMES, [])
+    assert noted and (check.same, check.different) == (FRAMES, [])
 
 
 def test_the_check_tells_findings_apart(tmp_path):
@@ -188,60 +148,51 @@ def bits(*names: str) -> int:
 
 
 def test_what_only_heads_tell_is_said_once_and_when_it_is_over():
-    events = Events()
+    events, nearly = Events(), FAULT_CLEAR_FRAMES - 1
     outlier = {"diagnostics": bits("outlier"), "outliers": 1}
     assert events.lines(solved(1)) == []
     assert events.lines(solved(2, **outlier)) == ["1 row left out as an outlier, frame 2"]
     assert events.lines(solved(3, **outlier)) == []
-    assert [events.lines(solved(4 + k)) for k in range(FAULT_CLEAR_FRAMES - 1)] == [[]] * (
-        FAULT_CLEAR_FRAMES - 1
-    )
+    assert [events.lines(solved(4 + k)) for k in range(nearly)] == [[]] * nearly
     assert events.lines(solved(20, **outlier)) == []  # it came back in time
     said = [events.lines(solved(21 + k)) for k in range(FAULT_CLEAR_FRAMES)]
-    over = f"outlier: over, frame {20 + FAULT_CLEAR_FRAMES}"
-    assert said == [[]] * (FAULT_CLEAR_FRAMES - 1) + [[over]]
+    assert said == [[]] * nearly + [[f"outlier: over, frame {20 + FAULT_CLEAR_FRAMES}"]]
 
 
 def test_what_fault_and_head_tell_is_said_once():
-    events, off = Events(), {"diagnostics": bits("electrode open"), "open_electrodes": (5,)}
+    events, opened = Events(), {"diagnostics": bits("electrode open")}
     rise = Fault(FaultCode.ELECTRODE_OPEN, True, 41, 5, 0)
-    assert events.lines(rise) == [
-        "electrode 5 open, frame 41: it makes no contact; wet or press it, then tare"
-    ]
-    assert events.lines(solved(41, **off)) == []
-    also = {"diagnostics": bits("electrode open"), "open_electrodes": (5, 9)}
-    assert events.lines(solved(42, **also)) == ["electrode 9 open, frame 42"]  # its fault was lost
-    assert events.lines(replace(rise, frame=42, index=9)) == []
-    assert events.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == [
-        "electrode 5 open: over, frame 53"
-    ]
-    assert events.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == []
+    over = Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)
+    what_to_do = "it makes no contact; wet or press it, then tare"
+    for told, said in (
+        (rise, [f"electrode 5 open, frame 41: {what_to_do}"]),
+        (solved(41, open_electrodes=(5,), **opened), []),
+        # the fault of 9 was lost
+        (solved(42, open_electrodes=(5, 9), **opened), ["electrode 9 open, frame 42"]),
+        (replace(rise, frame=42, index=9), []),
+        (over, ["electrode 5 open: over, frame 53"]),
+        (over, []),
+    ):
+        assert events.lines(told) == said
 
 
 def test_a_bridged_pair_is_said_once():
-    events = Events()
-    text = (
-        "electrodes 6 and 7 bridged, frame 3: water, paste or a wire joins them; dry or part them"
-    )
-    assert events.lines(Fault(FaultCode.BRIDGED, True, 3, 6, 7, (0xC0, 0, 0, 0, 0))) == [text]
-    assert events.lines(Fault(FaultCode.BRIDGED, True, 3, 7, 6, (0xC0, 0, 0, 0, 0))) == []
-    assert (
-        events.lines(solved(3, diagnostics=bits("electrodes bridged"), bridged_electrodes=(6, 7)))
-        == []
-    )
-    over = [
-        line for e in (6, 7) for line in events.lines(Fault(FaultCode.BRIDGED, False, 11, e, 0))
-    ]
-    assert over == ["electrode 6 bridged: over, frame 11", "electrode 7 bridged: over, frame 11"]
+    events, both = Events(), (0xC0, 0, 0, 0, 0)
+    what_to_do = "water, paste or a wire joins them; dry or part them"
+    pair = {"diagnostics": bits("electrodes bridged"), "bridged_electrodes": (6, 7)}
+    for told, said in (
+        (Fault(FaultCode.BRIDGED, True, 3, 6, 7, both),
+         [f"electrodes 6 and 7 bridged, frame 3: {what_to_do}"]),
+        (Fault(FaultCode.BRIDGED, True, 3, 7, 6, both), []),
+        (solved(3, **pair), []),
+        (Fault(FaultCode.BRIDGED, False, 11, 6, 0), ["electrode 6 bridged: over, frame 11"]),
+        (Fault(FaultCode.BRIDGED, False, 11, 7, 0), ["electrode 7 bridged: over, frame 11"]),
+    ):  # fmt: skip
+        assert events.lines(told) == said
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts():
-    events, model_mismatch = (
-        Events(),
-        {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125},
-    )
-    told = [
-        events.lines(solved(frame, **(model_mismatch if frame in (2, 3, 7, 8, 9, 10) else {})))
-        for frame in range(1, 12)
-    ]
+    events, off = Events(), {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125}
+    frames = ((k, off if k in (2, 3, 7, 8, 9, 10) else {}) for k in range(1, 12))
+    told = [events.lines(solved(frame, **found)) for frame, found in frames]
     assert told == [[]] * 8 + [["model mismatch 12.5 %, frame 9"], [], []]

@@ -16,13 +16,11 @@ IMAGE = struct.pack("<II", 0x2000_4000, 0x0800_0201) + bytes(2000)
 
 @pytest.fixture
 def tools(tmp_path, monkeypatch) -> Path:
-    """A folder on the path with all three tools, which write down how they were called."""
+    """A folder on the path with all three tools, which end as ``FAIL`` says."""
     folder = tmp_path / "bin"
     folder.mkdir()
     for name in TOOLS:
-        (folder / name).write_text(
-            f'#!/bin/sh\nprintf "%s\\n" "{name} $*" >> {tmp_path}/called\nexit ${{FAIL:-0}}\n'
-        )
+        (folder / name).write_text("#!/bin/sh\nexit ${FAIL:-0}\n")
         (folder / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}:/usr/bin:/bin")
     return folder
@@ -64,19 +62,12 @@ def test_a_model_goes_into_the_first_bank_and_the_other_loses_its_record(tool, i
 
 
 def test_the_first_tool_that_is_there_is_taken(tools):
-    assert find_tool() == "openocd"
-    (tools / "openocd").unlink()
-    assert find_tool() == "st-flash"
-    (tools / "st-flash").unlink()
-    assert find_tool() == "pyocd"
-    with pytest.raises(
-        DeviceError, match="openocd is not installed; install one:  apt install openocd"
-    ):
-        find_tool("openocd")
-    (tools / "pyocd").unlink()
-    with pytest.raises(
-        DeviceError, match="none of openocd, st-flash, pyocd is installed; install one"
-    ):
+    for first in ("openocd", "st-flash", "pyocd"):
+        assert find_tool() == first
+        (tools / first).unlink()
+        with pytest.raises(DeviceError, match=f"{first} is not installed; install one"):
+            find_tool(first)
+    with pytest.raises(DeviceError, match="none of openocd, st-flash, pyocd is installed; install"):
         find_tool()
     with pytest.raises(UsageError, match="--tool dfu: use one of openocd, st-flash, pyocd"):
         find_tool("dfu")
@@ -84,27 +75,19 @@ def test_the_first_tool_that_is_there_is_taken(tools):
     assert find_tool("pyocd", installed=False) == "pyocd"
 
 
-@pytest.mark.parametrize("tool", TOOLS)
-def test_the_plan_is_what_is_run(tool, image, tools, tmp_path):
-    said: list[str] = []
-    plan = plan_flash(image, tiny_blob(), image.parent, tool=tool)
-    assert not (tmp_path / "called").exists()  # planning runs nothing
-    run_flash(plan, said.append)
-    assert said == plan.lines()
-    assert (tmp_path / "called").read_text().splitlines() == [
-        " ".join(command) for command in plan.commands
-    ]
-
-
 def test_a_tool_that_fails_is_said(image, tools, monkeypatch):
     monkeypatch.setenv("FAIL", "3")
-    with pytest.raises(
-        DeviceError, match=r"flashing failed: st-flash .* ended with 3; is the board plugged in"
-    ) as caught:
+    said = r"flashing failed: st-flash .* ended with 3; is the board plugged in"
+    with pytest.raises(DeviceError, match=said) as caught:
         run_flash(plan_flash(image, None, image.parent, tool="st-flash"))
     assert "\n" not in str(caught.value)
     with pytest.raises(DeviceError, match="cannot be run"):
         run_flash(FlashPlan("pyocd", (("/no/such/pyocd",),), image))
+
+
+def words(stack: int, start: int) -> bytes:
+    """The first words of an image."""
+    return struct.pack("<II", stack, start) + bytes(2000)
 
 
 @pytest.mark.parametrize(
@@ -113,12 +96,9 @@ def test_a_tool_that_fails_is_said(image, tools, monkeypatch):
         (b"\x7fELF" + bytes(600), r"this is an \.elf; give the \.bin"),
         (b"", "no firmware image of this board"),
         (bytes(4000), "no firmware image of this board"),
-        (
-            struct.pack("<II", 0x2000_4000, 0x0800_0200) + bytes(2000),
-            "no firmware image",
-        ),  # not Thumb
-        (struct.pack("<II", 0x2000_4000, 0x0900_0001) + bytes(2000), "no firmware image"),
-        (struct.pack("<II", 0x1000_0000, 0x0800_0201) + bytes(2000), "no firmware image"),
+        (words(0x2000_4000, 0x0800_0200), "no firmware image"),  # not Thumb
+        (words(0x2000_4000, 0x0900_0001), "no firmware image"),
+        (words(0x1000_0000, 0x0800_0201), "no firmware image"),
         (IMAGE + bytes(256 * 1024), "but firmware has room for 262144"),
     ],
 )

@@ -158,23 +158,6 @@ def solved(count: int, status: int = 0) -> pk.Solved:
                      0b10111111, 3, 2, 0.375, (5, 63), (0, 1), (7,))  # fmt: skip
 
 
-def test_images_and_touches_are_read_as_built():
-    image = np.linspace(-1, 1, 50, dtype=np.float32)
-    again = pl.parse(link.PacketType.IMAGE, build_image(pk.SolvedImage(solved(50, -12), image)))
-    assert isinstance(again, pk.SolvedImage)
-    assert again.solved == solved(50, -12)
-    assert again.image.tobytes() == image.tobytes()
-    touches = (
-        Touch(1, 2.5, -3.5, 4.0, 5.0, 0.5, 0.25, 0.75, 1.5, 0.0, 2.0),
-        Touch(2**32 - 1, 0.0, 0.0, 1.0, 1.0, 1.0),
-    )
-    found = pk.SolvedTouches(solved(2), touches)
-    assert pl.parse(link.PacketType.TOUCHES, build_touches(found)) == found
-    assert pl.parse(
-        link.PacketType.TOUCHES, build_touches(pk.SolvedTouches(solved(0), ()))
-    ) == pk.SolvedTouches(solved(0), ())
-
-
 @pytest.mark.parametrize("extra", [-1, 1, 4])
 def test_a_payload_of_another_length_is_refused(extra):
     whole = {

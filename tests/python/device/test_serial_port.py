@@ -19,12 +19,12 @@ from eitskin.device import ports as ports_module
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.link import LinkEvent, Reconnect
-from eitskin.device.open import list_devices, open_device, open_transport
+from eitskin.device.open import list_devices, open_device
 from eitskin.device.ports import Port, SerialTransport
 from eitskin.device.simulated import SimBoard
 from eitskin.device.wire.link_table import GetInfo, Stream, Tare
 from eitskin.device.wire.packets import BoardInfo, RawFrame
-from eitskin.errors import DeviceError, UsageError
+from eitskin.errors import DeviceError
 from eitskin.scene.board_frames import BoardFrames
 from small_models import prebuilt
 
@@ -257,28 +257,3 @@ def test_devices_are_listed_boards_first(monkeypatch):
     monkeypatch.setattr("eitskin.device.open.ports", lambda: [Port("/dev/ttyACM9"), BOARD, OTHER])
     found = [port.path for port in list_devices()]
     assert found == ["/dev/ttyACM0", "/dev/ttyACM9", "/dev/ttyUSB0"]
-
-
-@pytest.mark.parametrize(
-    ("url", "message"),
-    [
-        ("", "device ''"),
-        ("seral:/dev/ttyACM0", "serial"),
-        ("/dev/ttyACM0", "write  serial:/dev/ttyACM0"),
-        ("COM3", "write  serial:COM3"),
-        ("serial", "serial:/dev/ttyACM0"),
-        ("serial:", "something must follow the colon"),
-        ("auto:x", "nothing follows  auto"),
-        ("sim:", "something must follow the colon"),
-        ("serial:/dev/ttyACM0?baud=0", "baud=N"),
-        ("serial:/dev/ttyACM0?baud=fast", "baud=N"),
-        ("serial:/dev/ttyACM0?speed=9600", "baud=N"),
-        ("serial:/dev/ttyACM0?baud=99999999", "baud=N"),
-        ("serial:?baud=9600", "baud=N"),
-    ],
-)
-def test_urls_that_cannot_be_read(url, message):
-    with pytest.raises(UsageError) as caught:
-        open_transport(url)
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
