@@ -73,9 +73,8 @@ def test_contraction_and_reordered_sums_are_found_at_the_start(tmp_path, flags, 
     ],
 )
 def test_what_the_compiler_says_of_its_flags_is_refused(tmp_path, flags, said):
-    done = subprocess.run(
-        compile_with(tmp_path, *flags), cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    command = compile_with(tmp_path, *flags)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode != 0 and said in done.stderr
 
 
@@ -124,19 +123,13 @@ def test_other_arithmetic_in_one_file_is_found_by_the_set_and_not_by_the_one_ima
         pytest.skip("this processor's compiler has no -mfma: nothing is contracted by it")
     (tmp_path / "main.c").write_text(SELF_TEST)
     (tmp_path / "unfused.h").write_text(UNFUSED)
-    flags = (
-        ["-ffp-contract=fast", "-mfma"]
-        if fused
-        else ["-ffp-contract=off", "-include", str(tmp_path / "unfused.h")]
-    )
-    built = build_core() / "built"
+    flags = ["-ffp-contract=fast", "-mfma"] if fused else ["-ffp-contract=off", "-include"]
+    flags += [] if fused else [str(tmp_path / "unfused.h")]
     compiler, include = tool("cc", "gcc"), [f"-I{CSRC / 'src'}", f"-I{CSRC / 'include'}"]
-    planted = tmp_path / "planted.o"
+    planted, library = tmp_path / "planted.o", build_core() / "built" / "libeitskin_f32.a"
     run(compiler, "-O3", "-std=gnu11", *flags, *include, "-c", CSRC / "src" / source, "-o", planted)
     # before the library, so that the linker leaves the library's own out
-    run(
-        compiler, *include, tmp_path / "main.c", planted, built / "libeitskin_f32.a", "-lm",
-        "-o", tmp_path / "program",
-    )  # fmt: skip
+    files = [tmp_path / "main.c", planted, library, "-lm", "-o", tmp_path / "program"]
+    run(compiler, *include, *files)
     model = ROOT / "python" / "eitskin" / "model" / "paper.eitm"
     assert run(tmp_path / "program", model).split() == ["0", str(status)]

@@ -17,12 +17,8 @@ ARITHMETIC = {"f32": {"fmaf", "sqrtf"}, "f64": {"fma", "sqrt"}}
 # what a compiler refers to by itself: the processor's features, position-independent code,
 # hardening
 PROCESSOR = {"__cpu_model", "__cpu_features2", "__cpu_indicator_init"}
-OF_THE_COMPILER = PROCESSOR | {
-    "_GLOBAL_OFFSET_TABLE_",
-    "__stack_chk_fail",
-    "__memcpy_chk",
-    "__memset_chk",
-}
+LINKING = {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail", "__memcpy_chk", "__memset_chk"}
+OF_THE_COMPILER = PROCESSOR | LINKING
 WIDTHS = ("f32", "f64")
 
 
@@ -55,10 +51,8 @@ def symbols(library: Path) -> list[Symbol]:
 
 def asked_of_others(library: Path) -> set[str]:
     """Names that the library uses and does not define."""
-    all_symbols = symbols(library)
-    return {s.name for s in all_symbols if s.kind == "U"} - {
-        s.name for s in all_symbols if s.kind != "U"
-    }
+    names = {kind: {s.name for s in symbols(library) if (s.kind == "U") == kind} for kind in (0, 1)}
+    return names[1] - names[0]
 
 
 def writable(library: Path) -> set[str]:
@@ -89,19 +83,6 @@ def shown(library: Path) -> set[str]:
 def test_asks_only_for_memory_moves_and_arithmetic(libraries, width):
     """No malloc, no printf, no file, no clock: nothing but what is listed here."""
     asked = asked_of_others(libraries[width])
-    for forbidden in (
-        "malloc",
-        "calloc",
-        "realloc",
-        "free",
-        "printf",
-        "puts",
-        "fopen",
-        "abort",
-        "exit",
-        "__errno_location",
-    ):
-        assert forbidden not in asked
     assert asked - OF_THE_COMPILER <= MEMORY | ARITHMETIC[width]
     assert "memcpy" in asked or "memset" in asked  # the list was read at all
 
@@ -117,18 +98,13 @@ def test_shows_only_names_of_its_own(libraries, width):
     names = shown(libraries[width])
     assert {name for name in names if not name.startswith("eits_")} == set()
     assert {"eits_model_open", "eits_init", "eits_reconstruct", "eits_find_touches"} <= names
-
-
-def test_both_widths_show_the_same(libraries):
-    assert shown(libraries["f32"]) == shown(libraries["f64"])
+    assert names == shown(libraries["f32"])
 
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_every_source_is_built(libraries, width):
-    members = {
-        name.removesuffix(".o").removesuffix(".obj")
-        for name in run(tool("ar"), "t", libraries[width]).split()
-    }
+    listed = run(tool("ar"), "t", libraries[width]).split()
+    members = {name.removesuffix(".o").removesuffix(".obj") for name in listed}
     sources = {path.name for path in SOURCES if path.suffix == ".c"}
     assert sources - members <= {"avx2.c", "m7.c"}  # for one family of processors only
     assert members <= sources
@@ -169,18 +145,8 @@ def test_each_header_stands_alone(path, width, tmp_path):
     """Included first and alone, as C11 without extensions and, where there is a C++ compiler, as
     C++."""
     program = tmp_path / "alone.c"
-    program.write_text(
-        f'#include "eitskin/{path.name}"\nint main(void) {{ return 0; }}\n', encoding="ascii"
-    )
-    strict: list[str | Path] = [
-        "-fsyntax-only",
-        "-pedantic",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-I",
-        CSRC / "include",
-    ]
+    program.write_text(f'#include "eitskin/{path.name}"\nint main(void) {{ return 0; }}\n')
+    strict = ["-fsyntax-only", "-pedantic", "-Wall", "-Wextra", "-Werror", f"-I{CSRC / 'include'}"]
     strict += ["-DEITS_DOUBLE"] if width == "f64" else []
     run(tool("cc", "gcc", "clang"), "-std=c11", *strict, program)
     plus = shutil.which("c++") or shutil.which("g++")

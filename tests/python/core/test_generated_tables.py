@@ -24,12 +24,8 @@ CONSTANTS = load_toml(ROOT / "tables" / "constants.toml", "table")["room"]
 
 
 def test_what_is_written_from_the_tables_is_up_to_date():
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "tables" / "make_tables.py"), "--check"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, str(ROOT / "tables" / "make_tables.py"), "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"run  python tables/make_tables.py\n{done.stdout}{done.stderr}"
 
 
