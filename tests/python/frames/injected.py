@@ -1,10 +1,13 @@
 """Healthy frames from the closed form, seeded, and the faults that tests inject into them."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import homogeneous, touch_transfer, voltages_of
+from eitskin.frames.orders import match_rows, source_table, swap_map
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
 
@@ -57,14 +60,11 @@ def healthy_frames(
 
 def changed(frames: Frames, reference: FloatArray, voltage: FloatArray) -> Frames:
     """The same frames with other voltages."""
-    return Frames(
-        protocol=frames.protocol,
-        voltage_v=voltage,
+    return replace(
+        frames,
         reference_voltage_v=reference,
-        touch_frame=frames.touch_frame,
-        touch_xy_mm=frames.touch_xy_mm,
-        touch_radius_mm=frames.touch_radius_mm,
-        touch_sign=frames.touch_sign,
+        voltage_v=voltage,
+        frame_name=(),
         allow_nonfinite=True,
     )
 
@@ -99,6 +99,37 @@ def as_if_electrodes(
 
 def quiet_only(frames: Frames) -> Frames:
     """The same voltages without any known touch."""
-    return Frames(
-        frames.protocol, frames.voltage_v, frames.reference_voltage_v, allow_nonfinite=True
-    )
+    volts, quiet = frames.voltage_v, frames.reference_voltage_v
+    return Frames(frames.protocol, volts, quiet, allow_nonfinite=True)
+
+
+def rotating(frames: Frames) -> Frames:
+    """The same in rotating order."""
+    given = source_table("rotating", frames.protocol)
+    return permuted(frames, match_rows(frames.protocol.drive_measure, given).index)
+
+
+def reversed_sign(frames: Frames) -> Frames:
+    return times(frames, np.float64(-1))
+
+
+def dead(frames: Frames, *electrodes: int) -> Frames:
+    gone = np.isin(frames.protocol.drive_measure, electrodes).any(axis=1)
+    return times(frames, np.where(gone, 1e-3, 1.0))
+
+
+def channels_off(frames: Frames, channels: list[int], gain: float) -> Frames:
+    gains = np.ones(frames.protocol.n_rows)
+    gains[channels] = gain
+    return times(frames, gains)
+
+
+def pair_off(frames: Frames, columns: slice, gain: float) -> Frames:
+    """All channels that drive (columns 0, 1) or measure (2, 3) with the electrodes 3 and 4."""
+    of_pair = (frames.protocol.drive_measure[:, columns] == [3, 4]).all(axis=1)
+    return times(frames, np.where(of_pair, gain, 1.0))
+
+
+def wired(seed: int, *pairs: tuple[int, int]) -> Frames:
+    """With the wires of these electrodes exchanged."""
+    return as_if_electrodes(healthy_frames(seed), swap_map(16, pairs), seed=seed)

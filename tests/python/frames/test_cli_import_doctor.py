@@ -7,15 +7,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from injected import as_if_electrodes, healthy_frames, permuted, quiet_only, times
+from injected import (
+    as_if_electrodes,
+    channels_off,
+    dead,
+    healthy_frames,
+    pair_off,
+    quiet_only,
+    reversed_sign,
+    rotating,
+    times,
+    wired,
+)
 
 from eitskin.cli import cmd_doctor, cmd_import
 from eitskin.errors import EitskinError, UsageError
 from eitskin.frames.frames import Frames, load_frames, save_frames
-from eitskin.frames.orders import electrode_map, match_rows, source_table, swap_map
-from eitskin.skin.protocol import adjacent, opposite
+from eitskin.frames.orders import electrode_map, match_rows, source_table
+from eitskin.skin.protocol import opposite
 
-ROWS = adjacent(16).drive_measure.astype(np.int64)
 NPZ = ("--voltage", "v", "--reference", "r", "--scale", "1")
 ADJACENT = ("--protocol", "adjacent", "--electrodes", "16")
 SKIN = """
@@ -43,67 +53,58 @@ def write(path: Path, frames: Frames) -> Path:
     return path
 
 
-def rotating(frames: Frames) -> Frames:
-    protocol = frames.protocol
-    return permuted(
-        frames, match_rows(protocol.drive_measure, source_table("rotating", protocol)).index
-    )
-
-
-def one_off(frames: Frames, channels: list[int], gain: float) -> Frames:
-    gains = np.ones(frames.protocol.n_rows)
-    gains[channels] = gain
-    return times(frames, gains)
-
-
-def dead(frames: Frames, electrode: int) -> Frames:
-    return times(frames, np.where((electrode == ROWS).any(axis=1), 1e-3, 1.0))
-
-
-FAULTS: dict[str, Callable[[], Frames]] = {
-    "rotating": lambda: rotating(healthy_frames(1)),
-    "reversed": lambda: times(healthy_frames(2), np.float64(-1)),
-    "rotating and reversed": lambda: times(rotating(healthy_frames(3)), np.float64(-1)),
-    "swapped": lambda: as_if_electrodes(healthy_frames(4), swap_map(16, [(2, 7)]), seed=4),
-    "swapped twice, rotating": lambda: rotating(
-        as_if_electrodes(healthy_frames(5), swap_map(16, [(3, 9), (1, 14)]), seed=5)
+BOTH_WAYS = "--order rotating --swap 3,9 --swap 1,14"
+FAULTS: dict[str, tuple[Callable[[], Frames], str]] = {
+    "rotating": (lambda: rotating(healthy_frames(1)), "--order rotating"),
+    "reversed": (lambda: reversed_sign(healthy_frames(2)), "--sign reversed"),
+    "rotating and reversed": (
+        lambda: reversed_sign(rotating(healthy_frames(3))), "--order rotating --sign reversed",
     ),
-    "dead": lambda: dead(healthy_frames(6), 11),
-    "two dead": lambda: dead(dead(healthy_frames(19), 2), 9),
-    "dead, rotating, reversed": lambda: times(rotating(dead(healthy_frames(7), 4)), np.float64(-1)),
-    "one channel": lambda: one_off(healthy_frames(8), [40], 1.5),
-    "both of a pair": lambda: one_off(healthy_frames(9), [0, 26], 1.5),
-    "flipped": lambda: one_off(healthy_frames(10), [17, 90], -1.0),
-    "own gains": lambda: times(
-        healthy_frames(11), np.random.default_rng(11).uniform(0.8, 1.2, 208)
+    "swapped": (lambda: wired(4, (2, 7)), "--swap 2,7"),
+    "swapped twice, rotating": (lambda: rotating(wired(5, (3, 9), (1, 14))), BOTH_WAYS),
+    "swapped twice, rotating, reversed": (
+        lambda: reversed_sign(rotating(wired(10, (3, 9), (1, 14)))), f"{BOTH_WAYS} --sign reversed",
     ),
-    "one drive": lambda: times(
-        healthy_frames(12), np.where((ROWS[:, :2] == [3, 4]).all(axis=1), 0.7, 1.0)
+    "dead": (lambda: dead(healthy_frames(6), 11), "--drop-electrodes 11"),
+    "two dead": (lambda: dead(healthy_frames(19), 2, 9), "--drop-electrodes 2,9"),
+    "dead, rotating, reversed": (
+        lambda: reversed_sign(rotating(dead(healthy_frames(7), 4))),
+        "--order rotating --sign reversed --drop-electrodes 4",
     ),
-}
+    "one channel": (
+        lambda: channels_off(healthy_frames(8), [40], 1.5), "--impute-channels 40"
+    ),
+    "both of a pair": (
+        lambda: channels_off(healthy_frames(9), [0, 26], 1.5), "--drop-channels 0,26"
+    ),
+    "flipped": (
+        lambda: channels_off(healthy_frames(10), [17, 90], -1.0), "--flip-channels 17,90"
+    ),
+    "own gains": (
+        lambda: times(healthy_frames(11), np.random.default_rng(11).uniform(0.8, 1.2, 208)),
+        "--equalise",
+    ),
+    "one drive": (lambda: pair_off(healthy_frames(12), slice(0, 2), 0.7), "--equalise"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_advice_mends(tmp_path, capsys, fault):
-    path, repaired = write(tmp_path / "s.npz", FAULTS[fault]()), tmp_path / "repaired.npz"
+    make, wanted = FAULTS[fault]
+    path, repaired = write(tmp_path / "s.npz", make()), tmp_path / "repaired.npz"
     assert run("doctor", path, *NPZ, *ADJACENT, "--json") == 11
-    advice = json.loads(capsys.readouterr().out)["repair"].split()
-    assert advice
-    assert run("import", path, "-o", repaired, *NPZ, *ADJACENT, *advice) == 0
+    advice = json.loads(capsys.readouterr().out)["repair"]
+    assert advice == wanted
+    assert run("import", path, "-o", repaired, *NPZ, *ADJACENT, *advice.split()) == 0
     assert run("doctor", repaired, "--json") == 0, capsys.readouterr().out
 
 
 def test_numbering_is_advised_by_known_touches_and_mends(tmp_path, capsys):
     (tmp_path / "skin.toml").write_text(SKIN)
     turned = as_if_electrodes(healthy_frames(13), electrode_map(16, 5, True), seed=13)
-    path, repaired = (
-        write(tmp_path / "s.npz", one_off(turned, [40], 1.5)),
-        tmp_path / "repaired.npz",
-    )
-    touch = (
-        "--skin", tmp_path / "skin.toml", "--touch", "30,40,8", "--touch=-50,10,8", "--touch-in",
-        "0",
-    )  # fmt: skip
+    path = write(tmp_path / "s.npz", channels_off(turned, [40], 1.5))
+    repaired, skin = tmp_path / "repaired.npz", tmp_path / "skin.toml"
+    touch = ("--skin", skin, "--touch", "30,40,8", "--touch=-50,10,8", "--touch-in", "0")
     assert run("doctor", path, *NPZ, *touch, "--json") == 11
     report = json.loads(capsys.readouterr().out)
     assert report["repair"] == "--rotate 5 --mirror"

@@ -6,7 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from injected import as_if_electrodes, changed, healthy_frames, permuted, quiet_only, times
+from injected import (
+    as_if_electrodes,
+    changed,
+    channels_off,
+    dead,
+    healthy_frames,
+    pair_off,
+    quiet_only,
+    reversed_sign,
+    rotating,
+    times,
+    wired,
+)
 
 from eitskin.frames import front_end, orders, repair
 from eitskin.frames import homogeneous as ideal
@@ -21,7 +33,6 @@ from small_models import small
 
 STORE = Path(__file__).with_suffix(".json")
 PAPER = paper_skin()
-ROWS = adjacent(16).drive_measure.astype(np.int64)
 RING: dict[str, Protocol] = {"adjacent": adjacent(16), "opposite": opposite(8), "skip": skip(12, 2)}
 
 
@@ -41,23 +52,10 @@ def limited(share: float) -> Frames:
     return spoilt(31, lambda v, _: np.clip(v, -share * np.abs(v).max(), share * np.abs(v).max()))
 
 
-def dead(frames: Frames, *electrodes: int) -> Frames:
-    return times(frames, np.where(np.isin(ROWS, electrodes).any(axis=1), 1e-3, 1.0))
-
-
-def wired(seed: int, *pairs: tuple[int, int]) -> Frames:
-    return as_if_electrodes(healthy_frames(seed), orders.swap_map(16, pairs), seed=seed)
-
-
-def rotating(frames: Frames) -> Frames:
-    given = orders.source_table("rotating", frames.protocol)
-    return permuted(frames, orders.match_rows(frames.protocol.drive_measure, given).index)
-
-
 SPOILT: dict[str, Callable[[], Frames]] = {
     "healthy": lambda: healthy_frames(1),
     "quiet only": lambda: quiet_only(healthy_frames(2)),
-    "reversed": lambda: times(healthy_frames(3), np.float64(-1)),
+    "reversed": lambda: reversed_sign(healthy_frames(3)),
     "rotating": lambda: rotating(healthy_frames(4)),
     "magnitudes": lambda: spoilt(5, lambda v, _: np.abs(v)),
     "too large": lambda: times(healthy_frames(6), np.float64(4000)),
@@ -65,13 +63,9 @@ SPOILT: dict[str, Callable[[], Frames]] = {
     "swapped twice": lambda: wired(8, (3, 9), (1, 14)),
     "one dead": lambda: dead(healthy_frames(9), 11),
     "three dead": lambda: dead(healthy_frames(10), 2, 3, 9),
-    "a channel": lambda: times(healthy_frames(11), np.where(np.arange(208) == 40, 1.5, 1.0)),
-    "two flipped": lambda: times(
-        healthy_frames(12), np.where(np.isin(np.arange(208), (17, 90)), -1.0, 1.0)
-    ),
-    "a drive": lambda: times(
-        healthy_frames(13), np.where((ROWS[:, :2] == [3, 4]).all(axis=1), 0.7, 1.0)
-    ),
+    "a channel": lambda: channels_off(healthy_frames(11), [40], 1.5),
+    "two flipped": lambda: channels_off(healthy_frames(12), [17, 90], -1.0),
+    "a drive": lambda: pair_off(healthy_frames(13), slice(0, 2), 0.7),
     "own gains": lambda: times(
         healthy_frames(14), np.random.default_rng(14).uniform(0.7, 1.3, 208)
     ),
