@@ -9,30 +9,22 @@ from firmware_checks import CHECKS, run_session
 
 from eitskin.device.client import Device
 from eitskin.device.wire.link_table import Quality, Stream
-from eitskin.device.wire.packets import RawFrame, SolvedTouches
-from eitskin.errors import DeviceError, ProtocolError
+from eitskin.errors import DeviceError
 from eitskin.model.build import BuildSettings, linearise, make_model
 from eitskin.model.eitm import encode_model
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.scene.library_scenes import find_scene
 from eitskin.skin.protocol import opposite
 from eitskin.skin.skin import paper_skin
 from eitskin_emulator.analog.converter import STEP_V
 from eitskin_emulator.board import EmulatedBoard
 from eitskin_emulator.clocktime import TICKS_PER_S
-from eitskin_emulator.scene_skin import skin_of
 from emulated import EVERYTHING, board_of, clean, connect, power_up, raw_frames, twin_check
-from small_models import small
 
 
 @pytest.fixture(scope="module")
 def quiet(image) -> Device:
     """A board before an untouched skin without noise."""
     return connect(power_up(image, noisy=False))
-
-
-def joined_order(board: EmulatedBoard, first: int) -> list[tuple[int | None, ...]]:
-    return [one.joined for one in board.multiplexers.log[first:] if None not in one.joined]
 
 
 def test_the_board_says_what_it_is(quiet):
@@ -104,22 +96,15 @@ def test_touches_and_images_are_the_host_s_to_the_bit(image):
 
 def test_an_opposite_protocol(image):
     """Another protocol: the model's table is scanned, and each row has its voltage."""
-    skin, protocol = (
-        paper_skin(),
-        opposite(16, 0.5e-3),
-    )  # at 1 mA its voltages would saturate this front end
-    model = make_model(
-        skin,
-        protocol,
-        linearise(skin, protocol, pixels_across=14, elements=900),
-        BuildSettings(rank=40),
-    )
+    skin, protocol = paper_skin(), opposite(16, 0.5e-3)  # 1 mA would saturate this front end
+    linear = linearise(skin, protocol, pixels_across=14, elements=900)
+    model = make_model(skin, protocol, linear, BuildSettings(rank=40))
     board = power_up(image, noisy=False, model=encode_model(model))
     device = connect(board)
     assert device.board.protocol_hash == protocol.hash
     errors = amplitude_errors_lsb(device)
     table = [tuple(int(k) for k in row) for row in protocol.drive_measure]
-    order = joined_order(board, 0)
+    order = [one.joined for one in board.multiplexers.log if None not in one.joined]
     start = order.index(table[0])
     assert order[start : start + len(table)] == table
     print(f"opposite: worst {np.abs(errors).max():.3f} LSB")
@@ -129,16 +114,8 @@ def test_an_opposite_protocol(image):
 
 def periods_us(device: Device, frames: int) -> tuple[float, float]:
     """From frame to frame, by the board's clock: of scans alone, and with solves."""
-    raw = [
-        item.time_us
-        for item in device.stream(Stream.RAW, frames=frames)
-        if isinstance(item, RawFrame)
-    ]
-    solved = [
-        item.solved.time_us
-        for item in device.stream(Stream.TOUCHES, frames=frames)
-        if isinstance(item, SolvedTouches)
-    ]
+    raw = [one.time_us for one in device.stream(Stream.RAW, frames=frames)]
+    solved = [one.solved.time_us for one in device.stream(Stream.TOUCHES, frames=frames)]
     return float(np.diff(raw)[2:].mean()), float(np.diff(solved)[2:].mean())
 
 
@@ -160,9 +137,8 @@ def test_frame_rates(image, check_every, rows):
     rate = f"scan {scan_us / 1000:.2f} ms, frame {frame_us / 1000:.2f} ms ({1e6 / frame_us:.1f} Hz)"
     print(f"{rows} rows: {rate}; {told}: {bound} bounds it")
     assert abs(scan_us - rows * device.board.slot_us) <= 2 * device.board.slot_us
-    assert (
-        scan_us - 1 <= frame_us <= max(scan_us, sum(own_us.values())) * 1.1
-    )  # they overlap: it is not their sum
+    # they overlap: it is not their sum
+    assert scan_us - 1 <= frame_us <= max(scan_us, sum(own_us.values())) * 1.1
     clean(board)
 
 
@@ -188,10 +164,3 @@ def test_without_the_8_mhz_the_red_light_blinks(image):
         lights.add(board.ports["B"].levels)
     assert lights >= {0, 1 << 14}
     assert board.receive() == b""
-
-
-def test_a_scene_for_other_electrodes_is_refused():
-    with pytest.raises(
-        ProtocolError, match=r"its skin has 16 electrodes, the model is for 8; build a model"
-    ):
-        skin_of(find_scene("two_touch"), small("disk", "adjacent", 8).protocol)

@@ -29,12 +29,9 @@ def test_a_device_by_its_url(built, scene):
         assert isinstance(device.transport, Transport)
         device.tare(4)
         device.start_scene()
-        touches = [
-            item
-            for item in device.stream(Stream.TOUCHES, frames=3)
-            if isinstance(item, SolvedTouches)
-        ]
-        assert len(touches[-1].touches) == 2
+        items = list(device.stream(Stream.TOUCHES, frames=3))
+        last = [item for item in items if isinstance(item, SolvedTouches)][-1]
+        assert len(last.touches) == 2
         assert not device.transport.ended
 
 

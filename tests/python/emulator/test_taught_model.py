@@ -54,11 +54,19 @@ def test_a_taught_model_is_uploaded_and_streamed(image, tmp_path):
     (tmp_path / "skin.toml").write_text(EIGHT_OPPOSITE_TOML, encoding="utf-8")
     (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
     device = connect(power_up(image, scene=str(tmp_path / "scene.toml"), model=physics))
-    assert device.upload_model(blob).model_crc == zlib.crc32(blob)
+    board = board_of(device)
+    before, info = board.bank(0), device.upload_model(blob)
+    assert (info.model_crc, info.bank, info.tared) == (zlib.crc32(blob), 1, 0)
+    assert board.bank(1)[: len(blob)] == blob and board.bank(0) == before
+    assert board.flash.words_programmed == -(-len(blob) // 4) + 8
+    device.self_test()
+    assert device.reset().bank == 1
     check, _, results = twin_check(device, blob, 6)
     assert check.as_dict()["same_bits"] and check.compared == 6
     last = results[-1]
     assert last is not None
     assert [(one.x_mm, one.y_mm) for one in last.touches] == [pytest.approx(PLACE_MM, abs=3)]
-    assert restarted(device).board.model_crc == zlib.crc32(blob)
-    clean(board_of(device))
+    clean(board)
+    again = restarted(device)
+    assert (again.board.model_crc, again.board.bank) == (zlib.crc32(blob), 1)
+    clean(board)

@@ -106,12 +106,6 @@ def out(board: EmulatedBoard, count: int) -> list[int]:
     return list(struct.unpack(f"<{count}I", board.memories.ram[OUT - RAM : OUT - RAM + 4 * count]))
 
 
-def unexpected(board: EmulatedBoard) -> int:
-    """The number of an exception that the program did not expect; the pattern of fresh RAM if none
-    came."""
-    return int(struct.unpack("<I", board.memories.ram[OUT - RAM - 4 : OUT - RAM])[0])
-
-
 # 216 MHz as the firmware sets it up, in as few words
 CLOCK = """
 static void clock_216(void) {

@@ -91,31 +91,27 @@ def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path):
 @pytest.mark.parametrize("protocol", (adjacent(16), opposite(16)), ids=("adjacent", "opposite"))
 def test_signs_come_back(tmp_path, protocol, sign):
     frames = healthy_frames(3, protocol)
-    path = tmp_path / "s.npz"
     change = np.abs if sign == "magnitude" else np.negative
-    np.savez(path, v=change(frames.voltage_v), r=change(frames.reference_voltage_v))
+    volts, quiet = change(frames.voltage_v), change(frames.reference_voltage_v)
+    path = source(tmp_path, replace(frames, voltage_v=volts, reference_voltage_v=quiet))
     assert_same(taken(path, protocol, sign=sign), frames)
 
 
 @pytest.mark.parametrize(("rotate", "mirror"), [(3, False), (0, True), (5, True)])
 def test_renumbering_comes_back(tmp_path, rotate, mirror):
     frames = healthy_frames(4)
-    back = electrode_map(16, rotate, mirror)
-    match = match_rows(TABLE, relabel(TABLE, back))
+    match = match_rows(TABLE, relabel(TABLE, electrode_map(16, rotate, mirror)))
     path = source(tmp_path, frames, match.index, match.sign)
-    options = ImportOptions(source=KEYS, rotate=rotate, mirror=mirror)
-    assert_same(import_frames(path, options, adjacent(16), None), frames)
+    assert_same(taken(path, rotate=rotate, mirror=mirror), frames)
 
 
 def test_clockwise_mirrors_unless_the_skin_is_clockwise(tmp_path):
-    frames = healthy_frames(5)
+    frames, skin = healthy_frames(5), paper_skin()
     match = match_rows(TABLE, relabel(TABLE, electrode_map(16, 0, True)))
     path = source(tmp_path, frames, match.index, match.sign)
-    options = ImportOptions(source=KEYS, clockwise=True)
-    assert_same(import_frames(path, options, adjacent(16), paper_skin()), frames)
-    skin = paper_skin()
+    assert_same(taken(path, skin=skin, clockwise=True), frames)
     clockwise = replace(skin, electrodes=replace(skin.electrodes, clockwise=True))
-    unchanged = import_frames(path, options, adjacent(16), clockwise)
+    unchanged = taken(path, skin=clockwise, clockwise=True)
     assert np.allclose(unchanged.voltage_v, frames.voltage_v[:, match.index] * match.sign)
 
 
@@ -128,14 +124,9 @@ def test_swapped_wires_give_the_table_that_was_really_measured(tmp_path):
 def test_channels_are_flipped_filled_and_left_out(tmp_path):
     frames = healthy_frames(7)
     path = source(tmp_path, frames)
-    options = ImportOptions(
-        source=KEYS,
-        flip_channels=(5,),
-        impute_channels=(0,),
-        drop_channels=(207,),
-        drop_electrodes=(9,),
+    repaired = taken(
+        path, flip_channels=(5,), impute_channels=(0,), drop_channels=(207,), drop_electrodes=(9,)
     )
-    repaired = import_frames(path, options, adjacent(16), None)
     kept = [row for row in range(207) if 9 not in TABLE[row]]
     assert np.array_equal(repaired.protocol.drive_measure, TABLE[kept])
     assert np.allclose(repaired.voltage_v[:, 5], -frames.voltage_v[:, 5])
@@ -267,28 +258,14 @@ def test_mat_files_with_structs(tmp_path):
 def test_truth_comes_along_in_millimetres(tmp_path):
     frames, rng = healthy_frames(13), np.random.default_rng(13)
     mask = rng.integers(-1, 2, size=(1, 5, 6)).astype(np.int8)
-    path = tmp_path / "t.npz"
-    np.savez(
-        path,
-        v=frames.voltage_v,
-        r=frames.reference_voltage_v,
-        names=np.array(["two"]),
-        of=np.array(["two", "two"]),
-        xy=np.array([[0.1, 0.2], [0.3, -0.4]]),
-        rad=np.array([0.1, 0.2]),
-        more=np.array([True, False]),
-        mask=mask,
-    )
+    known = {"of": ["two", "two"], "xy": [[0.1, 0.2], [0.3, -0.4]], "rad": [0.1, 0.2]}
+    path = source(tmp_path, frames, names=["two"], more=[True, False], mask=mask, **known)
     truth = TruthOptions(
-        touch_frame="of",
-        touch_xy="xy",
-        touch_radius="rad",
-        touch_sign="more",
-        touch_unit_mm=97.0,
+        touch_frame="of", touch_xy="xy", touch_radius="rad", touch_sign="more", touch_unit_mm=97.0,
         mask="mask",
-    )
-    options = ImportOptions(source=replace(KEYS, names="names"), truth=truth)
-    got = import_frames(path, options, adjacent(16), paper_skin())
+    )  # fmt: skip
+    named, skin = replace(KEYS, names="names"), paper_skin()
+    got = taken(path, skin=skin, source=named, truth=truth)
     assert got.touch_frame is not None
     assert got.touch_xy_mm is not None
     assert got.touch_sign is not None
@@ -297,17 +274,14 @@ def test_truth_comes_along_in_millimetres(tmp_path):
     assert got.touch_strength is not None and np.isnan(got.touch_strength).all()
     assert np.array_equal(got.truth_mask, mask)
     assert got.truth_mask_extent_mm == (-97.0, -97.0, 97.0, 97.0)
-    top_first = replace(options, truth=replace(truth, mask_top_first=True))
-    flipped = import_frames(path, top_first, adjacent(16), paper_skin())
+    flipped = taken(path, skin=skin, source=named, truth=replace(truth, mask_top_first=True))
     assert np.array_equal(flipped.truth_mask, mask[:, ::-1])
     with pytest.raises(UsageError, match="--truth-mask-extent"):
-        import_frames(path, options, adjacent(16), None)
+        taken(path, source=named, truth=truth)
     with pytest.raises(UsageError, match="need --truth-xy too"):
-        import_frames(
-            path, replace(options, truth=TruthOptions(touch_frame="of")), adjacent(16), None
-        )
+        taken(path, source=named, truth=TruthOptions(touch_frame="of"))
     with pytest.raises(FrameError, match="names frame 'two'; frames are 0"):
-        import_frames(path, replace(options, source=KEYS), adjacent(16), paper_skin())
+        taken(path, skin=skin, truth=truth)
 
 
 def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path):
@@ -325,51 +299,32 @@ def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path):
         import_frames(tmp_path / "a.npz", ImportOptions(), opposite(16), None)
 
 
+NPZ = r"no array 'x' .*r \(12, 208\), v \(1, 208\)"
+QUIET = "which frames are quiet: --reference KEY"
+
+
 @pytest.mark.parametrize(
-    ("options", "protocol", "said"),
+    ("of_source", "options", "protocol", "said"),
     [
-        (
-            ImportOptions(source=SourceOptions(voltage="x")),
-            adjacent(16),
-            r"no array 'x' .*r \(12, 208\), v \(1, 208\)",
-        ),
-        (ImportOptions(source=SourceOptions()), adjacent(16), "--voltage KEY"),
-        (
-            ImportOptions(source=SourceOptions(voltage="v")),
-            adjacent(16),
-            "which frames are quiet: --reference KEY",
-        ),
-        (
-            ImportOptions(source=replace(KEYS, columns="1")),
-            adjacent(16),
-            "--columns does not go with a NPZ",
-        ),
-        (ImportOptions(source=KEYS), adjacent(8), r"v \(1, 208\): a frame should have 40 channels"),
-        (ImportOptions(source=KEYS, order="fixed-all"), adjacent(16), "should have 256 channels"),
-        (ImportOptions(source=KEYS), None, "say which protocol"),
-        (ImportOptions(source=KEYS, order="table"), adjacent(16), "--order table needs"),
-        (ImportOptions(source=KEYS, sign="maybe"), adjacent(16), "--sign maybe"),
-        (ImportOptions(source=replace(KEYS, scale=0.0)), adjacent(16), "--scale 0"),
-        (
-            ImportOptions(source=replace(KEYS, frames_in="columns")),
-            adjacent(16),
-            "--frames-in columns a",
-        ),
-        (
-            ImportOptions(source=replace(KEYS, reference_frames="0")),
-            adjacent(16),
-            "another reference",
-        ),
-        (
-            ImportOptions(source=replace(KEYS, protocol_table="v")),
-            adjacent(16),
-            "table is .rows, 4",
-        ),
+        (SourceOptions(voltage="x"), {}, ADJACENT, NPZ),
+        (SourceOptions(), {}, ADJACENT, "--voltage KEY"),
+        (SourceOptions(voltage="v"), {}, ADJACENT, QUIET),
+        (replace(KEYS, columns="1"), {}, ADJACENT, "--columns does not go with a NPZ"),
+        (KEYS, {}, adjacent(8), r"v \(1, 208\): a frame should have 40 channels"),
+        (KEYS, {"order": "fixed-all"}, ADJACENT, "should have 256 channels"),
+        (KEYS, {}, None, "say which protocol"),
+        (KEYS, {"order": "table"}, ADJACENT, "--order table needs"),
+        (KEYS, {"sign": "maybe"}, ADJACENT, "--sign maybe"),
+        (replace(KEYS, scale=0.0), {}, ADJACENT, "--scale 0"),
+        (replace(KEYS, frames_in="columns"), {}, ADJACENT, "--frames-in columns a"),
+        (replace(KEYS, reference_frames="0"), {}, ADJACENT, "another reference"),
+        (replace(KEYS, protocol_table="v"), {}, ADJACENT, "table is .rows, 4"),
     ],
 )
-def test_bad_options_say_what_to_do(tmp_path, options, protocol, said):
+def test_bad_options_say_what_to_do(tmp_path, of_source, options, protocol, said):
+    path = source(tmp_path, healthy_frames(15))
     with pytest.raises(EitskinError, match=said) as caught:
-        import_frames(source(tmp_path, healthy_frames(15)), options, protocol, None)
+        taken(path, protocol, source=of_source, **options)
     assert "\n" not in str(caught.value)
 
 

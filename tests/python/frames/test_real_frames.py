@@ -21,12 +21,9 @@ KIT4 = Skin(
     "kit4", disk(280.0), Electrodes(count=16, width_mm=25.0, start_angle_deg=90.0, clockwise=True)
 )
 KIT4_SOURCE = SourceOptions(
-    voltage="voltage",
-    reference="reference_voltage",
-    names="frame_name",
-    protocol_table="drive_measure",
-    scale=1.0,
-)
+    voltage="voltage", reference="reference_voltage", names="frame_name",
+    protocol_table="drive_measure", scale=1.0,
+)  # fmt: skip
 KIT4_TRUTH = TruthOptions(
     touch_frame="object_frame",
     touch_xy="object_xy",
@@ -71,12 +68,8 @@ def test_kit4_is_healthy_with_notes_on_what_is_there(kit4):
     assert report.exit_code == 0
     found = {finding.name: finding for finding in report.findings}
     assert set(found) == {"measure-pair-gain", "gain-spread", "reciprocity"}
-    pairs = {
-        tuple(f.evidence["pair"]): f.evidence["gain"]
-        for f in report.findings
-        if f.name == "measure-pair-gain"
-    }
-    assert pairs == {
+    gains = (f.evidence for f in report.findings if f.name == "measure-pair-gain")
+    assert {tuple(one["pair"]): one["gain"] for one in gains} == {
         (14, 15): pytest.approx(0.908, abs=0.005),
         (15, 0): pytest.approx(1.113, abs=0.005),
     }
@@ -99,13 +92,10 @@ def test_the_rotating_order_of_the_raw_exports_is_recognised(shared_data, name):
     report = examine(subject_from_source(shared_data / name, ImportOptions(), adjacent(16), None))
     assert report.exit_code == 11
     assert report.repair == "--order rotating --sign reversed"
-    order = next(finding for finding in report.findings if finding.name == "order")
-    assert order.evidence["correlation"]["rotating"] > 0.995
-    assert order.evidence["correlation"]["fixed"] < 0.25
-    unlike = next(
-        finding for finding in report.findings if finding.name == "frames-unlike-the-reference"
-    )
-    assert unlike.evidence["frames"] == ["1", "3"]
+    found = {finding.name: finding.evidence for finding in report.findings}
+    assert found["order"]["correlation"]["rotating"] > 0.995
+    assert found["order"]["correlation"]["fixed"] < 0.25
+    assert found["frames-unlike-the-reference"]["frames"] == ["1", "3"]
 
 
 @pytest.mark.parametrize("name", TANKS)
@@ -140,14 +130,12 @@ def test_the_metal_rod_changes_most_beside_its_electrode(shared_data):
 
 
 def test_the_metal_rods_place_agrees_with_the_numbering(shared_data):
-    at = 0.58 * 140.0
     options = replace(MENDED, source=replace(MENDED.source, scale=1.0))
     frames = import_frames(shared_data / TANKS[1], options, adjacent(16), KIT4)
-    centres = at / 140.0 * KIT4.electrode_centres_mm()[[0, 12, 4, 8]]
     known = replace(
         frames,
         touch_frame=np.zeros(4, dtype=np.int64),
-        touch_xy_mm=centres,
+        touch_xy_mm=0.58 * KIT4.electrode_centres_mm()[[0, 12, 4, 8]],
         touch_radius_mm=np.full(4, 14.0),
         touch_sign=np.array([1, 1, -1, -1], dtype=np.int8),
     )
