@@ -14,6 +14,7 @@ from fresh_python import words
 from small_models import session
 
 Refused = Callable[..., str]
+TOUCH_FIELDS = ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign")
 
 
 @pytest.fixture(scope="session")
@@ -27,23 +28,19 @@ def frames_file(tmp_path_factory) -> Path:
 @pytest.fixture
 def changed_frames(frames_file, tmp_path) -> Callable[..., Path]:
     """Write the frames file with fields replaced (None: left out), past the checks of
-    ``save_frames``."""
+    ``save_frames``; of the ``first`` frames, or without its ``truth``."""
 
-    def write(name: str = "changed.npz", first: int | None = None, **changes: Any) -> Path:
+    def write(first: int | None = None, *, truth: bool = True, **changes: Any) -> Path:
         fields = dict(np.load(frames_file)) | changes
         if first is not None:
             kept = fields["touch_frame"] < first
-            for key in (
-                "touch_frame",
-                "touch_xy_mm",
-                "touch_radius_mm",
-                "touch_strength",
-                "touch_sign",
-            ):
+            for key in TOUCH_FIELDS:
                 fields[key] = fields[key][kept]
             for key in ("voltage_v", "frame_name"):
                 fields[key] = fields[key][:first]
-        path = tmp_path / name
+        if not truth:
+            fields |= dict.fromkeys(TOUCH_FIELDS)
+        path = tmp_path / "changed.npz"
         np.savez(path, **{key: value for key, value in fields.items() if value is not None})
         return path
 

@@ -154,13 +154,9 @@ def test_for_people(done, frames_file):
 
 def test_quiet_frames_show_nothing(done, told, changed_frames):
     quiet = session().quiet_v
-    empty = dict.fromkeys(
-        ["touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign"]
-    )
     names = np.array([f"q{k}" for k in range(8)])
-    path = changed_frames(
-        voltage_v=quiet[:8], reference_voltage_v=quiet[8:], frame_name=names, **empty
-    )
+    given = {"voltage_v": quiet[:8], "reference_voltage_v": quiet[8:], "frame_name": names}
+    path = changed_frames(truth=False, **given)
     text = done(f"reconstruct {path}")
     assert text.count("none (no change above the noise)") >= 7
     assert "against the truth" not in text

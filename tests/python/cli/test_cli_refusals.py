@@ -84,23 +84,16 @@ MODELS = {
 
 
 @pytest.mark.parametrize(
-    "command",
-    [("model", "info"), ("model", "info", "--json"), ("model", "verify"), ("reconstruct",)],
+    "command", ["model info", "model info --json", "model verify", "reconstruct FRAMES --model"]
 )
 @pytest.mark.parametrize("kind", MODELS)
 def test_models_that_cannot_be_read(kind, command, refused, tmp_path, frames_file):
     change, text = MODELS[kind]
     path = tmp_path / "bad.eitm"
     path.write_bytes(change(small_blob()))
-    if command[0] == "model":
-        line = refused(MODEL, *command, path)
-    else:
-        output = tmp_path / "out.npz"
-        line = refused(
-            MODEL,
-            *command,
-            f"{frames_file} --model {path} -o {output} --picture {tmp_path / 'out.png'}",
-        )
+    outputs = f"-o {tmp_path / 'out.npz'} --picture {tmp_path / 'out.png'}"
+    given = command.replace("FRAMES", str(frames_file))
+    line = refused(MODEL, given, path, outputs if "FRAMES" in command else "")
     assert str(path) in line and text in line and ";" in line
 
 
@@ -139,15 +132,11 @@ def with_nan(count: int) -> np.ndarray:
     ids=["nan", "inf", "zero"],
 )
 @pytest.mark.parametrize("engine", ["c", "numpy"])
-def test_frames_that_cannot_be_used(
-    voltage, text, engine, tmp_path,
-    changed_frames,
-    ran,
-):  # fmt: skip
+def test_frames_that_cannot_be_used(voltage, text, engine, tmp_path, changed_frames, ran):
     """The frame is named on its one line; nothing is written where nothing could be done."""
     path = changed_frames(first=1, voltage_v=voltage)
-    outputs = ["-o", str(tmp_path / "out.npz"), "--picture", str(tmp_path / "out.png")]
-    err = ran(FRAME, f"reconstruct {path} --engine {engine}", *outputs)[1]
+    outputs = f"-o {tmp_path / 'out.npz'} --picture {tmp_path / 'out.png'}"
+    err = ran(FRAME, f"reconstruct {path} --engine {engine}", outputs)[1]
     assert err.startswith(f"eitskin: {path}: frame 0 (test-s3-0) refused: ")
     assert err.count("\n") == 1
     assert text in err
@@ -173,41 +162,25 @@ def test_references_that_cannot_be_used(value, text, refused, changed_frames, tm
     assert text in line and line.endswith(f"run  eitskin doctor {path}")
 
 
+# one of each kind: tests/python/frames has all that can be wrong with a file
 @pytest.mark.parametrize(
     ("changes", "code", "text"),
     [
-        ({"voltage_v": np.ones((1, 207))}, FRAME, "voltage_v"),
         ({"voltage_v": np.ones(208)}, FRAME, "voltage_v"),
-        ({"voltage_v": np.array([["a"] * 208])}, FRAME, "voltage_v"),
-        (
-            {"voltage_v": np.ones((0, 208)), "frame_name": np.zeros(0, "U1")},
-            FRAME,
-            "nothing to reconstruct",
-        ),
+        ({"voltage_v": np.ones((0, 208)), "frame_name": np.zeros(0, "U1")}, FRAME,
+         "nothing to reconstruct"),
         ({"reference_voltage_v": np.ones((2, 200))}, FRAME, "reference_voltage_v"),
         ({"voltage_v": None}, FRAME, "'voltage_v' is missing"),
-        ({"version": np.array(2)}, FRAME, "format version 2"),
         ({"drive_measure": opposite(16).drive_measure}, FRAME, "voltage_v"),
         ({"drive_measure": np.full((208, 4), 3, np.uint8)}, PROTOCOL, "two different electrodes"),
         ({"n_electrodes": np.array(12)}, PROTOCOL, "electrodes are 0 to 11"),
     ],
-)
-def test_frames_files_that_cannot_be_read(
-    changes, code, text, refused,
-    changed_frames,
-    tmp_path,
-):  # fmt: skip
-    empty = {
-        "touch_frame": None,
-        "touch_xy_mm": None,
-        "touch_radius_mm": None,
-        "touch_strength": None,
-        "touch_sign": None,
-    }
-    path = changed_frames(**({"voltage_v": FIRST, "frame_name": np.array(["a"])} | empty | changes))
-    line = refused(
-        code, f"reconstruct {path} -o {tmp_path / 'out.npz'} --picture {tmp_path / 'out.png'}"
-    )
+)  # fmt: skip
+def test_frames_files_that_cannot_be_read(changes, code, text, refused, changed_frames, tmp_path):
+    own = {"voltage_v": FIRST, "frame_name": np.array(["a"])}
+    path = changed_frames(truth=False, **(own | changes))
+    outputs = f"-o {tmp_path / 'out.npz'} --picture {tmp_path / 'out.png'}"
+    line = refused(code, f"reconstruct {path}", outputs)
     assert str(path) in line and text in line
 
 
@@ -265,26 +238,27 @@ def test_a_description_that_is_no_text(refused, tmp_path):
 # ---- files ----
 
 
-def test_missing_files(refused, tmp_path, frames_file):
-    none, output = tmp_path / "none", tmp_path / "out"
-    assert "no such skin description; check the path" in refused(
-        FILE, f"model build {none} -o {output}"
-    )
-    assert "no such model; check the path" in refused(FILE, f"model info {none}")
-    assert "no such model" in refused(FILE, f"model verify {none}")
-    assert "no such frames file; check the path" in refused(FILE, f"reconstruct {none}")
-    assert "no such model" in refused(FILE, f"reconstruct {frames_file} --model {none} -o {output}")
-    assert "no such skin description" in refused(FILE, f"compare --skin {none}")
-
-
-def test_folders_instead_of_files(refused, tmp_path, frames_file):
-    for arguments in (
-        ("model", "info", tmp_path),
-        ("model", "build", tmp_path, "-o", tmp_path / "out.eitm"),
-        ("reconstruct", tmp_path),
-        ("reconstruct", frames_file, "--model", tmp_path),
-    ):
-        assert str(tmp_path) in refused(FILE, *arguments)
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        ("model build NONE -o OUT", "no such skin description; check the path"),
+        ("model info NONE", "no such model; check the path"),
+        ("model verify NONE", "no such model"),
+        ("reconstruct NONE", "no such frames file; check the path"),
+        ("reconstruct FRAMES --model NONE -o OUT", "no such model"),
+        ("compare --skin NONE", "no such skin description"),
+        # a folder instead of a file
+        ("model info FOLDER", "FOLDER"),
+        ("model build FOLDER -o OUT", "FOLDER"),
+        ("reconstruct FOLDER", "FOLDER"),
+        ("reconstruct FRAMES --model FOLDER", "FOLDER"),
+    ],
+)
+def test_missing_files_and_folders_instead_of_files(command, text, refused, tmp_path, frames_file):
+    for word, path in (("NONE", tmp_path / "none"), ("OUT", tmp_path / "out"),
+                       ("FRAMES", frames_file), ("FOLDER", tmp_path)):  # fmt: skip
+        command, text = command.replace(word, str(path)), text.replace(word, str(path))
+    assert text in refused(FILE, command)
 
 
 @pytest.mark.parametrize("place", ["none/out", "."])
