@@ -51,25 +51,12 @@ def run_board(image: Path, folder: Path, files: dict[str, bytes]) -> Run:
     folder.mkdir(exist_ok=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    command = [
-        "qemu-system-arm",
-        "-M",
-        "mps2-an500",
-        "-nographic",
-        "-monitor",
-        "none",
-        "-semihosting-config",
-    ]
-    command += ["enable=on,target=native", "-icount", "shift=6", "-kernel", str(image)]
+    machine = "qemu-system-arm -M mps2-an500 -nographic -monitor none"
+    how = "-semihosting-config enable=on,target=native -icount shift=6 -kernel"
     done = subprocess.run(
-        command,
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
+        [*machine.split(), *how.split(), str(image)], cwd=folder, capture_output=True, text=True,
+        timeout=300, check=False, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     output = (folder / "link_out.bin").read_bytes()
     decoder = Decoder()

@@ -12,15 +12,14 @@ ICSR, AIRCR, CFSR, HFSR, MMFAR, BFAR = (
     SCB + offset for offset in (0x04, 0x0C, 0x28, 0x2C, 0x34, 0x38)
 )
 RCC_CSR = 0x40023874
-MMARVALID, BFARVALID, STKERR = 1 << 7, 1 << 15, 1 << 12
-FRAME = struct.pack(
-    "<8I", 1, 2, 3, 4, 12, 0x08001235, 0x08004568, 0x01000000
-)  # r0-r3, r12, lr, pc, xpsr
+STKERR = 1 << 12
+R0_TO_R12, LR, PC, XPSR = (1, 2, 3, 4, 12), 0x08001235, 0x08004568, 0x01000000
+FRAME = struct.pack("<8I", *R0_TO_R12, LR, PC, XPSR)
 
 
 @pytest.fixture
-def image(cortex_m7) -> BareImage:
-    return BareImage(cortex_m7 / "firmware" / "eitskin_nucleo_f767zi.elf")
+def image(elf) -> BareImage:
+    return BareImage(elf)
 
 
 def crash(image: BareImage, frame: int, cfsr: int, hfsr: int = 0) -> None:
@@ -44,7 +43,7 @@ def test_a_fault_is_told_once_after_the_reset(image, cfsr, address):
     frame = image.symbols["stack_top"] - 64
     image.write_bytes(frame, FRAME)
     crash(image, frame, cfsr, 1 << 30)
-    assert last_reset(image) == (1, 0, 0x08004568, 0x08001235, cfsr, 1 << 30, address)
+    assert last_reset(image) == (1, 0, PC, LR, cfsr, 1 << 30, address)
     assert last_reset(image) == (0, 0, 0, 0, 0, 0, 0)
 
 
@@ -52,7 +51,7 @@ def test_an_unexpected_interrupt_is_told_by_its_number(image):
     frame = image.symbols["stack_top"] - 64
     image.write_bytes(frame, FRAME)
     crash(image, frame, 0)
-    assert last_reset(image)[2:] == (0x08004568, 0x08001235, 0, 0, 16 + 28)
+    assert last_reset(image)[2:] == (PC, LR, 0, 0, 16 + 28)
 
 
 @pytest.mark.parametrize("frame", ["below the guard", "above the stack", "stacking failed"])

@@ -21,10 +21,7 @@ CONSTANTS = {"BUTTON": 13, "FSYNC": 2, "LED_GREEN": 0, "LED_BLUE": 7, "LED_RED":
 
 def firmware_pins() -> dict[str, tuple[str, int]]:
     """Mode and alternate function of each pin that the firmware sets up."""
-    program = "".join(
-        (BOARD / name).read_text(encoding="utf-8")
-        for name in sorted(path.name for path in BOARD.glob("*.c"))
-    )
+    program = "".join(path.read_text(encoding="utf-8") for path in sorted(BOARD.glob("*.c")))
     call = re.compile(r"nucleo_pin\(GPIO([A-F])_BASE, ([\w +]+), (PIN_\w+), (\d+),")
     pins: dict[str, tuple[str, int]] = {}
     enables = int(re.findall(r"ENABLE_PIN = (\d+)", program)[0])
@@ -76,11 +73,8 @@ def test_the_lines_are_in_the_order_of_the_hal():
 
 
 def test_no_place_is_taken_twice():
-    for places in (
-        [w.pin for w in WIRES],
-        [w.zio for w in WIRES if w.zio],
-        [w.morpho for w in WIRES if w.morpho],
-    ):
+    for kind in ("pin", "zio", "morpho"):
+        places = [place for wire in WIRES if (place := getattr(wire, kind))]
         assert len(places) == len(set(places))
 
 

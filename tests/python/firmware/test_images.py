@@ -5,7 +5,6 @@ import re
 import shutil
 import struct
 import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -36,11 +35,6 @@ def arm(tool: str, *arguments: object) -> str:
 
 
 @pytest.fixture(scope="session")
-def elf(cortex_m7) -> Path:
-    return cortex_m7 / "firmware" / f"{IMAGE}.elf"
-
-
-@pytest.fixture(scope="session")
 def symbols(elf) -> dict[str, int]:
     return {
         name: int(value, 16)
@@ -56,22 +50,15 @@ def sections(elf) -> dict[str, tuple[int, int]]:
 
 
 def test_vectors(elf, symbols):
-    image = elf.with_suffix(".bin").read_bytes()
-    vectors = struct.unpack(
-        "<126I", image[: 4 * 126]
-    )  # 16 of the core, 110 of the F767 (RM0410 table 46)
+    # 16 of the core, 110 of the F767 (RM0410 table 46)
+    vectors = struct.unpack("<126I", elf.with_suffix(".bin").read_bytes()[: 4 * 126])
     assert vectors[0] == symbols["stack_top"] and vectors[0] % 8 == 0
     assert vectors[1] == symbols["nucleo_reset"] | 1
     for number, vector in enumerate(vectors[2:], 2):
-        if number in RESERVED:
-            assert vector == 0
-        else:
-            assert vector == symbols[HANDLERS.get(number, "nucleo_fault_irq")] | 1, (
-                f"vector {number}"
-            )
-    assert (
-        symbols["vectors"] == FLASH and symbols["vectors"] % 512 == 0
-    )  # VTOR: aligned to the table's size, a power of two
+        handler = symbols[HANDLERS.get(number, "nucleo_fault_irq")] | 1
+        assert vector == (0 if number in RESERVED else handler), f"vector {number}"
+    # VTOR: aligned to the table's size, a power of two
+    assert symbols["vectors"] == FLASH and symbols["vectors"] % 512 == 0
 
 
 def test_places_in_memory(sections, symbols):
@@ -101,19 +88,12 @@ def test_what_the_image_does_without(symbols):
 
 def test_sizes(elf, sections, symbols):
     image = elf.with_suffix(".bin").stat().st_size
-    stack, workspace = (
-        symbols["stack_top"] - symbols["stack_bottom"],
-        symbols["workspace_end"] - symbols["workspace_start"],
-    )
-    print(
-        f"\nflash {image} of {FLASH_BYTES} bytes, stack {stack}, DMA buffers {sections['.dtcm'][0]}"
-    )
+    stack = symbols["stack_top"] - symbols["stack_bottom"]
+    workspace = symbols["workspace_end"] - symbols["workspace_start"]
+    print(f"\nflash {image} of {FLASH_BYTES} bytes, stack {stack}, DMA {sections['.dtcm'][0]}")
     print(f"statics {sections['.bss'][0]}, workspace {workspace} of {SRAM_BYTES} bytes")
-    assert image == sum(
-        sections[name][0]
-        for name in (".vectors", ".text", ".ARM.exidx", ".data")
-        if name in sections
-    )
+    parts = (".vectors", ".text", ".ARM.exidx", ".data")
+    assert image == sum(sections.get(name, (0, 0))[0] for name in parts)
     assert image <= FLASH_BYTES - 85_000, "85 kB of flash are kept for what is to come"
     assert workspace >= 256 * 1024
     assert f"0x{symbols['stack_top']:08x}" in elf.with_suffix(".map").read_text(encoding="utf-8")

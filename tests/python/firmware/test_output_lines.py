@@ -10,8 +10,8 @@ ADDRESSES, ENABLES = 0x0000FFFF, 0x000F0000
 
 
 @pytest.fixture(scope="module")
-def image(cortex_m7) -> BareImage:
-    return BareImage(cortex_m7 / "firmware" / "eitskin_nucleo_f767zi.elf")
+def image(elf) -> BareImage:
+    return BareImage(elf)
 
 
 def write(image: BareImage, mask: int, levels: int) -> tuple[int, int, int]:

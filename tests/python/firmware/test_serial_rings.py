@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bare_image import DMA1, SCRATCH, BareImage
 
-STREAM_BYTES, TX, RX = 0x18, DMA1 + 0x10 + 0x18 * 3, DMA1 + 0x10 + 0x18 * 1
+TX, RX = DMA1 + 0x10 + 0x18 * 3, DMA1 + 0x10 + 0x18 * 1
 CR, NDTR, M0AR = 0, 4, 12
 EN, TCIF1, TCIF3, TEIF3 = 1, 1 << 11, 1 << 27, 1 << 25
 TX_BYTES, RX_BYTES = 32768, 16384
@@ -24,10 +24,8 @@ class Serial:
 
     def write(self, data: bytes) -> bool:
         self.image.write_bytes(SCRATCH, data)
-        return bool(
-            self.image.call(self.image.operation("nucleo_link_ops", 0), 0, SCRATCH, len(data))
-            & 0xFF
-        )
+        write = self.image.operation("nucleo_link_ops", 0)
+        return bool(self.image.call(write, 0, SCRATCH, len(data)) & 0xFF)
 
     def send(self, flag: int = TCIF3) -> bytes:
         """DMA sends what it has been given, and says so."""
@@ -59,11 +57,6 @@ class Serial:
         return self.image.read_bytes(READ_AT, size)
 
 
-@pytest.fixture(scope="module")
-def elf(cortex_m7) -> Path:
-    return cortex_m7 / "firmware" / "eitskin_nucleo_f767zi.elf"
-
-
 def test_baud_rate_and_directions(elf):
     image = Serial(elf).image
     assert 54_000_000 / image.read(0x4000480C) == 1_000_000
@@ -81,9 +74,8 @@ def test_every_byte_is_sent_once_and_in_order(elf, seed):
             accepted += data
         else:
             refused += 1
-            assert len(data) > TX_BYTES - (len(accepted) - len(sent)), (
-                "refused though there was room"
-            )
+            room = TX_BYTES - (len(accepted) - len(sent))
+            assert len(data) > room, "refused though there was room"
         assert len(accepted) - len(sent) <= TX_BYTES
         if rng.random() < 0.5:
             sent += serial.send()
