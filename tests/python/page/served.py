@@ -66,9 +66,13 @@ class Page:
         """A script's value."""
         return self.driver.execute_script(script)
 
+    def get(self, name: str, what: str = "textContent") -> Any:
+        """A property of an element."""
+        return self.run(f"return document.getElementById('{name}').{what}")
+
     def text(self, name: str) -> str:
         """What an element says."""
-        return str(self.run(f"return document.getElementById('{name}').textContent"))
+        return str(self.get(name))
 
     def click(self, name: str) -> None:
         """Press it, and see to it that the old answer is gone."""

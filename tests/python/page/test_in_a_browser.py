@@ -2,6 +2,7 @@
 browser for all tests."""
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ from eitskin.teaching.presses import load_presses
 
 PLACES = [(-40.0, 10.0), (30.0, -20.0)]
 NEAR_MM = 3.0
+EMPTY = bytes([ERASED]) * BANK_BYTES
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +78,7 @@ def assert_shown(page: Page) -> None:
     until(lambda: len(page.touches()) == 2)
     assert np.abs(np.array(page.touches()) - PLACES).max() < NEAR_MM
     assert page.text("n-latency")
-    name = page.run("return document.getElementById('skin').ariaLabel")
+    name = page.get("skin", "ariaLabel")
     assert "2 touches" in name
 
 
@@ -98,14 +100,10 @@ def test_simulated(live):
     assert min(red(live, *place) for place in PLACES) > 40
     assert red(live, -20.0, -60.0) < 25
     assert "16 electrodes" in live.text("device")
-    assert live.run("return document.getElementById('electrodes').children.length") == 16
+    assert live.get("electrodes", "children.length") == 16
     assert live.text("found") == "nothing found wrong"
     until(lambda: "touches" in live.text("words"))
-    until(
-        lambda: (
-            "from the reference" in live.run("return document.getElementById('volts').ariaLabel")
-        )
-    )
+    until(lambda: "from the reference" in live.get("volts", "ariaLabel"))
     until(lambda: live.text("n-rate").endswith("Hz"))
 
 
@@ -119,7 +117,7 @@ def test_recorded(scene, page, tmp_path):
         assert_shown(page)
         assert page.text("n-frame").isdigit()
         assert server.follower.frames == count
-        assert page.run("return document.getElementById('tare').disabled")
+        assert page.get("tare", "disabled")
         page.open(server)  # a page that comes later sees the last frame
         assert_shown(page)
         until(lambda: page.text("play") == "Start again")
@@ -208,14 +206,20 @@ def test_tare_solver_and_mode(live, server):
     assert session.device.board.samples == 20
     live.run("document.querySelector('#mode input[value=raw]').click()")
     assert live.answer() == "streaming touches, image"
-    until(lambda: "No raw" in live.run("return document.getElementById('volts').ariaLabel"))
+    until(lambda: "No raw" in live.get("volts", "ariaLabel"))
     live.run("document.querySelector('#mode input[value=raw]').click()")
     assert live.answer() == "streaming touches, image, raw"
-    until(lambda: "raw voltages" in live.run("return document.getElementById('volts').ariaLabel"))
+    until(lambda: "raw voltages" in live.get("volts", "ariaLabel"))
     live.click("tare")  # the touches are in the reference then
     assert live.answer() == "reference taken from 16 frames"
     until(lambda: not live.touches())
     begin_again(server)
+
+
+def more_frames(server: PageServer) -> None:
+    """They go on."""
+    before = server.follower.frames
+    until(lambda: server.follower.frames > before + 3)
 
 
 def begin_again(server: PageServer) -> None:
@@ -231,8 +235,7 @@ def test_record(live, server):
     live.click("record")
     name = live.answer().removeprefix("recording to ")
     until(lambda: live.text("record-text") == "Stop recording")
-    before = server.follower.frames
-    until(lambda: server.follower.frames > before + 3)
+    more_frames(server)
     live.click("record")
     assert live.answer().endswith(name)
     until(lambda: live.text("record-text") == "Record")
@@ -249,38 +252,36 @@ def test_a_model_is_uploaded(live, server, tmp_path):
     (tmp_path / "good.eitm").write_bytes(load_prebuilt()[1])
     box.send_keys(str(tmp_path / "good.eitm"))
     until(lambda: "is in use" in live.text("answer"))
-    before = server.follower.frames
-    until(lambda: server.follower.frames > before + 3)
+    more_frames(server)
     begin_again(server)
 
 
 def test_unplugged_and_back(scene, page, monkeypatch):
-    empty = bytes([ERASED]) * BANK_BYTES
-    board = SimBoard(BoardFrames(load_scene(scene)), [bank_bytes(load_prebuilt()[1], 1), empty])
-    first, there = Wire(board, frame_s=0.02), []
+    board = SimBoard(BoardFrames(load_scene(scene)), [bank_bytes(load_prebuilt()[1], 1), EMPTY])
+    there: list[str] = []
     monkeypatch.setattr(
         ports_module, "ports", lambda: [Port(path, "", 0x0483, 0x374B, "SERIAL1") for path in there]
     )
-    there.append(first.path)
-    second = None
-    try:
+    with ExitStack() as wires:
+
+        def plugged() -> Wire:
+            wire = Wire(board, frame_s=0.02)
+            wires.callback(wire.unplug)
+            there[:] = [wire.path]
+            return wire
+
+        first = plugged()
         with serving(f"serial:{first.path}", Stream.TOUCHES) as server:
             page.open(server)
             until(lambda: server.follower.frames > 3)
-            assert page.run("return document.getElementById('step').hidden")
+            assert page.get("step", "hidden")
             there.clear()
             first.unplug()
             until(lambda: "plugged in again" in page.text("state"))
             assert "unplugged" in page.text("log")
-            second = Wire(board, frame_s=0.02)
-            there.append(second.path)
+            plugged()
             until(lambda: page.text("state") == "live")
-            before = server.follower.frames
-            until(lambda: server.follower.frames > before + 3)
-    finally:
-        for wire in (first, second):
-            if wire is not None:
-                wire.unplug()
+            more_frames(server)
 
 
 @pytest.mark.parametrize("width", [360, 768, 2560])
