@@ -79,13 +79,13 @@ def any_bytes(
     return st.one_of(mangled, mangled, mangled, mangled, st.binary(max_size=300))
 
 
-def read_or_refuse(read: Callable[[], Content]) -> Content | None:
-    """What ``read`` gives, or None where it refuses; fails where it raises anything but an
-    EitskinError of one line, or warns."""
+def read_or_refuse(read: Callable[..., Content], *given: Any, **named: Any) -> Content | None:
+    """What ``read`` gives of what is ``given``, or None where it refuses; fails where it raises
+    anything but an EitskinError of one line, or warns."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            return read()
+            return read(*given, **named)
         except EitskinError as error:
             text = str(error)
             assert text.strip() and len(text.splitlines()) == 1, f"not one line: {text!r}"

@@ -167,7 +167,7 @@ def read_scene(path: Path) -> None:
 def read_shapes(path: Path) -> None:
     drawing = read_drawing(path, DrawingReading(1.0))
     for element in (None, "skin", "a"):
-        found = read_or_refuse(lambda element=element: drawing.outline(element))
+        found = read_or_refuse(drawing.outline, element)
         if found is not None:
             finite(found.vertices_mm)
 

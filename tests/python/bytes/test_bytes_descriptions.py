@@ -59,7 +59,7 @@ SCENES = [SCENE, *(path.read_bytes() for path in library().values())]
 @bounded(300)
 def test_any_skin_is_read_or_refused_in_a_line(tmp_path, content):
     path = written(tmp_path, "skin.toml", content)
-    read = read_or_refuse(lambda: load_skin(path))
+    read = read_or_refuse(load_skin, path)
     if read is not None:
         skin, protocol = read
         assert protocol.n_electrodes == skin.electrodes.count
@@ -71,9 +71,9 @@ def test_any_skin_is_read_or_refused_in_a_line(tmp_path, content):
 def test_any_scene_is_read_or_refused_in_a_line(tmp_path, content):
     written(tmp_path, "skin.toml", SKIN)
     path = written(tmp_path, "scene.toml", content)
-    scene = read_or_refuse(lambda: load_scene(path))
+    scene = read_or_refuse(load_scene, path)
     if scene is not None and scene.frames <= 100:
-        read_or_refuse(lambda: compile_scene(scene))
+        read_or_refuse(compile_scene, scene)
 
 
 NUMBERS = ("nan", "inf", "-inf", "9" * 400, "9" * 5000, "-1", "1e999")
@@ -90,4 +90,4 @@ def test_each_value_of_a_wrong_kind_is_refused_in_a_line(tmp_path, value):
             if equals:
                 text = "\n".join([*lines[:k], f"{key} = {value}", *lines[k + 1 :]])
                 path = written(tmp_path, "x.toml", text.encode())
-                read_or_refuse(lambda path=path, read=read: read(path))
+                read_or_refuse(read, path)

@@ -17,20 +17,8 @@ CURVES = b"""<svg width="9cm" height="9cm" viewBox="0 0 90 90">
 <path id="a" d="m10,10 c20-5 30 5 40 0 q9,9 0 20 t-5 9 a9 5 30 1 0 -20 4 z"/></g>
 <use href="#a" x="3"/>
 <rect x="1" y="2" width="30" height="20" rx="4"/><polygon points="1,2 30,4 5,60"/></svg>"""
-WORDS = (
-    *ODD_BYTES,
-    b"nan",
-    b"1e999",
-    b"-1",
-    b'"',
-    b"<",
-    b"/>",
-    b"&#0;",
-    b"A",
-    b"z",
-    b"matrix(0 0 0 0 0 0)",
-    b"9" * 400,
-)
+MORE = b'nan 1e999 -1 " < /> &#0; A z'.split()
+WORDS = (*ODD_BYTES, *MORE, b"matrix(0 0 0 0 0 0)", b"9" * 400)
 
 
 @pytest.mark.parametrize("scale_mm", [None, 1.0])
@@ -47,9 +35,9 @@ def test_any_dxf_is_read_or_refused_in_a_line(tmp_path, content):
 
 
 def _read(path: Path, scale_mm: float | None) -> None:
-    drawing = read_or_refuse(lambda: read_drawing(path, DrawingReading(scale_mm)))
+    drawing = read_or_refuse(read_drawing, path, DrawingReading(scale_mm))
     if drawing is not None:
         for element in (None, "skin", "a"):
-            outline = read_or_refuse(lambda element=element: drawing.outline(element))
+            outline = read_or_refuse(drawing.outline, element)
             if outline is not None:
                 assert polygon(outline.vertices_mm) == outline

@@ -9,15 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.io
 from bytes_damage import ODD_BYTES, ODD_WORDS, any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
 from hypothesis import strategies as st
 
+from eitskin.cli.main import main
 from eitskin.frames.frames import Frames, load_frames, save_frames
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.importer import import_frames
 from eitskin.frames.source import SourceOptions
 from eitskin.skin.protocol import adjacent
+from fresh_python import words
 
 PROTOCOL = adjacent(8)
 ROWS = PROTOCOL.n_rows
@@ -74,26 +77,26 @@ ODD_ARRAYS: tuple[Any, ...] = (
 @bounded(200)
 def test_any_archive_is_frames_or_refused(tmp_path, content):
     path = written(tmp_path, "x.npz", content)
-    frames = read_or_refuse(lambda: load_frames(path))
+    frames = read_or_refuse(load_frames, path)
     if frames is not None:
         assert np.isfinite(frames.voltage_v).all() and np.isfinite(frames.reference_voltage_v).all()
     options = ImportOptions(SourceOptions(voltage="v", reference="ref", names="names"))
-    read_or_refuse(lambda: import_frames(path, options, PROTOCOL, None))
+    read_or_refuse(import_frames, path, options, PROTOCOL, None)
 
 
 @given(data=st.data())
 @bounded(60)
 def test_a_damaged_frames_file_is_refused(own, tmp_path, data):
     path = written(tmp_path, "x.npz", data.draw(any_bytes(own)))
-    read_or_refuse(lambda: load_frames(path))
+    read_or_refuse(load_frames, path)
 
 
 @pytest.mark.parametrize("name", sorted(FIELDS))
 def test_each_field_may_hold_anything(tmp_path, name):
     for k, value in enumerate(ODD_ARRAYS):
         path = written(tmp_path, f"{k}.npz", stored(**{**FIELDS, name: value}))
-        read_or_refuse(lambda path=path: load_frames(path))
-        read_or_refuse(lambda path=path: load_frames(path, allow_nonfinite=True))
+        read_or_refuse(load_frames, path)
+        read_or_refuse(load_frames, path, allow_nonfinite=True)
 
 
 def test_each_array_of_a_foreign_file_may_hold_anything(tmp_path):
@@ -106,21 +109,10 @@ def test_each_array_of_a_foreign_file_may_hold_anything(tmp_path):
         path = written(tmp_path, "x.npz", stored(**{**good, key: value, "odd\nname": np.array(1)}))
         for part in (None, "in-phase"):
             options = ImportOptions(SourceOptions(**keys, complex_part=part))
-            read_or_refuse(
-                lambda path=path, options=options: import_frames(path, options, None, None, 8)
-            )
-            read_or_refuse(
-                lambda path=path, options=options: import_frames(
-                    path, options, None, None, 8, lenient=True
-                )
-            )
+            read_or_refuse(import_frames, path, options, None, None, 8)
+            read_or_refuse(import_frames, path, options, None, None, 8, lenient=True)
         absent = ImportOptions(SourceOptions(voltage="not there"))
-        assert (
-            read_or_refuse(
-                lambda path=path, absent=absent: import_frames(path, absent, PROTOCOL, None)
-            )
-            is None
-        )
+        assert read_or_refuse(import_frames, path, absent, PROTOCOL, None) is None
 
 
 TABLE = "\n".join(",".join(f"{value:.5f}" for value in row) for row in VOLTS).encode()
@@ -140,14 +132,10 @@ def test_any_text_table_is_frames_or_refused(tmp_path, content):
         {"reference_columns": "quiet"},
     ):
         options = ImportOptions(SourceOptions(**quiet))
-        frames = read_or_refuse(
-            lambda options=options: import_frames(path, options, PROTOCOL, None)
-        )
+        frames = read_or_refuse(import_frames, path, options, PROTOCOL, None)
         assert frames is None or np.isfinite(frames.voltage_v).all()
     as_table = ImportOptions(SourceOptions(reference_frames="0"), table_file=str(path))
-    read_or_refuse(
-        lambda: import_frames(written(tmp_path, "v.csv", TABLE), as_table, None, None, 8)
-    )
+    read_or_refuse(import_frames, written(tmp_path, "v.csv", TABLE), as_table, None, None, 8)
 
 
 ELECTRODES = b"\n".join(b"%d,%d,%d,%d" % tuple(row) for row in PROTOCOL.drive_measure.tolist())
@@ -165,22 +153,18 @@ def test_any_protocol_table_is_one_or_refused(tmp_path, content):
 
 @cache
 def mat_files() -> list[bytes]:
-    import scipy.io as io_of
-
+    arrays = {
+        "v": VOLTS,
+        "ref": VOLTS[:1],
+        "s": {"names": ["a", "b"], "deep": {"x": 1.5}},
+        "c": np.array([1, "a", [2.0]], dtype=object),
+    }
     made = []
     for compressed in (False, True):
         stream = io.BytesIO()
-        cells = np.array([1, "a", [2.0]], dtype=object)
-        arrays = {
-            "v": VOLTS,
-            "ref": VOLTS[:1],
-            "s": {"names": ["a", "b"], "deep": {"x": 1.5}},
-            "c": cells,
-        }
-        io_of.savemat(stream, arrays, do_compression=compressed)
-        made.append(
-            b"MATLAB 5.0".ljust(116) + stream.getvalue()[116:]
-        )  # the head's text names the day
+        scipy.io.savemat(stream, arrays, do_compression=compressed)
+        # the head's text names the day
+        made.append(b"MATLAB 5.0".ljust(116) + stream.getvalue()[116:])
     return made
 
 
@@ -189,27 +173,14 @@ def mat_files() -> list[bytes]:
 def test_any_matlab_file_is_frames_or_refused(tmp_path, data):
     path = written(tmp_path, "x.mat", data.draw(any_bytes(mat_files())))
     options = ImportOptions(SourceOptions(voltage="v", reference="ref"))
-    frames = read_or_refuse(lambda: import_frames(path, options, PROTOCOL, None))
+    frames = read_or_refuse(import_frames, path, options, PROTOCOL, None)
     assert frames is None or np.isfinite(frames.voltage_v).all()
 
 
 def test_a_refused_import_leaves_what_was_there(tmp_path):
-    from eitskin.cli.main import main
-
     target = written(tmp_path, "out.npz", b"as it was")
     source = written(tmp_path, "x.csv", TABLE[: len(TABLE) // 2] + b"x")
-    words = [
-        "import",
-        str(source),
-        "--protocol",
-        "adjacent",
-        "--electrodes",
-        "8",
-        "--reference-frames",
-        "0",
-        "-o",
-        str(target),
-    ]
-    assert main(words) != 0
+    options = "--protocol adjacent --electrodes 8 --reference-frames 0"
+    assert main(words(f"import {source} {options} -o {target}")) != 0
     assert target.read_bytes() == b"as it was"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.npz", "x.csv"]

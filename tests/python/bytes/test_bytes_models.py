@@ -28,15 +28,15 @@ def resealed(content: bytes) -> bytes:
 @bounded(150)
 def test_a_damaged_model_is_refused_in_a_line(tmp_path, content):
     path = written(tmp_path, "x.eitm", content)
-    if read_or_refuse(lambda: load_model(path)) is None:
-        assert read_or_refuse(lambda: CoreEngine(content, prepared=False)) is None
+    if read_or_refuse(load_model, path) is None:
+        assert read_or_refuse(CoreEngine, content, prepared=False) is None
 
 
 @given(content=any_bytes(WHOLE).map(resealed))
 @bounded(250)
 def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(tmp_path, content):
     path = written(tmp_path, "x.eitm", content)
-    loaded = read_or_refuse(lambda: load_model(path))
+    loaded = read_or_refuse(load_model, path)
     if loaded is None:
         return
     model, blob = loaded

@@ -136,9 +136,9 @@ NOTES = [
 @bounded(200)
 def test_any_recording_is_read_or_refused_in_a_line(tmp_path, content):
     path = written(tmp_path, "x.eits", content)
-    head = read_or_refuse(lambda: read_head(path))
-    options = read_or_refuse(lambda: recorded_options(path))
-    frames = read_or_refuse(lambda: frames_of(path))
+    head = read_or_refuse(read_head, path)
+    options = read_or_refuse(recorded_options, path)
+    frames = read_or_refuse(frames_of, path)
     if head is None:
         assert options is None and frames is None
     if frames is not None:
@@ -157,4 +157,4 @@ HEADS = [
 @bounded(100)
 def test_any_head_of_a_recording(tmp_path, head):
     path = written(tmp_path, "x.eits", encode(PacketType.RECORDING, 0, head))
-    read_or_refuse(lambda: read_head(path))
+    read_or_refuse(read_head, path)

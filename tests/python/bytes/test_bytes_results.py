@@ -30,7 +30,7 @@ IMAGE = load_image()[0][:4096]
 @bounded(200)
 def test_any_results_of_the_trade_off_are_read_or_refused(tmp_path, content):
     path = written(tmp_path, "front.json", content)
-    front = read_or_refuse(lambda: load_front(path))
+    front = read_or_refuse(load_front, path)
     if front is not None:
         json.dumps(as_dict(front))
 
@@ -38,7 +38,7 @@ def test_any_results_of_the_trade_off_are_read_or_refused(tmp_path, content):
 @given(content=any_bytes([STORE], WORDS))
 @bounded(150)
 def test_a_run_goes_on_from_any_store(tmp_path, content):
-    store = read_or_refuse(lambda: Store(written(tmp_path, "store.jsonl", content)))
+    store = read_or_refuse(Store, written(tmp_path, "store.jsonl", content))
     assert store is not None
     store.put({"a": 1}, [1.5])
     assert Store(tmp_path / "store.jsonl").get({"a": 1}) == [1.5]
@@ -47,4 +47,4 @@ def test_a_run_goes_on_from_any_store(tmp_path, content):
 @given(content=any_bytes([IMAGE]))
 @bounded(60)
 def test_any_firmware_image_is_checked_or_refused(tmp_path, content):
-    read_or_refuse(lambda: check_image(tmp_path / "x.bin", content))
+    read_or_refuse(check_image, tmp_path / "x.bin", content)

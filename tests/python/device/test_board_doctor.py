@@ -10,6 +10,7 @@ from device_helpers import board_info
 
 from eitskin.device.diagnose_board import MeasuredBoard, board_findings
 from eitskin.device.known_model import KnownModel, find_model, need_model, scanned_protocol
+from eitskin.device.live_frames import LiveFrame
 from eitskin.device.recordings.raw_frames import RawRun, as_frames, finite_only, gather
 from eitskin.device.wire.link_table import FaultCode, Quality
 from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame
@@ -68,18 +69,13 @@ def test_protocols_that_need_no_model():
 def test_the_prebuilt_model_is_known_by_its_checksum():
     known = find_model(info(), None, "x")
     assert known is not None and known.blob == prebuilt()[1]
-    assert (
-        find_model(info(model_crc=1), None, "x")
-        is find_model(info(model_bytes=0), None, "x")
-        is None
-    )
-    with pytest.raises(
-        DeviceError,
-        match="x: a picture needs the board's model, 00000001, which is not the prebuilt one",
-    ):
-        need_model(info(model_crc=1), None, "x", "a picture")
+    another, none = info(model_crc=1), info(model_bytes=0)
+    assert find_model(another, None, "x") is find_model(none, None, "x") is None
+    said = "x: a picture needs the board's model, 00000001, which is not the prebuilt one"
+    with pytest.raises(DeviceError, match=said):
+        need_model(another, None, "x", "a picture")
     with pytest.raises(DeviceError, match="no model; upload one"):
-        need_model(info(model_bytes=0), None, "x", "a picture")
+        need_model(none, None, "x", "a picture")
 
 
 def test_only_frames_that_are_whole_become_a_frames_file():
@@ -87,30 +83,27 @@ def test_only_frames_that_are_whole_become_a_frames_file():
     known = KnownModel(*prebuilt())
 
     def made(quiet: list[RawFrame], frames: list[RawFrame]) -> tuple[int, int]:
-        kept, left_out = finite_only(
-            as_frames(quiet, frames, known.model.protocol, info(), known, allow_nonfinite=True), "x"
-        )
+        protocol = known.model.protocol
+        given = as_frames(quiet, frames, protocol, info(), known, allow_nonfinite=True)
+        kept, left_out = finite_only(given, "x")
         return kept.n_frames, left_out
 
     assert made(whole, [*whole[:3], *cut[:2]]) == (3, 2)
-    with pytest.raises(
-        FrameError, match=r"x: no frame has all its rows measured; row \d+ is missing most often"
+    missing = r"x: no frame has all its rows measured; row \d+ is missing most often"
+    for quiet, frames, said in (
+        (whole, cut, missing),
+        (cut, whole, "x: no quiet frame has all"),
+        ([], whole, "there is no quiet frame"),
     ):
-        made(whole, cut)
-    with pytest.raises(FrameError, match="x: no quiet frame has all"):
-        made(cut, whole)
-    with pytest.raises(FrameError, match="there is no quiet frame"):
-        made([], whole)
+        with pytest.raises(FrameError, match=said):
+            made(quiet, frames)
 
 
 def test_of_two_tares_the_last_counts():
-    from eitskin.device.live_frames import LiveFrame
-
-    def live(raw: RawFrame, quiet: bool) -> LiveFrame:
-        return LiveFrame(raw.frame, 0, 0, raw=replace(raw, flags=int(quiet)))
-
-    frames = raw_frames()
     order = [True, True, False, False, True, False]
-    run = gather(live(raw, quiet) for raw, quiet in zip(frames, order, strict=False))
+    marked = (
+        replace(raw, flags=int(quiet)) for raw, quiet in zip(raw_frames(), order, strict=False)
+    )
+    run = gather(LiveFrame(raw.frame, 0, 0, raw=raw) for raw in marked)
     assert [raw.frame for raw in run.quiet] == [4] and [raw.frame for raw in run.frames] == [5]
     assert run.left_out == 4

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from itertools import pairwise
 
 import pytest
-from device_helpers import QUIET, scene, sim_board
+from device_helpers import QUIET, of, scene, sim_board
 
 from eitskin.device.client import Device
 from eitskin.device.events import link_text
@@ -112,19 +112,14 @@ def plugged() -> Iterator[tuple[Device, Port]]:
 def test_it_is_waited_for_and_goes_on(away_s):
     with plugged() as (device, port):
         port.pull_out(10, away_s)
-        said, frames, touches = [], [], []
-        for item in device.stream(Stream.RAW | Stream.TOUCHES, frames=WANTED):
-            if isinstance(item, LinkEvent):
-                said.append(link_text(item))
-            elif isinstance(item, RawFrame):
-                frames.append(item.frame)
-            elif isinstance(item, SolvedTouches):
-                touches.append(item.frame)
+        items = list(device.stream(Stream.RAW | Stream.TOUCHES, frames=WANTED))
+        said = [link_text(event) for event in of(LinkEvent, items)]
+        frames = [raw.frame for raw in of(RawFrame, items)]
         assert said[0] == f"link: unplugged: {port.name}: the port is gone (pulled out)"
         assert said[1] == f"link: reconnected: {port.name}"
         assert away_s <= port.waited_s < away_s + 1 and device.counters.reconnects == 1
         assert len(frames) >= WANTED - 2 and frames == sorted(set(frames))
-        assert set(touches) <= set(frames)
+        assert {one.frame for one in of(SolvedTouches, items)} <= set(frames)
         lost = max(b - a for a, b in pairwise(frames))
         assert 0.9 < lost * FRAME_S < 1.2  # then it missed its host, and scanned no more
         assert device.info().tared and device.board.drive == Drive.ON

@@ -3,6 +3,7 @@ the new one is proven."""
 
 import random
 import zlib
+from dataclasses import replace
 
 import pytest
 from device_helpers import (
@@ -10,6 +11,7 @@ from device_helpers import (
     Damaging,
     dropping,
     frames,
+    raw_frames,
     same,
     sim_board,
     sim_device,
@@ -19,9 +21,8 @@ from device_helpers import (
 from eitskin.device.client import Device
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire import link_table as cmd
-from eitskin.device.wire.link_table import Stream
-from eitskin.device.wire.packets import RawFrame
 from eitskin.errors import DeviceError, FileError, ModelError
+from eitskin.model.eitm import decode_model, encode_model
 from small_models import prebuilt, small_blob, tiny_blob
 
 OLD = zlib.crc32(prebuilt()[1])
@@ -34,10 +35,9 @@ def new_blob() -> bytes:
 
 def works(board: SimBoard, crc: int) -> bool:
     """Whether the board, opened again, has the model and scans."""
-    with Device(SimTransport("again", board)) as device:
+    with sim_device(board) as device:
         device.tare(4)
-        raws = [item for item in device.stream(Stream.RAW, frames=1) if isinstance(item, RawFrame)]
-        return device.board.model_crc == crc and len(raws) == 1
+        return device.board.model_crc == crc and len(raw_frames(device, 1)) == 1
 
 
 def test_a_model_is_taken_up():
@@ -79,18 +79,13 @@ def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed):
         device.transport._there = there
         try:
             device.upload_model(tiny)
-            cut = False
         except DeviceError as error:
-            cut = True
             assert "the upload was cut after" in str(error) or "not answered" in str(error)
             assert "\n" not in str(error)
+            assert works(SimBoard(frames(), board.banks), OLD)  # a reboot
     new = zlib.crc32(tiny)
-    if cut:
-        rebooted = SimBoard(frames(), board.banks)
-        assert works(rebooted, OLD)
-    with Device(
-        SimTransport("again", board)
-    ) as device:  # without a reboot: goes on where it was cut, or begins again
+    with sim_device(board) as device:
+        # without a reboot: goes on where it was cut, or begins again
         assert device.board.model_crc in (OLD, new)
         if device.board.model_crc == OLD:
             assert device.upload_model(tiny).model_crc == new
@@ -110,7 +105,7 @@ def test_over_a_lossy_line(seed):
                 break
             except DeviceError as error:
                 assert "not answered" in str(error) or "cut after" in str(error)
-    with Device(SimTransport("again", board)) as device:
+    with sim_device(board) as device:
         assert device.board.model_crc == zlib.crc32(tiny)
         bank = board.banks[device.board.bank]
     assert bank[: len(tiny)] == tiny
@@ -129,11 +124,7 @@ def test_an_upload_goes_on_where_it_was_cut():
 
 
 def test_a_model_whose_golden_frame_gives_other_bits_is_refused():
-    from eitskin.model.eitm import decode_model, encode_model
-
     model = decode_model(tiny_blob(), "tiny")
-    from dataclasses import replace
-
     image = model.golden.image.copy()
     image[image.argmax()] *= 1.5
     wrong = encode_model(replace(model, golden=replace(model.golden, image=image)))
@@ -144,17 +135,17 @@ def test_a_model_whose_golden_frame_gives_other_bits_is_refused():
 
 def test_the_host_refuses_what_cannot_go_before_it_is_sent(tmp_path):
     board = sim_board()
+    (tmp_path / "bad.eitm").write_bytes(b"no model at all")
     with sim_device(board) as device:
         before = stats_of(board).packets_sent
-        with pytest.raises(FileError, match="no such model"):
-            device.upload_model(tmp_path / "none.eitm")
-        (tmp_path / "bad.eitm").write_bytes(b"no model at all")
-        with pytest.raises(ModelError):
-            device.upload_model(tmp_path / "bad.eitm")
-        with pytest.raises(ModelError):
-            device.upload_model(b"")
-        with pytest.raises(DeviceError, match="needs 32 electrodes and the board has 16"):
-            device.upload_model(small_blob(electrodes=32))
+        for given, kind, said in (
+            (tmp_path / "none.eitm", FileError, "no such model"),
+            (tmp_path / "bad.eitm", ModelError, None),
+            (b"", ModelError, None),
+            (small_blob(electrodes=32), DeviceError, "needs 32 electrodes and the board has 16"),
+        ):
+            with pytest.raises(kind, match=said):
+                device.upload_model(given)
         assert stats_of(board).packets_sent == before + 1  # but for the first of these two
 
 
