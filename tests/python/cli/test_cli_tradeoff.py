@@ -1,6 +1,7 @@
 """``eitskin recommend``, ``tradeoff``, and ``--budget`` and ``--accuracy`` on frames and boards."""
 
 import json
+from pathlib import Path
 
 import pytest
 from board_cases import write_scene
@@ -19,6 +20,11 @@ TINY_RUN = (
     "--scenes 3 --train 2 --set-scenes 2 --sets pairs --snr-db 60 --elements 1200 --random-skins 2"
     " --no-peers --counted 0 --rounds 1 --only 'tiny,mini,standard rank 32'"
 )
+
+
+@pytest.fixture
+def scene(tmp_path) -> Path:
+    return write_scene(tmp_path / "one.toml", frames=2, elements=900)
 
 
 def test_run_writes_tables_and_pictures(done, tmp_path):
@@ -106,18 +112,14 @@ def test_reconstruct_within_a_budget(told, frames_file, ran):
     assert "settings of" in err and fine["settings"]["rank"] == prebuilt()[0].rank
     point = next(one for one in load_front().points if one.name == fine["settings"]["name"])
     assert (point.accuracy(Conditions()) or 0) >= 0.87
-    assert (
-        max(f["info"]["iterations"] for f in fine["frames"]) == fine["settings"]["iterations"] != 60
-    )
+    most = max(frame["info"]["iterations"] for frame in fine["frames"])
+    assert most == fine["settings"]["iterations"] != 60
     assert fine["summary"]["miou_image"] > usual["summary"]["miou_image"]
-    assert all(
-        f["info"]["solve_us"] > 0 and f["info"]["touch_us"] >= 0
-        for f in fine["frames"] + usual["frames"]
-    )
+    for info in (frame["info"] for frame in fine["frames"] + usual["frames"]):
+        assert info["solve_us"] > 0 and info["touch_us"] >= 0
     quick = json.loads(ran(0, f"reconstruct {frames_file} --budget 600kMACs --json")[0])
-    assert sum(f["info"]["macs"] for f in quick["frames"]) < sum(
-        f["info"]["macs"] for f in usual["frames"]
-    )
+    macs = [sum(frame["info"]["macs"] for frame in one["frames"]) for one in (quick, usual)]
+    assert macs[0] < macs[1]
 
 
 @pytest.mark.parametrize(
@@ -145,33 +147,26 @@ def test_a_model_that_nothing_was_measured_with(refused, done, frames_file, tmp_
     )
 
 
-def test_boards_are_told_the_settings(tmp_path, ran):
-    scene = write_scene(tmp_path / "one.toml", frames=2, elements=900)
+def test_boards_are_told_the_settings(scene, ran):
     out, err = ran(0, f"stream --device sim:{scene} --accuracy 0.87 --json")
-    assert "on the F767 (an estimate)" in err
-    frames = [json.loads(line) for line in out.splitlines()][:2]
-    assert "at most 1200000 MACs" in err
-    assert all(
-        frame["info"]["stop"] == "macs" and frame["info"]["macs"] <= 1_200_000 for frame in frames
-    )
-    assert all(frame["info"]["gap_rel"] > 0 for frame in frames)
+    assert "on the F767 (an estimate)" in err and "at most 1200000 MACs" in err
+    for info in (json.loads(line)["info"] for line in out.splitlines()[:2]):
+        assert info["stop"] == "macs" and info["macs"] <= 1_200_000 and info["gap_rel"] > 0
     line = ran(0, f"stream --device sim:{scene} --budget 8.7ms -v")[0].splitlines()[0]
     assert "30 iterations (iterations), gap" in line and "MMAC" in line
 
 
-def test_a_preset_sets_the_boards_scan_too(tmp_path, ran):
-    scene, run = write_scene(tmp_path / "one.toml", frames=2, elements=900), tmp_path / "run.eits"
-    assert (
-        "20 samples, reciprocal scan; measured"
-        in ran(0, f"record --device sim:{scene} -o {run} --preset fast")[1]
-    )
+def test_a_preset_sets_the_boards_scan_too(scene, tmp_path, ran):
+    run = tmp_path / "run.eits"
+    said = ran(0, f"record --device sim:{scene} -o {run} --preset fast")[1]
+    assert "20 samples, reciprocal scan; measured" in said
     board = json.loads(ran(0, f"info --device file:{run} --json")[0])["board"]
     assert (board["samples"], board["check_every"]) == (20, 0)
 
 
-def test_python_takes_a_preset(tmp_path):
-    scene, run = write_scene(tmp_path / "one.toml", frames=1, elements=900), tmp_path / "run.eits"
-    assert len(list(eitskin.stream(f"sim:{scene}", preset="fast", record=run))) == 1
+def test_python_takes_a_preset(scene, tmp_path):
+    run = tmp_path / "run.eits"
+    assert len(list(eitskin.stream(f"sim:{scene}", preset="fast", record=run))) == 2
     with eitskin.open_device(f"file:{run}") as device:
         assert (device.board.samples, device.board.check_every) == (20, 0)
     skin = eitskin.Reconstructor(eitskin.load_model())
@@ -182,15 +177,16 @@ def test_python_takes_a_preset(tmp_path):
             next(eitskin.stream(f"sim:{scene}", **wrong))
 
 
-def test_boards_refuse(refused, tmp_path):
-    scene = write_scene(tmp_path / "one.toml", frames=1)
-    assert "--iterations" in refused(2, f"stream --device sim:{scene} --budget 5ms --iterations 9")
-    assert "takes" in refused(2, f"stream --device sim:{scene} --budget 1ms")
-    assert "--budget x" in refused(2, f"stream --device sim:{scene} --budget x")
+@pytest.mark.parametrize(
+    ("budget", "said"),
+    [("5ms --iterations 9", "--iterations"), ("1ms", "takes"), ("x", "--budget x")],
+)
+def test_boards_refuse(refused, scene, budget, said):
+    assert said in refused(2, f"stream --device sim:{scene} --budget {budget}")
 
 
-def test_a_recording_takes_no_budget_but_keeps_what_it_chose(refused, tmp_path, ran):
-    scene, run = write_scene(tmp_path / "one.toml", frames=2, elements=900), tmp_path / "run.eits"
+def test_a_recording_takes_no_budget_but_keeps_what_it_chose(refused, scene, tmp_path, ran):
+    run = tmp_path / "run.eits"
     ran(0, f"record --device sim:{scene} -o {run} --accuracy 0.87")
     ran(0, f"replay {run} --check")
     first = json.loads(ran(0, f"replay {run} --json")[0].splitlines()[-2])
