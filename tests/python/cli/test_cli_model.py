@@ -15,7 +15,7 @@ from eitskin.model.eitm import load_model
 from eitskin.model.model import Defaults
 from eitskin.skin.skin import load_skin
 from eitskin.solve.reconstructor import Reconstructor
-from fresh_python import MAIN, run_command, run_python, without
+from fresh_python import MAIN, run_command, run_python, without, words
 from small_models import prebuilt
 
 SKIN = """
@@ -57,36 +57,16 @@ def write_skin(
 @pytest.mark.parametrize(
     ("outline", "count", "kind", "options", "expected"),
     [
-        (
-            "disk",
-            16,
-            "adjacent",
-            "",
-            {"protocol_rows": 208, "folded_rows": 104, "rank": 64, "storage": "f32"},
-        ),
-        (
-            "disk",
-            32,
-            "adjacent",
-            "--storage i8",
-            {"protocol_rows": 928, "folded_rows": 464, "rank": 64, "storage": "i8"},
-        ),
-        (
-            "L",
-            16,
-            "opposite",
-            "--rank 20 --storage f16",
-            {"protocol_rows": 192, "rank": 20, "storage": "f16"},
-        ),
-        (
-            "clockwise L",
-            8,
-            "adjacent",
-            "--data log-ratio --samples 3",
-            {"protocol_rows": 40, "rank": 20, "data": "log-ratio"},
-        ),
+        ("disk", 16, "adjacent", "",
+         {"protocol_rows": 208, "folded_rows": 104, "rank": 64, "storage": "f32"}),
+        ("disk", 32, "adjacent", "--storage i8",
+         {"protocol_rows": 928, "folded_rows": 464, "rank": 64, "storage": "i8"}),
+        ("L", 16, "opposite", "--rank 20 --storage f16",
+         {"protocol_rows": 192, "rank": 20, "storage": "f16"}),
+        ("clockwise L", 8, "adjacent", "--data log-ratio --samples 3",
+         {"protocol_rows": 40, "rank": 20, "data": "log-ratio"}),
     ],
-)
+)  # fmt: skip
 def test_build_info_verify(
     outline,
     count,
@@ -143,38 +123,33 @@ def test_without_the_numpy_reference():
 
 
 def test_building_twice_gives_the_same_bytes(done, tmp_path):
-    skin = write_skin(tmp_path)
-    for name in ("a.eitm", "b.eitm"):
-        done(f"model build {skin} -o {tmp_path / name}", *QUICK)
-    assert (tmp_path / "a.eitm").read_bytes() == (tmp_path / "b.eitm").read_bytes()
+    skin, files = write_skin(tmp_path), [tmp_path / "a.eitm", tmp_path / "b.eitm"]
+    for file in files:
+        done(f"model build {skin} -o {file}", *QUICK)
+    assert files[0].read_bytes() == files[1].read_bytes()
 
 
 def test_in_a_process_of_its_own(tmp_path):
     """The module as users run it: exit codes, streams, and output in pipes."""
-    command = [sys.executable, "-m", "eitskin.cli.main"]
-    skin = write_skin(tmp_path)
-    built = run_command(
-        [*command, "model", "build", "skin.toml", "-o", "palm.eitm", "--json", *QUICK], cwd=tmp_path
-    )
-    assert (built.returncode, built.stderr) == (0, "")
-    assert json.loads(built.stdout)["model"] == "palm.eitm"
+
+    def ended(*arguments: str) -> tuple[int, str, str]:
+        command = [sys.executable, "-m", "eitskin.cli.main", *words(*arguments)]
+        done = run_command(command, cwd=tmp_path)
+        return done.returncode, done.stdout, done.stderr
+
+    skin, palm = write_skin(tmp_path), tmp_path / "palm.eitm"
+    code, out, err = ended("model build skin.toml -o palm.eitm --json", *QUICK)
+    assert (code, err) == (0, "") and json.loads(out)["model"] == "palm.eitm"
     skin.write_text(skin.read_text().replace("thickness_mm", "thicknes_mm"))
-    refused = run_command(
-        [*command, "model", "build", "skin.toml", "-o", "other.eitm"], cwd=tmp_path
-    )
-    assert (refused.returncode, refused.stdout) == (4, "")
-    assert (
-        refused.stderr
-        == "eitskin: skin.toml [skin]: unknown key 'thicknes_mm'; did you mean 'thickness_mm'?\n"
-    )
-    (tmp_path / "palm.eitm").write_bytes((tmp_path / "palm.eitm").read_bytes()[:-16])
-    broken = run_command([*command, "model", "verify", "palm.eitm"], cwd=tmp_path)
-    assert broken.returncode == 6
-    assert broken.stderr.startswith("eitskin: palm.eitm: the model is truncated")
-    wrong = run_command([*command, "model", "verfy"], cwd=tmp_path)
-    assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1
-    traced = run_command([*command, "--traceback", "model", "info", "none.eitm"], cwd=tmp_path)
-    assert traced.returncode == 1 and "FileError: none.eitm: no such model" in traced.stderr
+    said = "skin.toml [skin]: unknown key 'thicknes_mm'; did you mean 'thickness_mm'?"
+    assert ended("model build skin.toml -o other.eitm") == (4, "", f"eitskin: {said}\n")
+    palm.write_bytes(palm.read_bytes()[:-16])
+    code, _, err = ended("model verify palm.eitm")
+    assert code == 6 and err.startswith("eitskin: palm.eitm: the model is truncated")
+    code, _, err = ended("model verfy")
+    assert code == 2 and err.count("\n") == 1
+    code, _, err = ended("--traceback model info none.eitm")
+    assert code == 1 and "FileError: none.eitm: no such model" in err
 
 
 def test_a_pipe_that_closes_early_leaves_no_traceback():
