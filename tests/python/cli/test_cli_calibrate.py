@@ -1,26 +1,23 @@
 """``eitskin calibrate`` from a simulated bench to loads of presses that it never saw, on the host
 and on a simulated board."""
 
-import json
 from math import cos, radians, sin
 from pathlib import Path
 
 import numpy as np
 import pytest
+from board_cases import board_of
 
 from eitskin.core.results import NEWTONS_PER_GRAM
-from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
 from eitskin.device.live_frames import LiveFrame, follow
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.set_up import take_reference
-from eitskin.device.simulated import SimBoard, SimTransport
+from eitskin.device.simulated import SimTransport
 from eitskin.device.wire.link_table import Stream
 from eitskin.model.eitm import decode_model, load_model
-from eitskin.scene.board_frames import BoardFrames
-from eitskin.scene.description import load_scene
 from fresh_python import words
 from small_models import prebuilt
 
@@ -98,21 +95,15 @@ def test_it_says_what_it_found(folder, done, told):
 
 def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
     """The new presses on a simulated board with this model, recorded to ``path``."""
-    board = SimBoard(
-        BoardFrames(load_scene(folder / "new.toml")),
-        [bank_bytes(blob, 1), bytes([ERASED]) * BANK_BYTES],
-    )
+    board = board_of(folder / "new.toml", blob)
     with Device(SimTransport("test", board)) as device:
         options = board_options(decode_model(blob, "made"), device.board)
         device.solver(options)
         with Recorder(path, device, options):
             take_reference(device, 16, streamed=True)
             device.start_scene()
-            return [
-                item
-                for item in follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES)
-                if isinstance(item, LiveFrame)
-            ]
+            items = list(follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES))
+    return [item for item in items if isinstance(item, LiveFrame)]
 
 
 def test_a_board_with_that_model_sends_the_same_load_bits(folder, tmp_path):
@@ -128,7 +119,7 @@ def test_a_board_with_that_model_sends_the_same_load_bits(folder, tmp_path):
     assert (check.touches, check.different) == (len(NEW), [])
 
 
-def test_a_recorded_run_calibrates_too(folder, tmp_path, done, told):
+def test_a_recorded_run_calibrates_too(folder, tmp_path, told):
     path, listed = tmp_path / "run.eits", tmp_path / "run.toml"
     live = recorded(folder, prebuilt()[1], path)
     tables = [
@@ -139,51 +130,30 @@ def test_a_recorded_run_calibrates_too(folder, tmp_path, done, told):
     facts = told(f"calibrate {path} --weights {listed}")
     assert (facts["presses"], facts["places"], facts["gain_order"]) == (4, 4, 0)
     assert "4 places: the gain is taken to be the same everywhere" in facts["notes"][0]
-    both = (
-        "calibrate",
-        path,
-        folder / "weights.npz",
-        "--weights",
-        listed,
-        "--weights",
-        folder / "weights.csv",
-        "--json",
-    )
-    assert json.loads(done(*both))["presses"] == 54
+    both = f"{path} {folder / 'weights.npz'}"
+    lists = f"--weights {listed} --weights {folder / 'weights.csv'}"
+    assert told("calibrate", both, lists)["presses"] == 54
 
 
 def test_weights_that_do_not_show_are_named(folder, tmp_path, ran):
-
-    rows = (folder / "weights.csv").read_text().splitlines()
-    elsewhere = [
-        "first,weight_g,x_mm,y_mm",
-        *(f"{row},," for row in rows[1:-1]),
-        f"{rows[-1]},0,0",
-    ]  # that one stands near the rim
+    _, *rows, last = (folder / "weights.csv").read_text().splitlines()
+    # that one stands near the rim
+    elsewhere = ["first,weight_g,x_mm,y_mm", *(f"{row},," for row in rows), f"{last},0,0"]
     (tmp_path / "w.csv").write_text("\n".join(elsewhere))
-    assert (
-        "weights.npz: frames 49 to 49: 0 of 1 show the weight; left out"
-        in ran(0, f"calibrate {folder / 'weights.npz'} --weights {tmp_path / 'w.csv'}")[1]
-    )
+    said = ran(0, f"calibrate {folder / 'weights.npz'} --weights {tmp_path / 'w.csv'}")[1]
+    assert "weights.npz: frames 49 to 49: 0 of 1 show the weight; left out" in said
 
 
 def test_refusals(folder, refused, tmp_path):
-    frames, listed = folder / "weights.npz", folder / "weights.csv"
-    assert "1 recordings and 2 lists of weights" in refused(
-        2, f"calibrate {frames} --weights {listed} --weights {listed}"
-    )
-    (tmp_path / "w.csv").write_text("first,weight_g\n50,10\n")
-    assert "frames 50 to 50 of the list of weights are not there; it has frames 0 to 49" in refused(
-        8, f"calibrate {frames} --weights {tmp_path / 'w.csv'}"
-    )
-    (tmp_path / "w.csv").write_text("first,weight_g\n0,10\n1,20\n")
-    assert "2 presses are too few" in refused(
-        8, f"calibrate {frames} --weights {tmp_path / 'w.csv'}"
-    )
-    assert (
-        "no such frames file"
-        in refused(3, f"calibrate {tmp_path / 'none.npz'} --weights {listed}").lower()
-    )
-    assert "--seed -1 must be 0 or above" in refused(
-        2, f"calibrate {frames} --weights {listed} --seed -1"
-    )
+    frames, listed, own = folder / "weights.npz", folder / "weights.csv", tmp_path / "w.csv"
+    outside = "frames 50 to 50 of the list of weights are not there; it has frames 0 to 49"
+    for code, arguments, rows, said in (
+        (2, f"{frames} --weights {listed} --weights {listed}", "",
+         "1 recordings and 2 lists of weights"),
+        (8, f"{frames} --weights {own}", "50,10", outside),
+        (8, f"{frames} --weights {own}", "0,10\n1,20", "2 presses are too few"),
+        (3, f"{tmp_path / 'none.npz'} --weights {listed}", "", "no such frames file"),
+        (2, f"{frames} --weights {listed} --seed -1", "", "--seed -1 must be 0 or above"),
+    ):  # fmt: skip
+        own.write_text(f"first,weight_g\n{rows}\n")
+        assert said in refused(code, "calibrate", arguments)
