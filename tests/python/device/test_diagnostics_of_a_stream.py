@@ -9,7 +9,7 @@ from functools import cache
 import pytest
 from device_helpers import QUIET, Damaging, empty_bank, of, same, scene, sim_device
 
-from eitskin.core.diagnostics_table import DIAGNOSTICS
+from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.events import Events
@@ -84,6 +84,18 @@ def test_it_is_told_though_nobody_wants_images():
         told = faults(device.stream(Stream.RAW))
     found = [fault[:3] for fault in told]
     assert found == [(FaultCode.ELECTRODE_OPEN, True, OFF), (FaultCode.ELECTRODE_OPEN, False, OFF)]
+
+
+def test_what_is_not_looked_for_is_not_found():
+    opened = bits("electrode open")
+    with sim_device(board()) as device:
+        device.tare(QUIET)
+        options = board_options(prebuilt()[0], device.board)
+        device.solver(replace(options, diagnostics=ALL_DIAGNOSTICS & ~opened))
+        device.start_scene()
+        items = list(device.stream(Stream.TOUCHES))
+    assert not any(head.open_electrodes or head.diagnostics & opened for head in heads(items))
+    assert FaultCode.ELECTRODE_OPEN not in {fault[0] for fault in faults(items)}
 
 
 def test_the_check_finds_what_the_board_found(tmp_path):
