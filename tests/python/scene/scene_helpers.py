@@ -58,13 +58,9 @@ def effect_module(
 
     module = ModuleType(f"effects_of_tests_{name}")
     vars(module).update(
-        NAME=name,
-        STAGE=stage,
-        ORDER=50,
-        SUMMARY="adds",
-        Parameters=Offset,
-        make=add_offset if make is None else make,
-    )
+        NAME=name, STAGE=stage, ORDER=50, SUMMARY="adds", Parameters=Offset,
+        make=make or add_offset,
+    )  # fmt: skip
     sys.modules[module.__name__] = module
     return module.__name__
 

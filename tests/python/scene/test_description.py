@@ -35,9 +35,8 @@ def test_a_touch_comes_moves_and_goes(tmp_path):
 
 
 def test_hold_keeps_a_touch_and_standing_touches_need_no_path(tmp_path):
-    held = load_scene(
-        written(tmp_path, HEAD + TOUCH.replace("radius_mm", "hold = true\nradius_mm"))
-    )
+    touch = TOUCH.replace("radius_mm", "hold = true\nradius_mm")
+    held = load_scene(written(tmp_path, HEAD + touch))
     assert held.samples()[0].there[39] and held.samples()[0].x_mm[39] == 30.0
     text = HEAD + "[[touch]]\nradius_mm = 8\nx_mm = 1\ny_mm = 2\n"
     assert load_scene(written(tmp_path, text)).samples()[0].there.all()
@@ -123,15 +122,18 @@ def test_what_cannot_be_is_refused_in_one_line_naming_file_table_and_key(tmp_pat
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
-def test_scenes_made_in_python_are_checked_too():
-    with pytest.raises(ConfigError, match="outside"):
-        Scene("s", touches=(always(95, 0, 8),))
-    with pytest.raises(ConfigError, match="radius_mm must be above 0"):
-        Scene("s", touches=(always(0, 0, 0),))
-    with pytest.raises(ConfigError, match="contrast must be above 0"):
-        Scene("s", touches=(always(0, 0, 8, ShortCircuit(-1.0)),))
-    with pytest.raises(ConfigError, match="seed = -1"):
-        Scene("s", seed=-1)
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"touches": (always(95, 0, 8),)}, "outside"),
+        ({"touches": (always(0, 0, 0),)}, "radius_mm must be above 0"),
+        ({"touches": (always(0, 0, 8, ShortCircuit(-1.0)),)}, "contrast must be above 0"),
+        ({"seed": -1}, "seed = -1"),
+    ],
+)
+def test_scenes_made_in_python_are_checked_too(given, said):
+    with pytest.raises(ConfigError, match=said):
+        Scene("s", **given)
 
 
 def test_a_skin_file_beside_the_scene_is_found(tmp_path):
