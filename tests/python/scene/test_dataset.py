@@ -173,7 +173,7 @@ def test_bad_datasets_are_refused(tmp_path):
         (lambda: job_of(scene, 1, 1, ranges_file=tmp_path / "r.toml"), ConfigError,
          r"r.toml: a ranges file holds the table \[dataset\]"),
         (lambda: write_dataset(small_job(), tmp_path / "d", jobs=0), UsageError, "--jobs 0"),
-        (lambda: load_chunk(tmp_path / "c.npz"), FileError, ""),
+        (lambda: load_chunk(tmp_path / "c.npz"), FileError, None),
     ):  # fmt: skip
         with pytest.raises(error, match=said):
             make()
