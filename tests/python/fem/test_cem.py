@@ -36,17 +36,13 @@ def test_concentric_inclusion_converges_to_the_exact_series(radius_mm, inside):
     exact = exact_voltages(skin, protocol, radius_mm, inside)
     sizes, errors = [], []
     for fineness in (1, 2, 4):
-        rings = np.concatenate(
-            [
-                np.linspace(0, radius_mm, 4 * fineness + 1)[1:],
-                np.linspace(radius_mm, 97, 4 * fineness + 1)[1:],
-            ]
-        )
+        inner, outer = ((0, radius_mm), (radius_mm, 97))
+        rings = [np.linspace(*ends, 4 * fineness + 1)[1:] for ends in (inner, outer)]
+        rings = np.concatenate(rings)
         mesh = polar_mesh(skin, rings, 64 * fineness)
         forward = ForwardModel(mesh, skin, protocol, DWARFING_IMPEDANCE_OHM_M2)
-        conductivity = np.where(
-            np.hypot(*mesh.centroids_mm().T) < radius_mm, inside, skin.conductivity_s_per_m
-        )
+        away = np.hypot(*mesh.centroids_mm().T)
+        conductivity = np.where(away < radius_mm, inside, skin.conductivity_s_per_m)
         sizes.append(1 / fineness)
         errors.append(_relative(forward.voltages(conductivity), exact))
     assert errors[-1] < 3e-3
@@ -72,13 +68,7 @@ def test_netgen_meshes_converge_to_the_exact_series():
 
 
 def test_32_electrodes_opposite_drive_against_the_series():
-    skin = Skin(
-        "many",
-        disk(100.0),
-        Electrodes(32, 3.0, 17.0, True),
-        conductivity_s_per_m=1.3,
-        thickness_mm=7.0,
-    )
+    skin = Skin("many", disk(100.0), Electrodes(32, 3.0, 17.0, True), 1.3, 7.0)
     protocol = opposite(32)
     exact = exact_voltages(skin, protocol, 9.0, 1.3)
     mesh = mesh_for_elements(skin, 9000)
@@ -165,14 +155,12 @@ def test_against_scikit_fem(impedance, shape, paper_mesh, l_skin, l_mesh):
     skin, mesh = (paper_skin(), paper_mesh) if shape == "disk" else (l_skin, l_mesh)
     rng = np.random.default_rng(5)
     count = skin.electrodes.count
-    z = (
-        np.full(count, impedance)
-        if not isinstance(impedance, str)
-        else 10 ** rng.uniform(-4, 0, count)
-    )
     if isinstance(impedance, str):
+        z = 10 ** rng.uniform(-4, 0, count)
         z[[0, 3, 4]] = 0
         z[-1] = 0 if "ground" in impedance else 0.02
+    else:
+        z = np.full(count, impedance)
     conductivity = skin.conductivity_s_per_m * 10 ** rng.uniform(-1, 1, mesh.n_elements)
     for protocol in (
         adjacent(count, 2e-3),
@@ -188,9 +176,8 @@ def test_reciprocity_to_rounding(impedance, paper_mesh):
     rng = np.random.default_rng(6)
     conductivity = 10 ** rng.uniform(-3, -1, paper_mesh.n_elements)
     for protocol in (adjacent(16), skip(16, 3)):
-        voltages = ForwardModel(paper_mesh, paper_skin(), protocol, impedance).voltages(
-            conductivity
-        )
+        forward = ForwardModel(paper_mesh, paper_skin(), protocol, impedance)
+        voltages = forward.voltages(conductivity)
         pairs = protocol.reciprocal_pairs()
         difference = voltages[pairs.first] - pairs.sign * voltages[pairs.second]
         assert np.abs(difference).max() < 1e-11 * np.abs(voltages).max()
@@ -216,9 +203,8 @@ def test_every_protocol_reads_the_same_potentials(paper_mesh):
         assert len(forward.patterns.solved) <= 16
         voltages = forward.voltages(0.01)
         for row in range(0, protocol.n_rows, 37):
-            alone = ForwardModel(
-                paper_mesh, paper_skin(), Protocol(16, protocol.drive_measure[row : row + 1])
-            )
+            one = Protocol(16, protocol.drive_measure[row : row + 1])
+            alone = ForwardModel(paper_mesh, paper_skin(), one)
             assert len(alone.patterns.solved) == 2
             assert voltages[row] == pytest.approx(float(alone.voltages(0.01)[0]), rel=1e-8)
 
