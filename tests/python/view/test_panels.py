@@ -83,9 +83,8 @@ def assert_whole(figure: Any) -> None:
 @pytest.mark.parametrize("count", (1, 2, 12))
 def test_every_text_is_whole(name, count):
     skin = SKINS[name]
-    figure = panels_figure(
-        skin, grid_for(skin.outline), panels(skin, count), title=LONG, note=NOTE, legend=True
-    )
+    grid, given = grid_for(skin.outline), panels(skin, count)
+    figure = panels_figure(skin, grid, given, title=LONG, note=NOTE, legend=True)
     assert_whole(figure)
     width, height = figure.get_size_inches()
     assert width < 16 and height < 16
@@ -100,13 +99,8 @@ def test_every_text_is_whole(name, count):
 def test_one_frame_at_large_is_whole(name):
     skin = SKINS[name]
     panel = panels(skin, 1)[0]
-    assert panel.values is not None
-    assert_whole(
-        frame_figure(
-            skin, grid_for(skin.outline), panel.values, truth=panel.truth, found=panel.found,
-            title=LONG,
-        )
-    )  # fmt: skip
+    seen = {"truth": panel.truth, "found": panel.found, "title": LONG}
+    assert_whole(frame_figure(skin, grid_for(skin.outline), panel.values, **seen))
 
 
 def test_words_that_are_too_long_are_cut():
