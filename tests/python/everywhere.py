@@ -192,10 +192,8 @@ class SameEverywhere:
         return statuses, own
 
     def board(self, steps: Sequence[Step]) -> EmulatedRun:
-        """The emulated Cortex-M7 alone."""
         return run_steps(self._program, self._new_folder(), steps)
 
 
 def pairs(first: Sequence[Outcome], second: Sequence[Outcome]) -> Iterator[tuple[Outcome, Outcome]]:
-    """Outcome by outcome, as many of each."""
     return iter(zip(first, second, strict=True))

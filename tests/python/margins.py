@@ -60,7 +60,6 @@ _HERE = Margins()
 
 @pytest.fixture
 def margins() -> Margins:
-    """Records how near to its bound a hard case came."""
     return _HERE
 
 

@@ -7,8 +7,8 @@ from math import cos, radians, sin
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.grid import grid_for
 from eitskin.model.build import BuildSettings, Linearisation, linearise, make_model
 from eitskin.model.eitm import decode_model, encode_model
@@ -20,8 +20,6 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import Outline, disk, polygon
 from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
 from eitskin.skin.skin import Skin, paper_skin
-
-FloatArray = npt.NDArray[np.float64]
 
 DISK_MM = 100.0
 ELEMENTS = 900
@@ -57,7 +55,6 @@ def rounded_rectangle() -> Outline:
 
 
 def l_shape() -> Outline:
-    """An L of 100 mm whose arms are 40 mm wide."""
     return polygon([(0, 0), (100, 0), (100, 40), (40, 40), (40, 100), (0, 100)])
 
 
@@ -172,7 +169,6 @@ def tiny_blob(storage: str = "f32") -> bytes:
 
 @cache
 def prebuilt() -> tuple[Model, bytes]:
-    """The model of the paper's skin that ships with the package."""
     return load_prebuilt()
 
 

@@ -32,7 +32,6 @@ SET_UP = {"scripts/demo", "scripts/test"}
 
 
 def blocks(page: str) -> list[tuple[str, str]]:
-    """Language and text of each block of ``page``."""
     return BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
 
 

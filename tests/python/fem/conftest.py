@@ -11,7 +11,6 @@ from small_models import rounded_rectangle
 
 @pytest.fixture(scope="session")
 def paper_mesh() -> Mesh:
-    """A coarse mesh of the paper's skin, about 1,500 elements."""
     return build_mesh(paper_skin(), max_size_mm=9.0, electrode_size_mm=1.0)
 
 

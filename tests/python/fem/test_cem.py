@@ -3,10 +3,10 @@
 from math import pi
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from disk_series import DWARFING_IMPEDANCE_OHM_M2, exact_voltages, polar_mesh
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ProtocolError, UsageError
 from eitskin.fem.cem import Counters, ForwardModel
 from eitskin.fem.mesh import Mesh, build_mesh, mesh_for_elements
@@ -14,8 +14,6 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.protocol import Protocol, adjacent, opposite, skip, table
 from eitskin.skin.skin import Skin, paper_skin
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def _relative(found: FloatArray, exact: FloatArray) -> float:

@@ -4,9 +4,9 @@ clipping by hand."""
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.cem import Counters, ForwardModel
 from eitskin.fem.grid import Grid, grid_for
@@ -14,8 +14,6 @@ from eitskin.fem.mesh import Mesh, build_mesh
 from eitskin.fem.sensitivity import element_to_pixel, sensitivity
 from eitskin.skin.protocol import Protocol, adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def _whole(grid: Grid) -> Grid:

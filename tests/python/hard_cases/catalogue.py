@@ -25,7 +25,6 @@ class Case:
 
     @property
     def group(self) -> str:
-        """What comes before the slash of the id."""
         return self.id.split("/")[0]
 
     @property
@@ -64,7 +63,6 @@ def tests_in(path: Path) -> list[str]:
 
 
 def exists(test: str) -> bool:
-    """Whether what a case calls its test is there."""
     path = ROOT / _file(test)
     return path.is_file() and ("::" not in test or test.split("::")[1] in tests_in(path))
 

@@ -29,13 +29,11 @@ CONTACTS = {"contact_impedance": {"spread": 0.2}}
 
 @cache
 def scenes() -> tuple[TouchScene, ...]:
-    """What is touched."""
     return random_touches(paper_skin().outline, SEED, COUNT, "frames").scenes
 
 
 @cache
 def mesh_cache() -> MeshCache:
-    """Meshes, kept."""
     return MeshCache()
 
 
@@ -63,7 +61,6 @@ def frames_of(
 
 
 def swapped(i: int, j: int) -> Protocol:
-    """The scan with two electrodes' wires exchanged."""
     rows = ROWS.copy()
     rows[i == ROWS], rows[j == ROWS] = j, i
     return table(ELECTRODES, rows)
@@ -95,23 +92,19 @@ def simulated() -> list[dict[str, np.ndarray]]:
 
 
 def rms_v(k: int) -> float:
-    """Of the untouched skin's voltages."""
     return float(np.sqrt(np.mean(simulated()[k]["quiet"] ** 2)))
 
 
 def noisy(k: int, frame: np.ndarray, stream: int) -> np.ndarray:
-    """With noise that depends on scene and stream only."""
     generator = np.random.default_rng([SEED, k, stream])
     return np.asarray(frame + rms_v(k) / SNR * generator.standard_normal(frame.shape))
 
 
 def quiet_frames(k: int) -> np.ndarray:
-    """(QUIET, m) V."""
     return noisy(k, np.tile(simulated()[k]["quiet"], (QUIET, 1)), 0)
 
 
 def touched(k: int) -> np.ndarray:
-    """Scene k's touched frame (m,) V."""
     return noisy(k, simulated()[k]["touched"], 1)
 
 

@@ -42,7 +42,6 @@ def steps_of(kind: str, level: float) -> list[Step]:
 
 
 def all_steps() -> list[Step]:
-    """Every kind at every level."""
     return [
         step
         for kind, levels in LEVELS.items()

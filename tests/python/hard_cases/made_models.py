@@ -57,7 +57,6 @@ def made_model(s: np.ndarray, storage: str = "f32", lipschitz: float | None = No
 
 
 def made_blob(s: np.ndarray, **changes: object) -> bytes:
-    """The bytes of ``made_model``."""
     return encode_model(made_model(s, **changes))
 
 

@@ -124,5 +124,4 @@ DRAWN: dict[str, Callable[[Path], None]] = {
 
 
 def draw(name: str, path: Path) -> None:
-    """Make the picture ``name`` at ``path``."""
     DRAWN[name](path)

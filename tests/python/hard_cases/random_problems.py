@@ -22,19 +22,16 @@ class RandomProblem:
     y: np.ndarray
 
     def lambda_max(self, sign: str) -> float:
-        """The least lambda at which zero is the optimum."""
         return greatest(self.s.T @ self.y, sign)
 
     def options(self, **changes: object) -> Options:
         return plain_options(self.s, **changes)
 
     def judged(self, sign: str, one: Outcome) -> Judged:
-        """A solve's outcome."""
         return judged(self.s, self.y, sign, one)
 
 
 def rounded(values: np.ndarray) -> np.ndarray:
-    """To float32 numbers."""
     return np.asarray(values).astype(np.float32).astype(np.float64)
 
 

@@ -39,17 +39,14 @@ class Judged:
     x: np.ndarray
 
     def at_zero(self) -> Judged:
-        """The start."""
         return replace(self, x=np.zeros_like(self.x))
 
     @property
     def residual(self) -> np.ndarray:
-        """y - S x."""
         return np.asarray(self.y - self.s @ self.x)
 
     @property
     def objective(self) -> float:
-        """At x."""
         return objective_of(self.s, self.y, self.x, self.lam)
 
     @property

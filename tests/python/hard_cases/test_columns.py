@@ -21,7 +21,6 @@ def repeated(times: int, turn: float = 1.0, nudge: float = 0.0) -> RandomProblem
 
 
 def with_zeros() -> RandomProblem:
-    """Every third column is zero."""
     s = gaussian(5).s.copy()
     s[:, ::3] = 0
     return with_data(s, 6)
@@ -34,12 +33,10 @@ def of_rank(rank: int) -> RandomProblem:
 
 
 def all_zero() -> RandomProblem:
-    """Nothing is seen at all."""
     return RandomProblem(np.zeros((20, 64)), gaussian(9).y)
 
 
 def steep() -> RandomProblem:
-    """Columns from 1e-6 to 1e6 in length."""
     s = gaussian(10).s * 10.0 ** np.linspace(-6, 6, 64)
     return RandomProblem(rounded(s), rounded(s @ np.eye(64)[40] + 0.1 * s[:, 50]))
 

@@ -30,12 +30,10 @@ def check_named(
 
 
 def pair(k: int) -> tuple[int, ...]:
-    """The electrodes beside each other with which scene k's fault is."""
     return tuple(sorted((k % ELECTRODES, (k + 1) % ELECTRODES)))
 
 
 def using(*electrodes: int) -> np.ndarray:
-    """Rows (m,) that use any of them."""
     return np.asarray(np.isin(ROWS, electrodes).any(axis=1))
 
 

@@ -22,7 +22,6 @@ SHARE = 0.03
 
 @cache
 def optimum(name: str, sign: str) -> Judged:
-    """Of the problem of that name."""
     return optimum_of(PROBLEMS[name], sign, SHARE)
 
 
@@ -40,7 +39,6 @@ def allowance(best: Judged, k: int) -> float:
 
 
 def check_rate(margins: Margins, name: str, best: Judged, k: int, point: Judged) -> None:
-    """FISTA's promise."""
     half = 0.5 * float(best.y @ best.y)
     lacks = max(0.0, point.objective - best.objective) / half
     bound = (allowance(best, k) + best.gap + point.objective_rounding) / half
@@ -76,7 +74,6 @@ def test_iterations(same_everywhere, margins, solver):
 
 
 def smallest_of(s: np.ndarray, columns: np.ndarray) -> float:
-    """The least singular value of those columns."""
     return float(np.linalg.svd(s[:, columns], compute_uv=False)[-1]) if columns.any() else 1.0
 
 

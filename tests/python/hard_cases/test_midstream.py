@@ -25,7 +25,6 @@ def of_the_frame(one: Outcome) -> tuple[object, ...]:
 
 
 def unlike(some: list[Outcome], others: list[Outcome]) -> int:
-    """How many frames differ."""
     return sum(
         of_the_frame(one) != of_the_frame(other) for one, other in zip(some, others, strict=True)
     )

@@ -19,7 +19,6 @@ CHANNELS, ZERO = -11, -12  # eits_status
 
 
 def options(**changes: object) -> Options:
-    """The model's own, with some changed."""
     return replace(default_options(prebuilt()[0]), **changes)
 
 

@@ -33,7 +33,6 @@ def frames_of(places_mm: list[tuple[float, float] | None], share: float, seed: i
 
 
 def head(chosen: Options) -> list[Step]:
-    """A model, its options and a reference with noise."""
     return [Load(small_blob()), Choose(chosen), TareStep(small().quiet(131, 32, NOISE))]
 
 

@@ -39,7 +39,6 @@ def refused(s: np.ndarray) -> bool:
 
 
 def expected_end(size: float) -> str:
-    """What becomes of data of norm ``size``."""
     return "zero" if size < MIN_DATA else "solved" if size < MAX_DATA else "refused"
 
 

@@ -64,7 +64,6 @@ WHOLE = encode_load(law())
 
 
 def changed(at: int, layout: str, value: float) -> bytes:
-    """The section with one number changed."""
     number = struct.pack(layout, value)
     return WHOLE[:at] + number + WHOLE[at + len(number) :]
 

@@ -39,8 +39,6 @@ def moving_scene(frames: int = 8, **changes: Any) -> Scene:
 
 @dataclass(frozen=True)
 class Offset:
-    """Parameters of the effects made here."""
-
     offset_v: float = 0.001
 
 
@@ -66,7 +64,6 @@ def effect_module(
 
 
 def scene_command(*arguments: str) -> int:
-    """``eitskin scene ARGUMENTS``; errors are raised."""
     parser = argparse.ArgumentParser()
     cmd_scene.add_options(parser)
     options = parser.parse_args(arguments)

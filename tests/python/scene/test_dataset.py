@@ -29,7 +29,6 @@ from eitskin_studies.datasets.ranges import drawn, ranges_of
 
 
 def dataset_command(*arguments: str) -> int:
-    """``eitskin dataset ARGUMENTS``; errors are raised."""
     parser = argparse.ArgumentParser()
     cmd_dataset.add_parser(parser.add_subparsers())
     options = parser.parse_args(["dataset", *arguments])

@@ -25,7 +25,6 @@ print(json.dumps([loaded, sorted(sys.modules)]))
 
 
 def fresh(code: str, *arguments: str) -> str:
-    """What ``code`` prints in a fresh process."""
     done = run_python(code, *arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout

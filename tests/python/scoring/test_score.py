@@ -50,12 +50,10 @@ def put(*numbers: int, off: float = 0.0) -> list[tuple[float, float, float]]:
 
 @cache
 def scorer() -> Scorer:
-    """The prebuilt model's."""
     return scorer_for(prebuilt()[0])
 
 
 def scored(one: Reconstruction, sign: str = "increase", **changes: object) -> FrameScore | None:
-    """The first frame's score."""
     return scorer().score(frames(**changes), 0, one, sign)
 
 

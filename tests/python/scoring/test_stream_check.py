@@ -29,7 +29,6 @@ def touches(*places: tuple[float, float], status: int = 0, time_us: int = 1000) 
 
 
 def image(*places: tuple[float, float], sign: float = 1.0) -> LiveFrame:
-    """An image with a disc at each place."""
     centres = prebuilt()[0].grid.centres_mm()
     near = (np.linalg.norm(centres - place, axis=1) < 10 for place in places)
     values = (0.01 * sign * sum(near, np.zeros(len(centres)))).astype(np.float32)

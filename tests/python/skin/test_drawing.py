@@ -34,14 +34,12 @@ BOX = '<rect id="skin" x="10" y="10" width="60" height="40"/>'
 
 
 def svg(folder: Path, body: str, head: str = MM) -> Path:
-    """A drawing."""
     path = folder / "a.svg"
     path.write_text(HEAD.format(head, body), encoding="utf-8")
     return path
 
 
 def outline(path: Path, element: str | None = None, **reading: float) -> Outline:
-    """The outline in a drawing."""
     return read_drawing(path, DrawingReading(**reading)).outline(element)
 
 
@@ -58,7 +56,6 @@ def described(
 
 
 def assert_centres(skin: Skin, wanted: list[tuple[float, float]]) -> None:
-    """Where the electrodes are, mm."""
     np.testing.assert_allclose(skin.electrode_centres_mm(), wanted, atol=1e-4)
 
 
@@ -180,7 +177,6 @@ def test_points_on_a_disks_rim(tmp_path):
 
 
 def dxf(folder: Path, units: int = 4) -> tuple[ezdxf.document.Drawing, Path]:
-    """An empty drawing and where it is to be saved."""
     document = ezdxf.new("R2000", units=units)
     return document, folder / "a.dxf"
 

@@ -26,7 +26,6 @@ SOLVED = ("iterations", "optimum")
 
 @pytest.fixture(params=SOLVERS)
 def solver(request) -> str:
-    """Each solver in turn."""
     return str(request.param)
 
 

@@ -31,7 +31,6 @@ KEPT = (
 
 
 def few() -> tuple[Candidate, ...]:
-    """Those that the tables speak of, with two values each."""
     return tuple(
         replace(one, values=tuple(sorted({one.values[0], one.fixed})))
         for one in candidates()

@@ -70,7 +70,6 @@ def test_another_regularisation_is_the_model_built_with_it():
 
 
 def _few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run on few elements, electrodes, settings and cases."""
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
     monkeypatch.setattr(measuring, "PAIR_MM", (24.0, 36.0))
     for module in (electrodes, tables):

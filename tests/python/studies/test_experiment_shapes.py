@@ -29,14 +29,12 @@ from eitskin_studies.experiments.shapes.variants import ShapeVariant, variants
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory) -> dict[str, ShapeVariant]:
-    """The skins by name."""
     return {one.name: one for one in variants(tmp_path_factory.mktemp("drawings"))}
 
 
 def _small(
     monkeypatch: pytest.MonkeyPatch, known: dict[str, ShapeVariant], folder: Path
 ) -> ExperimentOutcome:
-    """A run on two shapes with few elements and scenes."""
     monkeypatch.setattr(shapes, "variants", lambda _: [known["disk, 16"], known["hand, 16 placed"]])
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
     return shapes.run(coarse(folder, 0.03, 2000))

@@ -136,7 +136,6 @@ def test_levers_are_named_by_what_differs():
 
 
 def with_few_values(patch: pytest.MonkeyPatch) -> None:
-    """One value a method, and few levers."""
     for name, values in (
         ("REGULARISATIONS", (0.01,)),
         ("ITERATIONS", (60,)),
@@ -152,7 +151,6 @@ def with_few_values(patch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def outcome(shared_data, tmp_path_factory) -> tuple[Workspace, ExperimentOutcome]:
-    """The whole study on few scenes and few levers."""
     shop = workspace(tmp_path_factory.mktemp("tank"), 0.05, data=shared_data)
     with pytest.MonkeyPatch.context() as patch:
         with_few_values(patch)

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray
 
+from eitskin.arrays import FloatArray
 from eitskin.scene.compiler import MeshCache, compile_scene
 from eitskin.scene.description import scene_from_table
 from eitskin.scene.effect import EffectSession, GeometryStep, LoadedStep, Loads, Stage, VoltageStep

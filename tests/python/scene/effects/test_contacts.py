@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError
 from eitskin.scene.effects import adc, jitter, noise, saturation
 

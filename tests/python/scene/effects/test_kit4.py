@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from effect_types import FloatArray
 
+from eitskin.arrays import FloatArray
 from eitskin.scene.compiler import MeshCache, compile_scene
 from eitskin.scene.description import Scene, load_scene
 from eitskin.scene.runner import simulate_frames
