@@ -2,7 +2,7 @@
 must be the same."""
 
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
@@ -193,7 +193,3 @@ class SameEverywhere:
 
     def board(self, steps: Sequence[Step]) -> EmulatedRun:
         return run_steps(self._program, self._new_folder(), steps)
-
-
-def pairs(first: Sequence[Outcome], second: Sequence[Outcome]) -> Iterator[tuple[Outcome, Outcome]]:
-    return iter(zip(first, second, strict=True))

@@ -73,21 +73,14 @@ def simulated() -> list[dict[str, np.ndarray]]:
     found = []
     for k in range(COUNT):
         quiet, touched = frames_of(k, {})
-        pair = [k % ELECTRODES, (k + 1) % ELECTRODES]
-        apart = [k % ELECTRODES, (k + 4) % ELECTRODES]
-        faults = {
-            "detached": frames_of(k, {"detached": {"electrodes": pair[:1]}}),
-            "bridged": frames_of(k, {"bridged": {"electrodes": pair, "resistance_ohm": 10.0}}),
-            "bridged apart": frames_of(
-                k, {"bridged": {"electrodes": apart, "resistance_ohm": 10.0}}
-            ),
-            "swapped": frames_of(k, {}, swapped(*pair)),
-            "swapped apart": frames_of(k, {}, swapped(*apart)),
-        }
-        found.append(
-            {"quiet": quiet, "touched": touched}
-            | {name: frames[-1] for name, frames in faults.items()}
-        )
+        pair, apart = ([k % ELECTRODES, (k + by) % ELECTRODES] for by in (1, 4))
+        off = {"detached": {"electrodes": pair[:1]}}
+        one = {"quiet": quiet, "touched": touched, "detached": frames_of(k, off)[-1]}
+        for name, of in (("", pair), (" apart", apart)):
+            bridge = {"bridged": {"electrodes": of, "resistance_ohm": 10.0}}
+            one[f"bridged{name}"] = frames_of(k, bridge)[-1]
+            one[f"swapped{name}"] = frames_of(k, {}, swapped(*of))[-1]
+        found.append(one)
     return found
 
 
@@ -133,6 +126,5 @@ def miou(image: np.ndarray, k: int) -> float:
     image_scorer, scene = scorer().image_scorer, scenes()[k]
     truth = metrics.disc_mask(image_scorer.raster.points_mm, scene.centres_mm(), scene.radii_mm())
     shown = image_scorer.lookup.show(np.asarray(image, dtype=np.float64))
-    return float(
-        metrics.miou(metrics.touch_mask(shown, prebuilt()[0].defaults.mask_threshold), truth)
-    )
+    seen = metrics.touch_mask(shown, prebuilt()[0].defaults.mask_threshold)
+    return float(metrics.miou(seen, truth))

@@ -58,10 +58,8 @@ class HardSkin:
         for _ in range(count):
             change = np.zeros(len(centres))
             for _ in range(2):
-                middle = centres[rng.integers(len(centres))]
-                change[np.linalg.norm(centres - middle, axis=1) <= 0.12 * size] = (
-                    2 * self.skin.conductivity_s_per_m
-                )
+                away = np.linalg.norm(centres - centres[rng.integers(len(centres))], axis=1)
+                change[away <= 0.12 * size] = 2 * self.skin.conductivity_s_per_m
             frames.append(self.linear.v0_v + self.linear.jacobian @ change)
         return self._noisy(np.array(frames), 3, noise)
 

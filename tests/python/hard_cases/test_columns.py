@@ -20,25 +20,13 @@ def repeated(times: int, turn: float = 1.0, nudge: float = 0.0) -> RandomProblem
     return with_data(s, 4)
 
 
-def with_zeros() -> RandomProblem:
-    s = gaussian(5).s.copy()
-    s[:, ::3] = 0
-    return with_data(s, 6)
-
-
 def of_rank(rank: int) -> RandomProblem:
     """64 columns of 20 rows within so many directions."""
     rng = np.random.default_rng(7)
     return with_data(rng.standard_normal((20, rank)) @ rng.standard_normal((rank, 64)) / 8, 8)
 
 
-def all_zero() -> RandomProblem:
-    return RandomProblem(np.zeros((20, 64)), gaussian(9).y)
-
-
-def steep() -> RandomProblem:
-    s = gaussian(10).s * 10.0 ** np.linspace(-6, 6, 64)
-    return RandomProblem(rounded(s), rounded(s @ np.eye(64)[40] + 0.1 * s[:, 50]))
+STEEP = gaussian(10).s * 10.0 ** np.linspace(-6, 6, 64)
 
 
 PROBLEMS = {
@@ -50,15 +38,20 @@ PROBLEMS = {
         "all but the same": repeated(2, nudge=1e-7),
         "all but opposite": repeated(2, -1.0, 1e-7),
     },
-    "problem/zero-columns": {"every third": with_zeros(), "all": all_zero()},
+    "problem/zero-columns": {
+        "every third": with_data(np.where(np.arange(64) % 3 == 0, 0.0, gaussian(5).s), 6),
+        "all": RandomProblem(np.zeros((20, 64)), gaussian(9).y),
+    },
     "problem/low-rank": {
-        "1": of_rank(1),
-        "2": of_rank(2),
-        "7": of_rank(7),
+        **{str(rank): of_rank(rank) for rank in (1, 2, 7)},
         "falling by 0.5": smooth(11, decay=0.5),
     },
     "problem/whitened": {"orthonormal rows": whitened(12)},
-    "problem/steep-columns": {"1e-6 to 1e6": steep()},
+    "problem/steep-columns": {
+        "1e-6 to 1e6": RandomProblem(
+            rounded(STEEP), rounded(STEEP @ np.eye(64)[40] + 0.1 * STEEP[:, 50])
+        )
+    },
 }
 
 

@@ -73,10 +73,6 @@ def test_iterations(same_everywhere, margins, solver):
         before = (name, sign, point)
 
 
-def smallest_of(s: np.ndarray, columns: np.ndarray) -> float:
-    return float(np.linalg.svd(s[:, columns], compute_uv=False)[-1]) if columns.any() else 1.0
-
-
 def precise(problem: RandomProblem, solver: str, sign: str) -> list[Step]:
     """To a gap of 1e-5 |y|^2/2."""
     options = problem.options(
@@ -112,7 +108,8 @@ def test_float32_against_float64(same_everywhere, margins, solver):
         apart = float(np.linalg.norm(problem.s @ (narrow.x - wide.x)))
         within("S x, float32 from float64", apart / size, room / size, "|y|")
         support = (narrow.x != 0) | (wide.x != 0)
-        least = smallest_of(problem.s, support)
+        columns = problem.s[:, support]
+        least = float(np.linalg.svd(columns, compute_uv=False)[-1]) if support.any() else 1.0
         if least > 0 and np.count_nonzero(support) <= problem.s.shape[0]:
             longest = float(np.linalg.norm(wide.x))
             moved = float(np.linalg.norm(narrow.x - wide.x))

@@ -38,10 +38,6 @@ def refused(s: np.ndarray) -> bool:
     return False
 
 
-def expected_end(size: float) -> str:
-    return "zero" if size < MIN_DATA else "solved" if size < MAX_DATA else "refused"
-
-
 def check_scaled(
     margins: Margins, case: str, base: Judged, one: Judged, data_off: float, to_base: float
 ) -> None:
@@ -84,7 +80,8 @@ def test_units_of_model_and_data(same_everywhere, margins, solver):
     base = problem.judged("both", outcomes[0])
     ends = set()
     for (a, b), one in zip(kept, outcomes, strict=True):
-        end = expected_end(size * 10.0**b)
+        norm = size * 10.0**b
+        end = "zero" if norm < MIN_DATA else "solved" if norm < MAX_DATA else "refused"
         ends.add(end)
         assert one.finite()
         if end == "solved":

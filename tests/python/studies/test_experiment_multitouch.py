@@ -153,9 +153,8 @@ def test_area_under_roc():
 
 def _seen(places: list[tuple[float, float]], explained: list[float]) -> SeenFrame:
     x, y = ([place[axis] for place in places] for axis in (0, 1))
-    return SeenFrame(
-        x, y, [9.0] * len(x), [2.0, 1.0][: len(x)], explained, False, 0.04, 100.0, 1, 1
-    )
+    strength = [2.0, 1.0][: len(x)]
+    return SeenFrame(x, y, [9.0] * len(x), strength, explained, False, 0.04, 100.0, 1, 1)
 
 
 def test_features_of_a_frame():
@@ -187,9 +186,8 @@ def test_rule_learns_what_matters():
     assert 0.93 < shown.exact_not_said.mean < 0.99 and shown.exact_said.mean < 0.6
     exact = np.array([one.exact for one in test])
     assert reliability(rule.chances(test), exact).error < 0.05
-    nothing = ScoredFrame(
-        60.0, 1, 0, False, False, False, math.inf, (0.0, 2.0, 1.0, 9.0, 10.0, 3.0)
-    )
+    none = (0.0, 2.0, 1.0, 9.0, 10.0, 3.0)
+    nothing = ScoredFrame(60.0, 1, 0, False, False, False, math.inf, none)
     assert not rule.says([nothing])[0]
 
 
@@ -203,15 +201,11 @@ def test_reliability_of_known_chances():
 def test_nonlinear_fit_knows_its_slope():
     skin = paper_skin()
     fits = Truthful(skin, adjacent(skin.electrodes.count))
-    at, contrasts = (
-        np.array([20.0, 30.0, 9.0, -40.0, 5.0, 8.0]),
-        [1.2, 1.4],
-    )  # weak: an element's answer is linear
+    # weak: an element's answer is linear
+    at, contrasts = np.array([20.0, 30.0, 9.0, -40.0, 5.0, 8.0]), [1.2, 1.4]
     slope = fits._answer(at, contrasts)[1]
     for k in range(len(at)):
-        step = np.zeros(len(at))
-        step[k] = STEP_MM
-        seen = (fits._answer(at + step, contrasts)[0] - fits._answer(at - step, contrasts)[0]) / (
-            2 * STEP_MM
-        )
+        step = STEP_MM * np.eye(len(at))[k]
+        high, low = (fits._answer(at + side * step, contrasts)[0] for side in (1, -1))
+        seen = (high - low) / (2 * STEP_MM)
         assert np.linalg.norm(slope[:, k] - seen) < 0.02 * np.linalg.norm(seen)

@@ -79,10 +79,10 @@ def test_frame_without_truth_has_two_panels_and_units(tmp_path):
 
 
 def test_many_panels(tmp_path):
-    panels = [
-        Panel(str(k), blob(GRID, 10 * k, 0), (Mark(10 * k, 0, 9),), (Mark(10 * k, 1, 8),))
-        for k in range(5)
-    ]
+    panels = []
+    for x in range(0, 50, 10):
+        marks = (Mark(x, 0, 9),), (Mark(x, 1, 8),)
+        panels.append(Panel(str(x), blob(GRID, x, 0), *marks))
     draw_panels(tmp_path / "many.png", SKIN, GRID, panels, 3, title="five", note="a note")
     height, width, _ = read(tmp_path / "many.png").shape
     assert 0.7 < height / width < 1.1  # two rows of three, a bar, a note
