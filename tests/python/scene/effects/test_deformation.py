@@ -102,7 +102,7 @@ def test_a_scene_is_solved_on_the_deformed_sheet_and_contacts():
     voltage_v, compiled = _voltages(stretch={"strain": 0.3, "at_s": -1000.0}, **contacts)
     how, z_ohm_m2 = stretched(1.3, 1.3**-0.5, 0), np.full(16, 0.02)
     direct = deformed(compiled.model, how).voltages(0.01 * how.thickness, z_ohm_m2 / how.thickness)
-    assert np.allclose(voltage_v[0], direct, rtol=1e-12, atol=0)
+    assert np.allclose(voltage_v[:2], direct, rtol=1e-12, atol=0)
 
 
 def test_effects_meet():
