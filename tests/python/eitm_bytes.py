@@ -10,15 +10,12 @@ ENTRY_SIZE = 16
 
 
 class Place(NamedTuple):
-    """Where a section lies."""
-
     offset: int
     size: int
     flags: int
 
 
 def sections_of(blob: bytes | bytearray) -> dict[str, Place]:
-    """The section table, in its order."""
     count = struct.unpack_from("<I", blob, 16)[0]
     entries = [
         struct.unpack_from("<4sIII", blob, HEADER_SIZE + ENTRY_SIZE * k) for k in range(count)
@@ -27,12 +24,10 @@ def sections_of(blob: bytes | bytearray) -> dict[str, Place]:
 
 
 def entry_place(blob: bytes | bytearray, name: str) -> int:
-    """The offset of a section's entry in the table."""
     return HEADER_SIZE + ENTRY_SIZE * list(sections_of(blob)).index(name)
 
 
 def fnv1a(content: bytes) -> int:
-    """FNV-1a, 64 bits."""
     value = 0xCBF29CE484222325
     for byte in content:
         value = ((value ^ byte) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF

@@ -2,7 +2,7 @@
 must be the same."""
 
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
@@ -127,45 +127,20 @@ def on_host(
     return statuses, outcomes
 
 
-def _electrode_bits(numbers: tuple[int, ...]) -> str:
-    return f"{sum(1 << e for e in numbers):016x}"
-
-
 def as_printed(outcome: Outcome) -> tuple[object, ...]:
     """In the emulated program's words."""
     i = outcome.info
-    info = ":".join(
-        [
-            str(i.nonzeros),
-            str(i.masked),
-            str(i.step_halvings),
-            *(bits(getattr(i, name)) for name in NUMBERS),
-        ]
-    )
-    info = ":".join(
-        [
-            info,
-            str(i.diagnostics),
-            str(i.saturated),
-            str(i.outliers),
-            bits(i.model_mismatch),
-            bits(i.unexplained),
-        ]
-    )
-    info = ":".join(
-        [info, *map(_electrode_bits, (i.open_electrodes, i.bridged_electrodes, i.noisy_electrodes))]
-    )
-    image = zlib.crc32(outcome.image.tobytes())
-    return (
-        outcome.status,
-        i.stop,
-        i.iterations,
-        i.macs,
-        i.touch_macs,
-        image,
-        info,
-        printed_touches(outcome.touches),
-    )
+    of_electrodes = (i.open_electrodes, i.bridged_electrodes, i.noisy_electrodes)
+    numbers = [
+        *map(str, (i.nonzeros, i.masked, i.step_halvings)),
+        *(bits(getattr(i, name)) for name in NUMBERS),
+        *map(str, (i.diagnostics, i.saturated, i.outliers)),
+        *map(bits, (i.model_mismatch, i.unexplained)),
+        *(f"{sum(1 << e for e in each):016x}" for each in of_electrodes),
+    ]
+    image, info = zlib.crc32(outcome.image.tobytes()), ":".join(numbers)
+    touches = printed_touches(outcome.touches)
+    return outcome.status, i.stop, i.iterations, i.macs, i.touch_macs, image, info, touches
 
 
 def _of_board(frame: EmulatedFrame) -> tuple[object, ...]:
@@ -217,10 +192,4 @@ class SameEverywhere:
         return statuses, own
 
     def board(self, steps: Sequence[Step]) -> EmulatedRun:
-        """The emulated Cortex-M7 alone."""
         return run_steps(self._program, self._new_folder(), steps)
-
-
-def pairs(first: Sequence[Outcome], second: Sequence[Outcome]) -> Iterator[tuple[Outcome, Outcome]]:
-    """Outcome by outcome, as many of each."""
-    return iter(zip(first, second, strict=True))

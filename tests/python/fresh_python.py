@@ -27,7 +27,6 @@ def without(*packages: str) -> str:
 def run_python(
     code: str, *arguments: object, cwd: Path | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run ``code`` with this project importable."""
     return run_command([sys.executable, "-c", code, *map(str, arguments)], cwd=cwd)
 
 

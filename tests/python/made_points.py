@@ -10,18 +10,15 @@ HERE = Conditions()
 
 def point(name: str, accuracy: float, instructions: float, **more: Any) -> Point:
     """A made-up point; its costliest frame takes twice the mean."""
-    fields = {
-        key: more.pop(key) for key in ("flash_bytes", "ram_bytes", "acquisition_us") if key in more
-    }
+    costs = {
+        "flash_bytes": 1000, "ram_bytes": 1000, "pixels_kept": 812, "acquisition_us": 20_800,
+    }  # fmt: skip
+    costs |= {key: more.pop(key) for key in costs.keys() & more.keys()}
     macs = instructions / 2
+    spread = {"worst_tenth": accuracy - 0.1, "low": accuracy - 0.01, "high": accuracy + 0.01}
     score = {
         "scenes": 9,
-        "image": {
-            "mean": accuracy,
-            "worst_tenth": accuracy - 0.1,
-            "low": accuracy - 0.01,
-            "high": accuracy + 0.01,
-        },
+        "image": {"mean": accuracy, **spread},
         "discs": {"mean": 0.9, "worst_tenth": 0.8, "low": 0.88, "high": 0.91},
         "exact_count": 1.0,
         "position_mm": {"median": 0.5, "p95": 1.0},
@@ -30,21 +27,10 @@ def point(name: str, accuracy: float, instructions: float, **more: Any) -> Point
         "touch_macs": [10, 20],
         "most_macs": 2 * macs,
     }
-    return Point(
-        Configuration(name, **more),
-        0.3,
-        1.0,
-        {
-            "flash_bytes": 1000,
-            "ram_bytes": 1000,
-            "pixels_kept": 812,
-            "acquisition_us": 20_800,
-            **fields,
-        },
-        {"kind": "counted", "mean": instructions, "most": 2 * instructions, "macs_mean": macs},
-        {"p50": instructions / 1e4, "p99": instructions, "most": instructions / 5e3},
-        {"random": {"60": score}},
-    )
+    counted = {"kind": "counted", "mean": instructions, "most": 2 * instructions, "macs_mean": macs}
+    host_us = {"p50": instructions / 1e4, "p99": instructions, "most": instructions / 5e3}
+    scores = {"random": {"60": score}}
+    return Point(Configuration(name, **more), 0.3, 1.0, costs, counted, host_us, scores)
 
 
 POINTS = (
@@ -62,6 +48,5 @@ COLD = POINTS[:-1]
 def target(
     budget: str | None = None, accuracy: float | None = None, board: str = "f767", **more: Any
 ) -> Target:
-    return check_wish(
-        Target(None if budget is None else read_budget(budget), accuracy, board, HERE, **more)
-    )
+    most = None if budget is None else read_budget(budget)
+    return check_wish(Target(most, accuracy, board, HERE, **more))

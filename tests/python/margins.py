@@ -5,6 +5,8 @@ import json
 import os
 import shutil
 import tempfile
+from collections.abc import Callable
+from functools import partial
 from math import isfinite
 from pathlib import Path
 
@@ -45,6 +47,10 @@ class Margins:
         for target in ("host f32", "M7"):
             self.record(case, what, target, measured, bound, unit)
 
+    def of(self, case: str) -> Callable[..., None]:
+        """``everywhere`` of one case."""
+        return partial(self.everywhere, case)
+
     def keep(self, case: str, target: str, used: float, text: str) -> None:
         self.worst[case, target] = max(self.worst.get((case, target), (-1.0, "")), (used, text))
 
@@ -54,7 +60,6 @@ _HERE = Margins()
 
 @pytest.fixture
 def margins() -> Margins:
-    """Records how near to its bound a hard case came."""
     return _HERE
 
 

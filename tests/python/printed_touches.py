@@ -8,7 +8,6 @@ from eitskin.core.diagnostics_table import Touch
 
 
 def bits(value: float) -> str:
-    """Of a float32."""
     return f"{struct.unpack('<I', struct.pack('<f', value))[0]:08x}"
 
 

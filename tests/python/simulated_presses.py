@@ -19,7 +19,6 @@ TRUE = Placement(turn_deg=37.0, scale=0.97)
 
 @cache
 def fields() -> Sensitivity:
-    """Of ``SKIN``."""
     return field_sensitivity(SKIN, opposite(8))
 
 

@@ -4,10 +4,11 @@ random without a seed."""
 from dataclasses import dataclass
 from functools import cache
 from math import cos, radians, sin
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.grid import grid_for
 from eitskin.model.build import BuildSettings, Linearisation, linearise, make_model
 from eitskin.model.eitm import decode_model, encode_model
@@ -19,8 +20,6 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import Outline, disk, polygon
 from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
 from eitskin.skin.skin import Skin, paper_skin
-
-FloatArray = npt.NDArray[np.float64]
 
 DISK_MM = 100.0
 ELEMENTS = 900
@@ -56,7 +55,6 @@ def rounded_rectangle() -> Outline:
 
 
 def l_shape() -> Outline:
-    """An L of 100 mm whose arms are 40 mm wide."""
     return polygon([(0, 0), (100, 0), (100, 40), (40, 40), (40, 100), (0, 100)])
 
 
@@ -79,14 +77,10 @@ class Small:
         size, change = np.ptp(centres, axis=0).min(), np.zeros(len(centres))
         for _ in range(count):
             middle = centres[generator.integers(len(centres))]
-            inside = (
-                np.linalg.norm(centres - middle, axis=1) <= generator.uniform(0.05, 0.12) * size
-            )
-            change[inside] = (
-                generator.choice(changes)
-                * generator.uniform(0.5, 1)
-                * self.skin.conductivity_s_per_m
-            )
+            near = np.linalg.norm(centres - middle, axis=1)
+            inside = near <= generator.uniform(0.05, 0.12) * size
+            share = generator.choice(changes) * generator.uniform(0.5, 1)
+            change[inside] = share * self.skin.conductivity_s_per_m
         return change
 
     def frames(
@@ -111,16 +105,14 @@ class Small:
         return v0 + noise * float(np.sqrt(np.mean(v0**2))) * generator.normal(size=(count, len(v0)))
 
 
+def small_skin(name: str, outline: Outline, electrodes: int) -> Skin:
+    return Skin(name, outline, Electrodes(electrodes, 3.0), 0.02, 5.0)
+
+
 @cache
 def small(outline: str = "disk", kind: str = "adjacent", electrodes: int = 16) -> Small:
     """A skin of some 100 mm with about 150 pixels, and its linear answer."""
-    skin = Skin(
-        outline,
-        OUTLINES[outline](),
-        Electrodes(electrodes, 3.0),
-        conductivity_s_per_m=0.02,
-        thickness_mm=5.0,
-    )
+    skin = small_skin(outline, OUTLINES[outline](), electrodes)
     protocol = PROTOCOLS[kind](electrodes)
     return Small(skin, protocol, linearise(skin, protocol, pixels_across=PIXELS, elements=ELEMENTS))
 
@@ -129,13 +121,7 @@ def small(outline: str = "disk", kind: str = "adjacent", electrodes: int = 16) -
 def sheet_without_mesh(outline: str = "l", kind: str = "adjacent", electrodes: int = 8) -> Small:
     """A skin whose linear answer is written down: each electrode a point of an infinite sheet. For
     numbers that no mesher may change."""
-    skin = Skin(
-        outline,
-        OUTLINES[outline](),
-        Electrodes(electrodes, 3.0),
-        conductivity_s_per_m=0.02,
-        thickness_mm=5.0,
-    )
+    skin = small_skin(outline, OUTLINES[outline](), electrodes)
     protocol, grid = PROTOCOLS[kind](electrodes), grid_for(skin.outline, PIXELS)
     at = skin.electrode_centres_mm()
     away = grid.centres_mm()[:, None] - at
@@ -153,19 +139,9 @@ def sheet_without_mesh(outline: str = "l", kind: str = "adjacent", electrodes: i
 
 
 @cache
-def small_model(
-    storage: str = "f32",
-    data_kind: str = "difference",
-    outline: str = "disk",
-    kind: str = "adjacent",
-    electrodes: int = 16,
-    rank: int = 37,
-) -> Model:
-    """A model of ``small``, as read from its bytes; the rank is no multiple of 8, so that padding
-    is at work."""
-    return decode_model(
-        small_blob(storage, data_kind, outline, kind, electrodes, rank), "small model"
-    )
+def small_model(*of: Any, **named: Any) -> Model:
+    """A model of ``small``, of what ``small_blob`` takes, as read from its bytes."""
+    return decode_model(small_blob(*of, **named), "small model")
 
 
 @cache
@@ -177,7 +153,7 @@ def small_blob(
     electrodes: int = 16,
     rank: int = 37,
 ) -> bytes:
-    """The bytes of ``small_model``."""
+    """Its bytes; the rank is no multiple of 8, so that padding is at work."""
     s = small(outline, kind, electrodes)
     settings = BuildSettings(rank=rank, storage=storage, data_kind=data_kind)
     return encode_model(make_model(s.skin, s.protocol, s.linear, settings))
@@ -186,18 +162,13 @@ def small_blob(
 @cache
 def tiny_blob(storage: str = "f32") -> bytes:
     """A model of a few kB, every byte of which can be tried: 8 electrodes, rank 5."""
-    skin = Skin(
-        "tiny", disk(DISK_MM), Electrodes(8, 3.0), conductivity_s_per_m=0.02, thickness_mm=5.0
-    )
+    skin, settings = small_skin("tiny", disk(DISK_MM), 8), BuildSettings(rank=5, storage=storage)
     linear = linearise(skin, adjacent(8), pixels_across=6, elements=300)
-    return encode_model(
-        make_model(skin, adjacent(8), linear, BuildSettings(rank=5, storage=storage))
-    )
+    return encode_model(make_model(skin, adjacent(8), linear, settings))
 
 
 @cache
 def prebuilt() -> tuple[Model, bytes]:
-    """The model of the paper's skin that ships with the package."""
     return load_prebuilt()
 
 

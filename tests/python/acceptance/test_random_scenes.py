@@ -31,13 +31,11 @@ def scores(simulated) -> list[FrameScore]:
     reconstructor, scorer = Reconstructor(model, blob=blob), scorer_for(model)
     reconstructor.tare(frames.reference_voltage_v)
     found = []
-    for number in range(len(frames.voltage_v)):
+    for number, frame_v in enumerate(frames.voltage_v):
         reconstructor.forget()
-        result = reconstructor.reconstruct(frames.voltage_v[number])
+        result = reconstructor.reconstruct(frame_v)
         assert result.info.iterations <= 60 and result.info.stop == "iterations"
-        score = scorer.score(frames, number, result, "increase")
-        assert score is not None
-        found.append(score)
+        found.append(scorer.score(frames, number, result, "increase"))
     return found
 
 
@@ -45,27 +43,21 @@ def test_the_scenes_are_what_they_should_be(simulated):
     counts = [len(scene.touches) for scene in simulated.touches.scenes]
     assert set(counts) == {1, 2, 3} and min(counts.count(k) for k in (1, 2, 3)) > 0.22 * len(counts)
     assert simulated.mesh_elements > 3 * prebuilt()[0].meta["mesh_elements"]
-    assert 20 * np.log10(
-        np.sqrt(np.mean(simulated.exact_quiet_v**2)) / simulated.noise_v
-    ) == pytest.approx(60)
+    rms_v = np.sqrt(np.mean(simulated.exact_quiet_v**2))
+    assert 20 * np.log10(rms_v / simulated.noise_v) == pytest.approx(60)
 
 
-def test_image(scores):
-    values = np.array([score.miou_image for score in scores])
-    assert values.mean() >= 0.84
-    assert np.quantile(values, 0.1) >= 0.72
-
-
-def test_touches_as_discs(scores):
-    values = np.array([score.miou_touches for score in scores])
-    assert values.mean() >= 0.88
-    assert np.quantile(values, 0.1) >= 0.80
+@pytest.mark.parametrize(
+    ("of", "mean", "worst_tenth"), [("image", 0.84, 0.72), ("touches", 0.88, 0.80)]
+)
+def test_miou(scores, of, mean, worst_tenth):
+    values = np.array([getattr(score, f"miou_{of}") for score in scores])
+    assert values.mean() >= mean and np.quantile(values, 0.1) >= worst_tenth
 
 
 def test_positions(scores):
     errors = [distance for score in scores for distance in score.matching.distances_mm]
-    assert np.median(errors) <= 1.5
-    assert np.quantile(errors, 0.95) <= 4.0
+    assert np.median(errors) <= 1.5 and np.quantile(errors, 0.95) <= 4.0
 
 
 def test_counts(scores):

@@ -6,17 +6,19 @@ contacts; in each an electrode detaches in the last frame (the effect `detached`
 given as NaN. Whole and damaged frames share a reference.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from eitskin.arrays import BoolArray, FloatArray
+from eitskin.core.diagnostics_table import Touch
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
-from eitskin.scene.random_touches import TouchScene, random_touches
+from eitskin.scene.random_touches import TouchScene, TrueTouch, random_touches
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scoring import metrics
@@ -34,9 +36,6 @@ SEED = 78
 QUIET = 16
 ELECTRODES = 16
 MAX_LOSS = 0.03
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,42 +58,26 @@ def cases(count: int) -> tuple[Case, ...]:
     for k, scene in enumerate(scenes[:count]):
         electrode = k % ELECTRODES
         touches = [
-            {
-                "x_mm": float(t.x_mm),
-                "y_mm": float(t.y_mm),
-                "radius_mm": float(t.radius_mm),
-                "contrast": float(t.contrast),
-            }
+            {name: float(getattr(t, name)) for name in ("x_mm", "y_mm", "radius_mm", "contrast")}
             for t in scene.touches
         ]
         session = {
-            "name": "one",
-            "skin": "paper",
-            "seed": 1000 * SEED + k,
-            "frames": 2,
-            "rate_hz": 20.0,
+            "name": "one", "skin": "paper", "seed": 1000 * SEED + k, "frames": 2, "rate_hz": 20.0,
             "quiet_frames": QUIET,
+        }  # fmt: skip
+        effects = {
+            "detached": {"electrodes": [electrode], "from_s": 0.04},
+            "noise": {"snr_db": 60.0},
+            "contact_impedance": {"spread": 0.2},
         }
-        table = {
-            "scene": session,
-            "touch": touches,
-            "effects": {
-                "detached": {"electrodes": [electrode], "from_s": 0.04},
-                "noise": {"snr_db": 60.0},
-                "contact_impedance": {"spread": 0.2},
-            },
-        }
-        voltage_v = simulate_frames(
-            compile_scene(scene_from_table(table, "one", Path()), mesh_cache=mesh_cache)
-        ).voltage_v
-        made.append(
-            Case(scene, electrode, voltage_v[:QUIET], voltage_v[QUIET], voltage_v[QUIET + 1])
-        )
+        table = {"scene": session, "touch": touches, "effects": effects}
+        compiled = compile_scene(scene_from_table(table, "one", Path()), mesh_cache=mesh_cache)
+        *quiet, whole, detached = simulate_frames(compiled).voltage_v
+        made.append(Case(scene, electrode, np.array(quiet), whole, detached))
     return tuple(made)
 
 
 def rows_of(*electrodes: int) -> BoolArray:
-    """The protocol rows (m,) that drive or measure at any of these."""
     return np.asarray(np.isin(prebuilt()[0].protocol.drive_measure, electrodes).any(axis=1))
 
 
@@ -109,10 +92,10 @@ class LeftOutRows:
         self.reconstructor = Reconstructor(model, blob=blob)
         self.reconstructor.with_options(max_masked=len(model.protocol.drive_measure))
 
-    def mask(self, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike) -> BoolArray:
-        """Raster points within discs."""
+    def mask(self, discs: Sequence[Touch | TrueTouch]) -> BoolArray:
+        centres, radii = [(t.x_mm, t.y_mm) for t in discs], [t.radius_mm for t in discs]
         return metrics.disc_mask(
-            self.points_mm, np.reshape(centres_mm, (-1, 2)), np.asarray(radii_mm, dtype=np.float64)
+            self.points_mm, np.reshape(centres, (-1, 2)), np.asarray(radii, dtype=np.float64)
         )
 
     def score(self, case: Case, frame_v: FloatArray, out: BoolArray) -> tuple[float, float]:
@@ -124,21 +107,14 @@ class LeftOutRows:
         self.reconstructor.forget()
         result = self.reconstructor.reconstruct(frame_v)
         assert np.isfinite(result.image).all() and result.info.masked == out.sum()
-        assert result.info.gap >= 0
-        assert result.info.step_halvings == 0
-        truth = self.mask(case.scene.centres_mm(), [t.radius_mm for t in case.scene.touches])
-        seen = metrics.touch_mask(
-            self.scorer.image_scorer.lookup.show(result.image.astype(np.float64)), self.threshold
-        )
-        discs = self.mask(
-            [(t.x_mm, t.y_mm) for t in result.touches], [t.radius_mm for t in result.touches]
-        )
-        return metrics.miou(seen, truth), metrics.miou(discs, truth)
+        assert result.info.gap >= 0 and result.info.step_halvings == 0
+        shown = self.scorer.image_scorer.lookup.show(result.image.astype(np.float64))
+        seen, truth = metrics.touch_mask(shown, self.threshold), self.mask(case.scene.touches)
+        return metrics.miou(seen, truth), metrics.miou(self.mask(result.touches), truth)
 
 
 @pytest.fixture(scope="module")
 def left_out_rows() -> LeftOutRows:
-    """One for all."""
     return LeftOutRows()
 
 
@@ -149,14 +125,9 @@ def scores(left_out_rows: LeftOutRows, electrodes: int, count: int) -> FloatArra
     """Mean scores of image and discs with so many electrodes out, the first of them truly off."""
     found = []
     for case in cases(count):
-        out = (
-            rows_of(*((case.electrode + 5 * k) % ELECTRODES for k in range(electrodes)))
-            if electrodes
-            else NONE_OUT
-        )
-        found.append(
-            left_out_rows.score(case, case.detached_v if electrodes else case.whole_v, out)
-        )
+        off = [(case.electrode + 5 * k) % ELECTRODES for k in range(electrodes)]
+        frame_v = case.detached_v if electrodes else case.whole_v
+        found.append(left_out_rows.score(case, frame_v, rows_of(*off)))
     return np.asarray(np.mean(found, axis=0))
 
 
@@ -175,8 +146,7 @@ def test_each_further_electrode_costs_a_little(left_out_rows, count):
     found = np.array([scores(left_out_rows, electrodes, count) for electrodes in range(4)])
     print(found)
     steps = -np.diff(found, axis=0)
-    assert (steps > 0).all()
-    assert (steps <= 0.06).all()
+    assert (steps > 0).all() and (steps <= 0.06).all()
     assert (found[3] >= (0.70, 0.78)).all()
 
 
@@ -201,14 +171,12 @@ def test_a_few_lost_rows_cost_next_to_nothing(left_out_rows, count):
 def test_no_touch_is_seen_where_there_is_none(left_out_rows):
     """Quiet frames after the reference, an electrode's rows lost: as few pass the gate as with all
     rows."""
-    seen = {0: 0, 1: 0}
+    seen, core = {0: 0, 1: 0}, left_out_rows.reconstructor
     for case in cases(48):
-        left_out_rows.reconstructor.tare(case.quiet_v[: QUIET - 4])
+        core.tare(case.quiet_v[: QUIET - 4])
         for electrodes in seen:
             out = rows_of(case.electrode) if electrodes else NONE_OUT
             for frame_v in case.quiet_v[QUIET - 4 :]:
-                seen[electrodes] += bool(
-                    left_out_rows.reconstructor.reconstruct(np.where(out, np.nan, frame_v)).touches
-                )
+                seen[electrodes] += bool(core.reconstruct(np.where(out, np.nan, frame_v)).touches)
     print(seen)
     assert seen[1] <= seen[0] + 3

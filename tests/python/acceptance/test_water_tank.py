@@ -31,33 +31,17 @@ IMPORT = [
 
 @pytest.fixture(scope="module")
 def folder(shared_data, tmp_path_factory) -> Path:
-    """Imported frames and the tank's model."""
     place = tmp_path_factory.mktemp("tank")
-    source = str(shared_data / "kit4_dev.npz")
-    assert (
-        main(["import", source, "-o", str(place / "kit4.npz"), "--skin", str(SKIN), *IMPORT]) == 0
-    )
-    build = [
-        "model",
-        "build",
-        str(SKIN),
-        "-o",
-        str(place / "kit4.eitm"),
-        "--data",
-        "log-ratio",
-        "--touch-change",
-        "2",
-        "--samples",
-        "0",
-    ]
-    assert main(build) == 0
+    source, skin = str(shared_data / "kit4_dev.npz"), str(SKIN)
+    build = ["--data", "log-ratio", "--touch-change", "2", "--samples", "0"]
+    assert main(["import", source, "-o", str(place / "kit4.npz"), "--skin", skin, *IMPORT]) == 0
+    assert main(["model", "build", skin, "-o", str(place / "kit4.eitm"), *build]) == 0
     return place
 
 
 def reconstructed(
     folder: Path, frames: str, capsys: pytest.CaptureFixture[str], *options: str
 ) -> dict[str, Any]:
-    """What ``eitskin reconstruct --json`` says."""
     capsys.readouterr()
     model = str(folder / "kit4.eitm")
     assert main(["reconstruct", str(folder / frames), "--model", model, "--json", *options]) == 0

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from known_presses import LOADS_N, RADIUS_MM, gain_of, places, presses, saturating
+from known_presses import RADIUS_MM, gain_of, places, presses, saturating
 
 from eitskin.calibration.fit import PLACE_MM, calibrate, places_of, weights_of
-from eitskin.calibration.presses import Presses, joined
+from eitskin.calibration.presses import joined
 from eitskin.errors import FrameError
 
 
@@ -22,9 +22,8 @@ def test_a_known_law_and_gain_are_found():
         assert value == pytest.approx(true, rel=0.05)
         assert low < true < high and high - low < 0.3 * true
     assert found.scatter[0] > 0.1 and found.scatter[1] < 0.025
-    assert found.law.uncertainty == pytest.approx(
-        np.quantile(np.abs(found.left_out), 0.95), rel=1e-6
-    )
+    uncertainty = np.quantile(np.abs(found.left_out), 0.95)
+    assert found.law.uncertainty == pytest.approx(uncertainty, rel=1e-6)
     assert found.notes == ()
     new = np.array([(10.0, -70.0), (-60.0, 20.0), (0.0, 0.0), (33.0, 44.0)])
     load = np.array([0.6, 1.2, 1.7, 1.9])
@@ -34,35 +33,27 @@ def test_a_known_law_and_gain_are_found():
 
 def test_a_flat_skin_needs_no_gain():
     found = calibrate(presses(bent=False), RADIUS_MM, resamples=0)
-    assert found.fitted.order == 0
-    assert found.law.gain.tolist() == [1.0]
+    assert found.fitted.order == 0 and found.law.gain.tolist() == [1.0]
 
 
 @pytest.mark.parametrize("exponent", [0.6, 1.3])
 def test_powers_are_told_as_well(exponent):
     known = presses(noise=0.002, bent=False)
     strength = 2.0 * known.force_n**exponent * known.strength / saturating(known.force_n)
-    found = calibrate(replace_strength(known, strength), RADIUS_MM, resamples=0)
+    found = calibrate(replace(known, strength=strength), RADIUS_MM, resamples=0)
     seen = 2.0 * np.array([0.7, 1.9]) ** exponent
     assert found.law.forces_at(np.zeros((2, 2)), seen) == pytest.approx([0.7, 1.9], rel=0.01)
-
-
-def replace_strength(known: Presses, strength: np.ndarray) -> Presses:
-    return Presses(known.force_n, strength, known.place_mm)
 
 
 def test_the_table_is_the_law():
     law = calibrate(presses(noise=0.0), RADIUS_MM, resamples=0).law
     load = np.linspace(0.02, 2.0, 50)
-    assert law.forces_at(np.zeros((50, 2)), saturating(load)) == pytest.approx(
-        load, rel=2e-3, abs=2e-4
-    )
-    beyond = law.forces_at(
-        np.zeros((3, 2)), np.array([saturating(np.array(2.0)) * 1.02, 100.0, np.inf])
-    )
-    assert (
-        beyond[0] > 2.0 and beyond[1] == beyond[2] == 4.0
-    )  # the last slope, to twice the greatest load
+    told = law.forces_at(np.zeros((50, 2)), saturating(load))
+    assert told == pytest.approx(load, rel=2e-3, abs=2e-4)
+    strong = np.array([1.02 * saturating(np.array(2.0)), 100.0, np.inf])
+    beyond = law.forces_at(np.zeros((3, 2)), strong)
+    # the last slope, to twice the greatest load
+    assert beyond[0] > 2.0 and beyond[1] == beyond[2] == 4.0
 
 
 def test_beyond_the_outermost_place_the_gain_stays():
@@ -73,13 +64,10 @@ def test_beyond_the_outermost_place_the_gain_stays():
 
 
 def test_one_place_is_told_to_be_one():
-    one = presses()
-    one = one.take(np.arange(5))
-    found = calibrate(one, RADIUS_MM, resamples=20)
+    found = calibrate(presses().take(np.arange(5)), RADIUS_MM, resamples=20)
     assert (found.groups, found.by_place, found.fitted.order) == (1, False, 0)
-    assert found.notes[0].startswith(
-        "1 place: the gain is taken to be the same everywhere; press at 5 or more"
-    )
+    said = "1 place: the gain is taken to be the same everywhere; press at 5 or more"
+    assert found.notes[0].startswith(said)
 
 
 def test_unlike_intervals_for_unlike_noise():
@@ -91,46 +79,33 @@ def test_unlike_intervals_for_unlike_noise():
 
 
 def test_the_same_seed_gives_the_same():
-    one, other = (
-        calibrate(presses(8), RADIUS_MM, seed=4, resamples=20).as_dict() for _ in range(2)
-    )
-    assert one == other
+    told = [calibrate(presses(8), RADIUS_MM, seed=4, resamples=20).as_dict() for _ in range(2)]
+    assert told[0] == told[1]
+
+
+ALIKE = r"1\.14 times the least, which cannot show a law; use a range of 1\.5 times or more"
 
 
 @pytest.mark.parametrize(
-    ("rows", "text"),
+    ("change", "text"),
     [
-        (slice(0, 3), "3 presses are too few; record at least 4"),
-        (np.arange(0, 120, 5), "1 different weights are too few; use at least 3"),
-        (np.flatnonzero(np.isin(np.tile(LOADS_N, 24), [1.0, 1.5])),
+        (lambda p: p.take(np.arange(3)), "3 presses are too few; record at least 4"),
+        (lambda p: p.take(np.arange(0, 120, 5)),
+         "1 different weights are too few; use at least 3"),
+        (lambda p: p.take(np.flatnonzero(np.isin(p.force_n, [1.0, 1.5]))),
          "2 different weights are too few"),
+        (lambda p: replace(p, force_n=1 + 0.1 * p.force_n), ALIKE),
+        (lambda p: replace(p, strength=1 / p.force_n), "strength does not grow with load"),
     ],
+    ids=["three", "one weight", "two weights", "weights too alike", "falling"],
 )  # fmt: skip
-def test_too_little_is_refused(rows, text):
+def test_what_shows_no_law_is_refused(change, text):
     with pytest.raises(FrameError, match=text):
-        calibrate(presses().take(np.arange(120)[rows]), RADIUS_MM)
-
-
-def test_weights_too_alike_are_refused():
-    known = presses()
-    alike = Presses(1 + 0.1 * known.force_n, known.strength, known.place_mm)
-    with pytest.raises(
-        FrameError,
-        match=r"1\.14 times the least, which cannot show a law; use a range of 1\.5 times or more",
-    ):
-        calibrate(alike, RADIUS_MM)
-
-
-def test_strength_that_falls_is_refused():
-    known = presses()
-    with pytest.raises(FrameError, match="strength does not grow with load"):
-        calibrate(replace_strength(known, 1 / known.force_n), RADIUS_MM)
+        calibrate(change(presses()), RADIUS_MM)
 
 
 def test_places_and_weights_are_told_apart():
-    chain = np.array(
-        [(0.0, 0.0), (0.9 * PLACE_MM, 0.0), (1.8 * PLACE_MM, 0.0), (4 * PLACE_MM, 0.0)]
-    )
+    chain = PLACE_MM * np.array([(0.0, 0.0), (0.9, 0.0), (1.8, 0.0), (4, 0.0)])
     assert places_of(chain).tolist() == [0, 0, 0, 1]
     assert weights_of(np.array([2.0, 1.0, 1.001, 2.0])).tolist() == [1.0, 2.0]
     both = joined([presses(3), presses(4)])
@@ -139,6 +114,7 @@ def test_places_and_weights_are_told_apart():
 
 def test_a_straight_line_is_told_to_have_no_end():
     known = presses(noise=0.0, bent=False)
-    found = calibrate(replace_strength(known, 2 * known.force_n), RADIUS_MM, resamples=0)
+    line = replace(known, strength=2 * known.force_n)
+    found = calibrate(line, RADIUS_MM, resamples=0)
     assert "no saturation" in " ".join(found.notes) or found.fitted.form == "power"
     assert replace(found, notes=()).as_dict()["error_rms"] < 0.01

@@ -19,11 +19,8 @@ def test_csv_and_toml_say_the_same(tmp_path):
     first = "[[press]]\nfirst = 0\nlast = 3\nforce_n = 0.980665\nx_mm = 1.5\ny_mm = -2\n"
     tables = written(tmp_path, first + "[[press]]\nfirst = 4\nweight_g = 200\n", "w.toml")
     one, other = load_weights(table), load_weights(tables)
-    assert one == [
-        Weight(0, 3, pytest.approx(0.980665), (1.5, -2.0)),
-        Weight(4, 4, pytest.approx(1.96133), None),
-    ]
-    assert one == other
+    first, second = Weight(0, 3, pytest.approx(0.980665), (1.5, -2.0)), pytest.approx(1.96133)
+    assert one == other == [first, Weight(4, 4, second, None)]
 
 
 @pytest.mark.parametrize(
@@ -51,9 +48,8 @@ def test_csv_and_toml_say_the_same(tmp_path):
 def test_what_is_wrong_is_told_in_a_line(tmp_path, text, line):
     with pytest.raises(ConfigError) as caught:
         load_weights(written(tmp_path, text))
-    assert line in str(caught.value)
-    assert str(caught.value).startswith(str(tmp_path))
-    assert "\n" not in str(caught.value)
+    said = str(caught.value)
+    assert line in said and said.startswith(str(tmp_path)) and "\n" not in said
 
 
 def test_toml_of_another_form(tmp_path):

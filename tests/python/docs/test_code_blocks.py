@@ -32,36 +32,26 @@ SET_UP = {"scripts/demo", "scripts/test"}
 
 
 def blocks(page: str) -> list[tuple[str, str]]:
-    """Language and text of each block of ``page``."""
     return BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_blocks_run(page, tmp_path):
     ran = 0
-    environment = {
-        **os.environ,
-        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-    }
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for language, text in blocks(page):
-        if set(text.split("\n")) & SET_UP:
-            for command in SET_UP & set(text.split("\n")):
-                assert os.access(ROOT / command, os.X_OK), (
-                    f"{page} names {command}, which cannot be run"
-                )
+        set_up = SET_UP & set(text.split("\n"))
+        for command in set_up:
+            assert os.access(ROOT / command, os.X_OK), f"{page} names {command}; it cannot be run"
+        if set_up:
             continue
         # a model's errors from 500 random skins take half a minute
         text = text.replace("eitskin model build ", "eitskin model build --samples 4 ")
         command = ["sh", "-e", "-c", text] if language == "sh" else [sys.executable, "-c", text]
         done = subprocess.run(
-            command,
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-        )
+            command, cwd=tmp_path, env={**os.environ, "PATH": path}, capture_output=True,
+            text=True, timeout=300, check=False,
+        )  # fmt: skip
         assert done.returncode == 0, f"{page}:\n{text}\n{done.stdout}\n{done.stderr}"
         ran += 1
     assert ran >= 1
@@ -70,10 +60,8 @@ def test_blocks_run(page, tmp_path):
 def test_pages_link_to_files_that_exist():
     for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]:
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
-            if "://" not in target:
-                assert (page.parent / target).exists(), (
-                    f"{page.relative_to(ROOT)} links to {target}, which is not there"
-                )
+            there = "://" in target or (page.parent / target).exists()
+            assert there, f"{page.relative_to(ROOT)} links to {target}, which is not there"
 
 
 def test_paths_that_pages_name_exist():

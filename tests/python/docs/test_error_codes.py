@@ -5,6 +5,7 @@ import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -65,12 +66,10 @@ def taken(tmp_path, monkeypatch) -> Iterator[int]:
 def test_a_code_is_provoked(code, taken, monkeypatch, capsys):
     raised: dict[int, type[BaseException]] = {1: errors.EitskinError, 130: KeyboardInterrupt}
     if code in raised:
-        monkeypatch.setattr("eitskin.model.prebuilt.load_prebuilt", raiser(raised[code]))
+        fault = Mock(side_effect=raised[code])
+        monkeypatch.setattr("eitskin.model.prebuilt.load_prebuilt", fault)
     if code == 9:
-        for name in {
-            "websockets",
-            *(name for name in sys.modules if name.startswith("websockets")),
-        }:
+        for name in ["websockets", *(n for n in sys.modules if n.startswith("websockets"))]:
             monkeypatch.setitem(sys.modules, name, None)
     assert main(COMMANDS[code].replace("PORT", str(taken)).split()) == code
     lines = capsys.readouterr().err.splitlines()
@@ -80,14 +79,6 @@ def test_a_code_is_provoked(code, taken, monkeypatch, capsys):
 def test_the_page_has_every_class_and_no_other():
     kinds = [errors.EitskinError, *errors.EitskinError.__subclasses__()]
     listed = {name: code for code, name in CODES.items() if name}
-    assert listed == {
-        kind.__name__: kind.exit_code for kind in kinds if kind.__module__ == errors.__name__
-    }
+    own = [kind for kind in kinds if kind.__module__ == errors.__name__]
+    assert listed == {kind.__name__: kind.exit_code for kind in own}
     assert sorted(COMMANDS) == sorted(CODES)
-
-
-def raiser(kind: type[BaseException]) -> object:
-    def fail(*arguments: object) -> None:
-        raise kind
-
-    return fail

@@ -34,7 +34,6 @@ FILES = {
 
 
 def rows() -> list[tuple[str, str, str]]:
-    """Command, code and answer of each row of the page."""
     return [(one[1], one[2], one[3]) for one in ROW.finditer(PAGE.read_text(encoding="utf-8"))]
 
 

@@ -1,18 +1,16 @@
 """Skins and meshes that several model tests share."""
 
-from math import cos, pi, sin
-
 import pytest
 
 from eitskin.fem.mesh import Mesh, build_mesh
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import polygon
 from eitskin.skin.skin import Skin, paper_skin
+from small_models import rounded_rectangle
 
 
 @pytest.fixture(scope="session")
 def paper_mesh() -> Mesh:
-    """A coarse mesh of the paper's skin, about 1,500 elements."""
     return build_mesh(paper_skin(), max_size_mm=9.0, electrode_size_mm=1.0)
 
 
@@ -32,10 +30,4 @@ def l_mesh(l_skin) -> Mesh:
 def rounded_skin() -> Skin:
     """A rectangle of 120 x 60 mm with corners of 15 mm radius, its outline given clockwise, with 16
     electrodes."""
-    corners = [(45, 15, 0), (-45, 15, 90), (-45, -15, 180), (45, -15, 270)]
-    points = [
-        (x + 15 * cos(pi * (turn + 10 * k) / 180), y + 15 * sin(pi * (turn + 10 * k) / 180))
-        for x, y, turn in corners
-        for k in range(10)
-    ]
-    return Skin("rounded", polygon(points[::-1]), Electrodes(16, 6.0, clockwise=True))
+    return Skin("rounded", rounded_rectangle(), Electrodes(16, 6.0, clockwise=True))

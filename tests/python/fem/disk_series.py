@@ -9,13 +9,11 @@ series.
 from math import pi
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.mesh import Mesh
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-
-FloatArray = npt.NDArray[np.float64]
 
 DWARFING_IMPEDANCE_OHM_M2 = 1e6
 

@@ -16,9 +16,7 @@ from eitskin.skin.skin import Skin
 def test_fields_are_those_of_the_jacobian():
     """Differences of electrodes are the patterns' fields, to rounding; the product of the pixels'
     means is the mean of products but for what the fields change within a pixel."""
-    skin = Skin(
-        "disk", disk(100.0), Electrodes(16, 3.0), conductivity_s_per_m=0.02, thickness_mm=5.0
-    )
+    skin = Skin("disk", disk(100.0), Electrodes(16, 3.0), 0.02, 5.0)
     protocol = adjacent(16)
     mesh = mesh_for_elements(skin, 3000)
     grid, forward = grid_for(skin.outline, 24), ForwardModel(mesh, skin, protocol)
@@ -31,17 +29,9 @@ def test_fields_are_those_of_the_jacobian():
     assert np.abs(pairs - means).max() < 1e-9 * np.abs(means).max()
     jacobian, _ = sensitivity(forward, 0.02, grid)
     rows = protocol.drive_measure.astype(int)
-    drive, measure = (
-        fields[:, :, rows[:, 0]] - fields[:, :, rows[:, 1]],
-        fields[:, :, rows[:, 2]] - fields[:, :, rows[:, 3]],
-    )
+    drive, measure = (fields[:, :, rows[:, k]] - fields[:, :, rows[:, k + 1]] for k in (0, 2))
     inner = np.linalg.norm(grid.centres_mm(), axis=1) < 35
-    product = (
-        -protocol.current_a
-        * forward.thickness_m
-        * (drive * measure).sum(axis=1)
-        * grid.pixel_mm**2
-        * 1e-6
-    )
+    volume_m3 = forward.thickness_m * grid.pixel_mm**2 * 1e-6
+    product = -protocol.current_a * volume_m3 * (drive * measure).sum(axis=1)
     difference = product[inner] - jacobian.T[inner]
     assert np.linalg.norm(difference) < 0.03 * np.linalg.norm(jacobian.T[inner])

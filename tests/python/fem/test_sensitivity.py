@@ -4,9 +4,9 @@ clipping by hand."""
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.cem import Counters, ForwardModel
 from eitskin.fem.grid import Grid, grid_for
@@ -14,8 +14,6 @@ from eitskin.fem.mesh import Mesh, build_mesh
 from eitskin.fem.sensitivity import element_to_pixel, sensitivity
 from eitskin.skin.protocol import Protocol, adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def _whole(grid: Grid) -> Grid:
@@ -94,10 +92,8 @@ def test_reciprocal_rows_and_chosen_rows(paper_mesh):
     forward = ForwardModel(paper_mesh, paper_skin(), protocol)
     whole, voltages = sensitivity(forward, 0.01, grid)
     pairs = protocol.reciprocal_pairs()
-    assert (
-        np.abs(whole[pairs.first] - pairs.sign[:, None] * whole[pairs.second]).max()
-        < 1e-13 * np.abs(whole).max()
-    )
+    off = whole[pairs.first] - pairs.sign[:, None] * whole[pairs.second]
+    assert np.abs(off).max() < 1e-13 * np.abs(whole).max()
     weights = element_to_pixel(paper_mesh, grid)
     kept = weights.copy()
     folded, some = sensitivity(forward, 0.01, grid, rows=pairs.first, weights=weights)
@@ -110,9 +106,8 @@ def test_one_factorisation_and_each_pair_once(paper_mesh):
     forward = ForwardModel(paper_mesh, paper_skin(), adjacent(16))
     sensitivity(forward, 0.01, grid_for(paper_skin().outline))
     assert forward.counters == Counters(1, 1, 16)
-    forward = ForwardModel(
-        paper_mesh, paper_skin(), table(16, [[0, 1, 2, 3], [3, 2, 5, 6], [6, 5, 1, 0]])
-    )
+    three = table(16, [[0, 1, 2, 3], [3, 2, 5, 6], [6, 5, 1, 0]])
+    forward = ForwardModel(paper_mesh, paper_skin(), three)
     sensitivity(forward, 0.01, grid_for(paper_skin().outline))
     assert forward.counters.solves == 3
 
@@ -145,10 +140,8 @@ def _clipped_area(triangle: FloatArray, low: FloatArray, side: float) -> float:
                 share = a / (a - b)
                 clipped.append((p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])))
         points = clipped
-    return (
-        sum(p[0] * q[1] - p[1] * q[0] for p, q in zip(points, points[1:] + points[:1], strict=True))
-        / 2
-    )
+    edges = zip(points, points[1:] + points[:1], strict=True)
+    return sum(p[0] * q[1] - p[1] * q[0] for p, q in edges) / 2
 
 
 def test_areas_against_clipping(l_mesh, l_skin):
@@ -184,9 +177,8 @@ def test_triangles_with_edges_along_the_grid():
     mesh = Mesh(nodes, np.array([[0, 1, 2], [1, 3, 2]]), ())
     grid = Grid(2, 2, 1.0, (0.0, 0.0), np.array([[0, 0], [1, 0], [0, 1], [1, 1]]))
     weights = element_to_pixel(mesh, grid).toarray()
-    np.testing.assert_allclose(
-        weights, [[0.5, 0.25, 0.25, 0.0], [0.0, 0.25, 0.25, 0.5]], atol=1e-15
-    )
+    expected = [[0.5, 0.25, 0.25, 0.0], [0.0, 0.25, 0.25, 0.5]]
+    np.testing.assert_allclose(weights, expected, atol=1e-15)
 
 
 def test_refused_conductivity(paper_mesh):

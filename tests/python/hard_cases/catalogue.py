@@ -10,8 +10,6 @@ HERE = Path(__file__).resolve().parent
 TESTS = HERE.parent
 ROOT = TESTS.parents[1]
 
-OF_THE_CATALOGUE = "hard_cases/test_catalogue.py"
-
 
 @dataclass(frozen=True)
 class Case:
@@ -20,18 +18,12 @@ class Case:
     id: str
     what: str
     promise: str
-    tests: tuple[str, ...]
+    tests: list[str]
     picture: str | None = None
 
     @property
     def group(self) -> str:
-        """What comes before the slash of the id."""
         return self.id.split("/")[0]
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """The files of its tests, from the root, each once."""
-        return tuple(dict.fromkeys(_file(test) for test in self.tests))
 
 
 def _file(test: str) -> str:
@@ -41,9 +33,7 @@ def _file(test: str) -> str:
 def _read(path: Path) -> tuple[Case, ...]:
     groups = load_toml(path, "catalogue of hard cases")
     return tuple(
-        Case(
-            f"{group}/{name}", one["what"], one["promise"], tuple(one["tests"]), one.get("picture")
-        )
+        Case(f"{group}/{name}", **one)
         for group, cases in groups.items()
         for name, one in cases.items()
     )
@@ -55,25 +45,21 @@ GROUPS = tuple(dict.fromkeys(case.group for case in CASES))
 
 def tests_in(path: Path) -> list[str]:
     """The names of the test functions at the top of a module, and in its classes."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return [
-        node.name
-        for node in ast.walk(tree)
-        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
-    ]
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    functions = [node.name for node in nodes if isinstance(node, ast.FunctionDef)]
+    return [name for name in functions if name.startswith("test_")]
 
 
 def exists(test: str) -> bool:
-    """Whether what a case calls its test is there."""
     path = ROOT / _file(test)
     return path.is_file() and ("::" not in test or test.split("::")[1] in tests_in(path))
 
 
 def hard_tests() -> set[str]:
     """Every test of this folder, but those of the catalogue itself."""
-    found = {
+    return {
         f"{path.parent.name}/{path.name}::{name}"
         for path in HERE.glob("test_*.py")
         for name in tests_in(path)
+        if path.name != "test_catalogue.py"
     }
-    return {name for name in found if not name.startswith(OF_THE_CATALOGUE)}

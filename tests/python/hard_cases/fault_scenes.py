@@ -29,13 +29,11 @@ CONTACTS = {"contact_impedance": {"spread": 0.2}}
 
 @cache
 def scenes() -> tuple[TouchScene, ...]:
-    """What is touched."""
     return random_touches(paper_skin().outline, SEED, COUNT, "frames").scenes
 
 
 @cache
 def mesh_cache() -> MeshCache:
-    """Meshes, kept."""
     return MeshCache()
 
 
@@ -63,7 +61,6 @@ def frames_of(
 
 
 def swapped(i: int, j: int) -> Protocol:
-    """The scan with two electrodes' wires exchanged."""
     rows = ROWS.copy()
     rows[i == ROWS], rows[j == ROWS] = j, i
     return table(ELECTRODES, rows)
@@ -76,42 +73,31 @@ def simulated() -> list[dict[str, np.ndarray]]:
     found = []
     for k in range(COUNT):
         quiet, touched = frames_of(k, {})
-        pair = [k % ELECTRODES, (k + 1) % ELECTRODES]
-        apart = [k % ELECTRODES, (k + 4) % ELECTRODES]
-        faults = {
-            "detached": frames_of(k, {"detached": {"electrodes": pair[:1]}}),
-            "bridged": frames_of(k, {"bridged": {"electrodes": pair, "resistance_ohm": 10.0}}),
-            "bridged apart": frames_of(
-                k, {"bridged": {"electrodes": apart, "resistance_ohm": 10.0}}
-            ),
-            "swapped": frames_of(k, {}, swapped(*pair)),
-            "swapped apart": frames_of(k, {}, swapped(*apart)),
-        }
-        found.append(
-            {"quiet": quiet, "touched": touched}
-            | {name: frames[-1] for name, frames in faults.items()}
-        )
+        pair, apart = ([k % ELECTRODES, (k + by) % ELECTRODES] for by in (1, 4))
+        off = {"detached": {"electrodes": pair[:1]}}
+        one = {"quiet": quiet, "touched": touched, "detached": frames_of(k, off)[-1]}
+        for name, of in (("", pair), (" apart", apart)):
+            bridge = {"bridged": {"electrodes": of, "resistance_ohm": 10.0}}
+            one[f"bridged{name}"] = frames_of(k, bridge)[-1]
+            one[f"swapped{name}"] = frames_of(k, {}, swapped(*of))[-1]
+        found.append(one)
     return found
 
 
 def rms_v(k: int) -> float:
-    """Of the untouched skin's voltages."""
     return float(np.sqrt(np.mean(simulated()[k]["quiet"] ** 2)))
 
 
 def noisy(k: int, frame: np.ndarray, stream: int) -> np.ndarray:
-    """With noise that depends on scene and stream only."""
     generator = np.random.default_rng([SEED, k, stream])
     return np.asarray(frame + rms_v(k) / SNR * generator.standard_normal(frame.shape))
 
 
 def quiet_frames(k: int) -> np.ndarray:
-    """(QUIET, m) V."""
     return noisy(k, np.tile(simulated()[k]["quiet"], (QUIET, 1)), 0)
 
 
 def touched(k: int) -> np.ndarray:
-    """Scene k's touched frame (m,) V."""
     return noisy(k, simulated()[k]["touched"], 1)
 
 
@@ -140,6 +126,5 @@ def miou(image: np.ndarray, k: int) -> float:
     image_scorer, scene = scorer().image_scorer, scenes()[k]
     truth = metrics.disc_mask(image_scorer.raster.points_mm, scene.centres_mm(), scene.radii_mm())
     shown = image_scorer.lookup.show(np.asarray(image, dtype=np.float64))
-    return float(
-        metrics.miou(metrics.touch_mask(shown, prebuilt()[0].defaults.mask_threshold), truth)
-    )
+    seen = metrics.touch_mask(shown, prebuilt()[0].defaults.mask_threshold)
+    return float(metrics.miou(seen, truth))

@@ -15,40 +15,24 @@ from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin
 
 
-def bunched() -> Skin:
-    """16 electrodes on a quarter of a disk's rim: 4 mm wide, 5 mm apart, of 314 mm."""
-    places = tuple(2.5 + 5.0 * k for k in range(16))
-    return Skin(
-        "bunched",
-        disk(100.0),
-        Electrodes(16, 3.0, positions_mm=places),
-        conductivity_s_per_m=0.02,
-        thickness_mm=5.0,
-    )
+def of_disk(name: str, electrodes: Electrodes) -> Skin:
+    """100 mm wide."""
+    return Skin(name, disk(100.0), electrodes, 0.02, 5.0)
 
 
 def strip() -> Skin:
     """A strip of 240 x 20 mm with 16 electrodes: its ends are far from everything."""
     outline = polygon([(-120, -10), (120, -10), (120, 10), (-120, 10)])
-    return Skin("strip", outline, Electrodes(16, 3.0), conductivity_s_per_m=0.02, thickness_mm=1.0)
+    return Skin("strip", outline, Electrodes(16, 3.0), 0.02, 1.0)
 
 
-def many(count: int) -> Skin:
-    """A disk with so many electrodes."""
-    return Skin(
-        f"{count} electrodes",
-        disk(100.0),
-        Electrodes(count, 2.0),
-        conductivity_s_per_m=0.02,
-        thickness_mm=5.0,
-    )
-
-
+# bunched: on a quarter of the rim, 3 mm wide, 5 mm apart, of 314 mm
+BUNCHED = Electrodes(16, 3.0, positions_mm=tuple(2.5 + 5.0 * k for k in range(16)))
 SKINS = {
-    "bunched": bunched,
+    "bunched": lambda: of_disk("bunched", BUNCHED),
     "strip": strip,
-    "32 electrodes": lambda: many(32),
-    "64 electrodes": lambda: many(64),
+    "32 electrodes": lambda: of_disk("32 electrodes", Electrodes(32, 2.0)),
+    "64 electrodes": lambda: of_disk("64 electrodes", Electrodes(64, 2.0)),
 }
 
 
@@ -74,10 +58,8 @@ class HardSkin:
         for _ in range(count):
             change = np.zeros(len(centres))
             for _ in range(2):
-                middle = centres[rng.integers(len(centres))]
-                change[np.linalg.norm(centres - middle, axis=1) <= 0.12 * size] = (
-                    2 * self.skin.conductivity_s_per_m
-                )
+                away = np.linalg.norm(centres - centres[rng.integers(len(centres))], axis=1)
+                change[away <= 0.12 * size] = 2 * self.skin.conductivity_s_per_m
             frames.append(self.linear.v0_v + self.linear.jacobian @ change)
         return self._noisy(np.array(frames), 3, noise)
 

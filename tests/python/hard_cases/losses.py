@@ -2,7 +2,6 @@
 numbers."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -23,22 +22,11 @@ UNITS = {
 }
 
 
-@cache
-def clean_frames() -> np.ndarray:
-    """(COUNT, m) V without noise."""
-    return small().frames(81, COUNT, noise=0.0)
-
-
-@cache
-def order_of_loss() -> np.ndarray:
-    """Rows in the order in which they are lost: each level's are among the next one's."""
-    return np.random.default_rng(82).permutation(small().protocol.n_rows)
-
-
 def steps_of(kind: str, level: float) -> list[Step]:
-    """Tare on quiet frames that are as bad as the frames, then the frames."""
-    s, frames = small(), clean_frames()
-    rng, v0 = np.random.default_rng(83), s.linear.v0_v
+    """Tare on quiet frames that are as bad as the frames, then the frames; each level's lost rows
+    are among the next one's."""
+    s, rng = small(), np.random.default_rng(83)
+    v0, frames = s.linear.v0_v, s.frames(81, COUNT, noise=0.0)
     sigma = (level if kind == "noise" else 0.0) * float(np.sqrt(np.mean(v0**2)))
     noise = rng.standard_normal(frames.shape)
     quiet = s.quiet(84, 32, 0.0) + sigma * rng.standard_normal((32, len(v0)))
@@ -46,16 +34,14 @@ def steps_of(kind: str, level: float) -> list[Step]:
     if kind == "bits":
         step = 2 * 1.25 * float(np.abs(v0).max()) / 2**level
         frames, quiet = np.round(frames / step) * step, np.round(quiet / step) * step
-    masked = np.zeros(len(v0), dtype=bool)
-    masked[order_of_loss()[: int(level) if kind == "rows left out" else 0]] = True
-    options = replace(
-        default_options(small_model()), diagnostics=0
-    )  # linear answers are no sheet's, and rows would be left out
+    lost = np.random.default_rng(82).permutation(s.protocol.n_rows)
+    masked = np.isin(np.arange(len(v0)), lost[: int(level) if kind == "rows left out" else 0])
+    # linear answers are no sheet's, and rows would be left out
+    options = replace(default_options(small_model()), diagnostics=0)
     return [Load(small_blob()), Choose(options), Mask(masked), TareStep(quiet), Play(frames)]
 
 
 def all_steps() -> list[Step]:
-    """Every kind at every level."""
     return [
         step
         for kind, levels in LEVELS.items()
@@ -66,9 +52,8 @@ def all_steps() -> list[Step]:
 
 def errors_of(outcomes: list[Outcome]) -> dict[str, list[float]]:
     """By kind and level: |image - image at the first level| / |that|, mean over the frames."""
-    images = np.array([one.image.astype(np.float64) for one in outcomes]).reshape(
-        -1, COUNT, len(outcomes[0].image)
-    )
+    images = np.array([one.image.astype(np.float64) for one in outcomes])
+    images = images.reshape(-1, COUNT, images.shape[-1])
     errors: dict[str, list[float]] = {}
     place = 0
     for kind, levels in LEVELS.items():

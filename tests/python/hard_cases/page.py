@@ -34,7 +34,6 @@ SAID = {
 
 
 def page_text() -> str:
-    """The whole page."""
     sizes = {group: sum(case.group == group for case in CASES) for group in GROUPS}
     groups = "\n".join(f"- **{group}** ({sizes[group]}): {SAID[group]}" for group in GROUPS)
     lines = [HEAD.format(count=len(CASES), groups=groups).rstrip()]

@@ -1,8 +1,10 @@
 """Pictures of hard cases: one function a file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import touch_scenes
 from losses import LEVELS, UNITS, all_steps, errors_of
@@ -39,15 +41,12 @@ def panel(group: str, which: int, sign: str, title: str) -> Panel:
     model, blob = prebuilt()
     options = replace(default_options(model), sign=sign)
     frames = frames_of(group)[which : which + 1]
-    _, (one,) = on_host(
-        [Load(blob), Choose(options), TareStep(touch_scenes.simulated().quiet_v), Play(frames)]
-    )
+    tare = TareStep(touch_scenes.simulated().quiet_v)
+    _, (one,) = on_host([Load(blob), Choose(options), tare, Play(frames)])
     truth = truth_marks(TouchScene(title, groups()[group][which]), model.skin.conductivity_s_per_m)
     found = tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in one.touches)
-    count = len(found)
-    return Panel(
-        f"{title}\n{count} touch{'' if count == 1 else 'es'} found", one.image, truth, found
-    )
+    said = f"{len(found)} touch{'' if len(found) == 1 else 'es'} found"
+    return Panel(f"{title}\n{said}", one.image, truth, found)
 
 
 def draw_touches(path: Path) -> None:
@@ -60,60 +59,46 @@ def draw_touches(path: Path) -> None:
     )
 
 
+@contextmanager
+def row_of(path: Path, count: int, height: float, label: str) -> Iterator[list[Any]]:
+    """So many axes side by side, saved when they are drawn; ``label`` is that of their y."""
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(9.0, height), layout="constrained")
+        row = [figure.add_subplot(1, count, k + 1) for k in range(count)]
+        yield row
+        row[0].set_ylabel(label, color=INK)
+        save_picture(figure, path)
+
+
 def draw_losses(path: Path) -> None:
     """How much the image changes with the damage to its frames."""
     errors = errors_of(on_host(all_steps())[1])
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(9.0, 3.0), layout="constrained")
-        for k, (kind, values) in enumerate(errors.items()):
-            axes = figure.add_subplot(1, 3, k + 1)
-            axes.plot(
-                [float(level) for level in LEVELS[kind]][1:], values[1:], "o-", color="#1f6fb4"
-            )
+    with row_of(path, 3, 3.0, "change of the image,\nshare of its norm") as row:
+        for axes, (kind, values) in zip(row, errors.items(), strict=True):
+            axes.plot(LEVELS[kind][1:], values[1:], "o-", color="#1f6fb4")
             axes.set_ylim(0, 0.26)
             axes.set_xlabel(UNITS[kind], color=INK)
-            if kind == "noise":
-                axes.set_xscale("log")
-            if kind == "bits":
-                axes.invert_xaxis()
-            if k == 0:
-                axes.set_ylabel("change of the image,\nshare of its norm")
-        save_picture(figure, path)
+        row[0].set_xscale("log")
+        row[2].invert_xaxis()
 
 
 def draw_precision(path: Path) -> None:
     """Errors of float32 over the condition number, and over the size of the change."""
     by_number, sizes = by_condition(on_host(condition_steps())[1]), by_change()
+    of_number = {"coefficients": "coefficients", "data": "S x"}
+    of_size = {"image": "image", "data": "reduced data"}
     panels = (
-        (
-            "condition number of S",
-            CONDITIONS,
-            {
-                "coefficients": [one.coefficients for one in by_number],
-                "S x": [one.data for one in by_number],
-            },
-        ),
-        (
-            "size of the change, golden frame: 1",
-            CHANGES,
-            {"image": [one.image for one in sizes], "reduced data": [one.data for one in sizes]},
-        ),
+        ("condition number of S", CONDITIONS, by_number, of_number),
+        ("size of the change, golden frame: 1", CHANGES, sizes, of_size),
     )
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(9.0, 3.2), layout="constrained")
-        for k, (label, at, lines) in enumerate(panels):
-            axes = figure.add_subplot(1, 2, k + 1)
-            for (name, values), style in zip(lines.items(), ("o-", "s--"), strict=True):
-                axes.loglog(at, values, style, label=name)
+    with row_of(path, 2, 3.2, "float32 from float64,\nshare of the norm") as row:
+        for axes, (label, at, errors, lines) in zip(row, panels, strict=True):
+            for (name, said), style in zip(lines.items(), ("o-", "s--"), strict=True):
+                axes.loglog(at, [getattr(one, name) for one in errors], style, label=said)
             axes.set_xlabel(label, color=INK)
             axes.legend(frameon=False)
-            if k == 0:
-                axes.set_ylabel("float32 from float64,\nshare of the norm", color=INK)
-            else:
-                axes.invert_xaxis()
-        save_picture(figure, path)
+        row[1].invert_xaxis()
 
 
 DRAWN: dict[str, Callable[[Path], None]] = {
@@ -124,5 +109,4 @@ DRAWN: dict[str, Callable[[Path], None]] = {
 
 
 def draw(name: str, path: Path) -> None:
-    """Make the picture ``name`` at ``path``."""
     DRAWN[name](path)

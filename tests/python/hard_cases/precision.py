@@ -68,13 +68,8 @@ def by_condition(narrow: list[Outcome]) -> list[Condition]:
         size = float(np.linalg.norm(one.y))
         room = np.sqrt(2 * one.gap) + np.sqrt(2 * (other.gap + U * size**2))
         apart = one.x - other.x
-        found.append(
-            Condition(
-                float(np.linalg.norm(s @ apart)) / size,
-                float(room) / size,
-                float(np.linalg.norm(apart) / np.linalg.norm(other.x)),
-            )
-        )
+        off = float(np.linalg.norm(apart) / np.linalg.norm(other.x))
+        found.append(Condition(float(np.linalg.norm(s @ apart)) / size, float(room) / size, off))
     return found
 
 
@@ -98,15 +93,10 @@ def by_change() -> list[Change]:
             host.forget()
             images.append(host.outcome(volts).image.astype(np.float64))
             data.append(host.reduced_data()[: model.rank].astype(np.float64))
-        off = U * np.linalg.norm(frame) + (4 + len(model.v_ref_v)) * U * size * np.linalg.norm(
-            change
-        )
+        off = U * np.linalg.norm(frame)
+        off += (4 + len(model.v_ref_v)) * U * size * np.linalg.norm(change)
         scale = float(np.linalg.norm(data[1]))
-        found.append(
-            Change(
-                float(np.linalg.norm(data[0] - data[1])) / scale,
-                norm * float(off) / scale,
-                float(np.linalg.norm(images[0] - images[1]) / np.linalg.norm(images[1])),
-            )
-        )
+        moved = float(np.linalg.norm(data[0] - data[1])) / scale
+        of_image = float(np.linalg.norm(images[0] - images[1]) / np.linalg.norm(images[1]))
+        found.append(Change(moved, norm * float(off) / scale, of_image))
     return found

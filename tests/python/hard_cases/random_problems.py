@@ -9,7 +9,7 @@ from soundness import Judged, judged
 from eitskin.core.results import Options
 from eitskin_reference.problem import greatest
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
-from everywhere import on_host
+from everywhere import Outcome, on_host
 
 RANK, COLUMNS = 20, 64
 
@@ -22,12 +22,16 @@ class RandomProblem:
     y: np.ndarray
 
     def lambda_max(self, sign: str) -> float:
-        """The least lambda at which zero is the optimum."""
         return greatest(self.s.T @ self.y, sign)
+
+    def options(self, **changes: object) -> Options:
+        return plain_options(self.s, **changes)
+
+    def judged(self, sign: str, one: Outcome) -> Judged:
+        return judged(self.s, self.y, sign, one)
 
 
 def rounded(values: np.ndarray) -> np.ndarray:
-    """To float32 numbers."""
     return np.asarray(values).astype(np.float32).astype(np.float64)
 
 
@@ -74,8 +78,7 @@ def asked(problem: RandomProblem, options: Options, **model: object) -> list[Ste
 def optimum_of(problem: RandomProblem, sign: str, share: float = 0.03) -> Judged:
     """By the active set in float64, to a gap of 1e-12 of the start's objective; ``share`` is lambda
     / lambda_max."""
-    options = plain_options(
-        problem.s, solver="active-set", sign=sign, iterations=1000, gap_rel=1e-12, lambda_rel=share
+    options = problem.options(
+        solver="active-set", sign=sign, iterations=1000, gap_rel=1e-12, lambda_rel=share
     )
-    _, outcomes = on_host(asked(problem, options), "float64")
-    return judged(problem.s, problem.y, sign, outcomes[0])
+    return problem.judged(sign, on_host(asked(problem, options), "float64")[1][0])

@@ -39,17 +39,14 @@ class Judged:
     x: np.ndarray
 
     def at_zero(self) -> Judged:
-        """The start."""
         return replace(self, x=np.zeros_like(self.x))
 
     @property
     def residual(self) -> np.ndarray:
-        """y - S x."""
         return np.asarray(self.y - self.s @ self.x)
 
     @property
     def objective(self) -> float:
-        """At x."""
         return objective_of(self.s, self.y, self.x, self.lam)
 
     @property
@@ -102,42 +99,24 @@ def check_sound(margins: Margins, case: str, point: Judged, one: Outcome) -> Non
     worse than at the start, and what is reported is what a float64 look at the coefficients finds;
     each but for rounding."""
     assert one.status == 0 and one.finite()
+    within = margins.of(case)
     allowed = {"increase": 1, "decrease": -1}.get(point.sign)
     wrong = 0 if allowed is None else np.count_nonzero(point.x * allowed < 0)
-    margins.everywhere(case, "coefficients of the wrong sign", wrong, 0, "pixels")
-    start, slack = point.at_zero(), point.objective_rounding
-    half = max(start.objective, 1e-300)
-    rise = max(0.0, point.objective - start.objective)
-    margins.everywhere(
-        case,
-        "objective above the start",
-        rise / half,
-        (slack + start.objective_rounding) / half,
-        "|y|^2/2",
-    )
-    size, longer = (
-        float(np.linalg.norm(point.y)) or 1.0,
-        float(np.linalg.norm(point.residual) - np.linalg.norm(point.y)),
-    )
-    allowance = point.rho + point.s.shape[0] * U * size
-    margins.everywhere(
-        case, "residual above the start", max(0.0, longer) / size, allowance / size, "|y|"
-    )
-    worse = max(0.0, point.gap - start.gap)
-    margins.everywhere(
-        case,
-        "gap above the start",
-        worse / half,
-        (point.gap_rounding + start.gap_rounding) / half,
-        "|y|^2/2",
-    )
+    within("coefficients of the wrong sign", wrong, 0, "pixels")
+    start = point.at_zero()
+    half, size = max(start.objective, 1e-300), float(np.linalg.norm(point.y)) or 1.0
+    rise = max(0.0, point.objective - start.objective) / half
+    room = (point.objective_rounding + start.objective_rounding) / half
+    within("objective above the start", rise, room, "|y|^2/2")
+    length = float(np.linalg.norm(point.residual))
+    longer = max(0.0, length - float(np.linalg.norm(point.y))) / size
+    allowance = (point.rho + point.s.shape[0] * U * size) / size
+    within("residual above the start", longer, allowance, "|y|")
+    room = (point.gap_rounding + start.gap_rounding) / half
+    within("gap above the start", max(0.0, point.gap - start.gap) / half, room, "|y|^2/2")
     nothing_known = one.info.stop == "macs" and one.info.iterations == 0
     if one.info.stop not in ("zero", "below-threshold", "diverged") and not nothing_known:
-        said = abs(one.info.gap - point.gap)
-        margins.everywhere(
-            case, "reported gap off the true one", said / half, point.gap_rounding / half, "|y|^2/2"
-        )
-        off = abs(one.info.residual - float(np.linalg.norm(point.residual)))
-        margins.everywhere(
-            case, "reported residual off the true one", off / size, allowance / size, "|y|"
-        )
+        off = abs(one.info.gap - point.gap) / half
+        within("reported gap off the true one", off, point.gap_rounding / half, "|y|^2/2")
+        off = abs(one.info.residual - length) / size
+        within("reported residual off the true one", off, allowance, "|y|")

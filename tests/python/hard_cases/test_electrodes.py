@@ -20,18 +20,20 @@ def compare(
     return [(clean, spoilt) for clean, spoilt in run(same_everywhere, both, options())]
 
 
-def unnamed(outcomes: list[tuple[Outcome, Outcome]]) -> int:
-    """Spoilt frames that are not said to be a model mismatch."""
-    return sum("model mismatch" not in one.info.diagnostics_by_name for _, one in outcomes)
+def check_named(
+    margins: Margins, case: str, what: str, outcomes: list[tuple[Outcome, Outcome]]
+) -> None:
+    """Every spoilt frame is taken, and said to be a model mismatch."""
+    assert all(one.status == 0 for _, one in outcomes)
+    unnamed = sum("model mismatch" not in one.info.diagnostics_by_name for _, one in outcomes)
+    margins.everywhere(case, f"{what}: frames that were not named", unnamed, 0, "frames")
 
 
 def pair(k: int) -> tuple[int, ...]:
-    """The electrodes beside each other with which scene k's fault is."""
     return tuple(sorted((k % ELECTRODES, (k + 1) % ELECTRODES)))
 
 
 def using(*electrodes: int) -> np.ndarray:
-    """Rows (m,) that use any of them."""
     return np.asarray(np.isin(ROWS, electrodes).any(axis=1))
 
 
@@ -45,8 +47,7 @@ def check_left_out(margins: Margins, case: str, one: Outcome, *electrodes: int) 
 def test_detached(same_everywhere, margins):
     """Its number is told, and its 52 rows are left out."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["detached"])):
-        assert one.info.open_electrodes == (k % ELECTRODES,)
-        assert one.info.bridged_electrodes == ()
+        assert one.info.open_electrodes == (k % ELECTRODES,) and not one.info.bridged_electrodes
         check_left_out(margins, "frames/detached", one, k % ELECTRODES)
 
 
@@ -54,21 +55,17 @@ def test_bridged(same_everywhere, margins):
     """Neighbours: both are named, and left out. Others: no row is dead, and the frame is named a
     model_mismatch."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["bridged"])):
-        assert one.info.bridged_electrodes == pair(k)
-        assert one.info.open_electrodes == ()
+        assert one.info.bridged_electrodes == pair(k) and not one.info.open_electrodes
         check_left_out(margins, "frames/bridged", one, *pair(k))
-    for _, one in compare(same_everywhere, lambda k, _: simulated()[k]["bridged apart"]):
-        assert one.status == 0 and "model mismatch" in one.info.diagnostics_by_name
+    apart = compare(same_everywhere, lambda k, _: simulated()[k]["bridged apart"])
+    check_named(margins, "frames/bridged", "apart", apart)
 
 
 @pytest.mark.parametrize("which", ["swapped", "swapped apart"])
 def test_swapped(same_everywhere, margins, which):
     """A model mismatch, by name."""
     outcomes = compare(same_everywhere, lambda k, _: simulated()[k][which])
-    assert all(one.status == 0 for _, one in outcomes)
-    margins.everywhere(
-        "frames/swapped", f"{which}: frames that were not named", unnamed(outcomes), 0, "frames"
-    )
+    check_named(margins, "frames/swapped", which, outcomes)
 
 
 def test_noisy(same_everywhere, margins):
@@ -103,7 +100,4 @@ def test_polarity_flip(same_everywhere, margins):
 def test_rotated(same_everywhere, margins, by):
     """All rows in the place of others: a model mismatch, by name."""
     outcomes = compare(same_everywhere, lambda _, frame: np.roll(frame, by))
-    assert all(one.status == 0 for _, one in outcomes)
-    margins.everywhere(
-        "frames/rotated", f"by {by}: frames that were not named", unnamed(outcomes), 0, "frames"
-    )
+    check_named(margins, "frames/rotated", f"by {by}", outcomes)

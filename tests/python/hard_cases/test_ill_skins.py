@@ -11,8 +11,7 @@ from eitskin.core.options_table import SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
-from everywhere import Host, Outcome, as_float32, on_host
-from margins import Margins
+from everywhere import Host, as_float32, on_host
 
 CASE = "problem/ill-conditioned-skins"
 FRAMES = 2
@@ -25,9 +24,8 @@ def steps_for(h: HardSkin, options: Options) -> list[Step]:
 def data_of(h: HardSkin, options: Options, width: str) -> list[np.ndarray]:
     """y of each frame, (r,), in float64."""
     host = Host(h.blob, width)
-    assert [
-        host.status_of(step) for step in (Choose(options), TareStep(as_float32(h.quiet_v(8))))
-    ] == [0, 0]
+    taken = [host.status_of(s) for s in (Choose(options), TareStep(as_float32(h.quiet_v(8))))]
+    assert taken == [0, 0]
     data = []
     for frame in as_float32(h.frames_v(FRAMES)):
         host.solve_frame(frame)
@@ -43,29 +41,16 @@ def rounding_of_data(h: HardSkin) -> float:
     return (12 + k) * U * norm * float(np.linalg.norm(h.model.v_ref_v.astype(np.float64)))
 
 
-def compare_widths(
-    margins: Margins,
-    name: str,
-    h: HardSkin,
-    narrow: Outcome,
-    wide: Outcome,
-    y: np.ndarray,
-    y64: np.ndarray,
-) -> None:
+def compare_widths(within, name, h, narrow, wide, y, y64) -> None:
     """The optimum's S x moves by at most as much as y, and as far again by lambda, which follows y;
     each gap g adds sqrt(2 g)."""
-    size = float(np.linalg.norm(y64))
-    moved = float(np.linalg.norm(y - y64))
-    margins.everywhere(
-        CASE, f"y, float32 from float64, {name}", moved / size, rounding_of_data(h) / size, "|y|"
-    )
-    one, other = (
-        judged(h.model.sensitivity, y, "increase", narrow),
-        judged(h.model.sensitivity, y64, "increase", wide),
-    )
+    size, moved = float(np.linalg.norm(y64)), float(np.linalg.norm(y - y64))
+    within(f"y, float32 from float64, {name}", moved / size, rounding_of_data(h) / size, "|y|")
+    s = h.model.sensitivity
+    one, other = judged(s, y, "increase", narrow), judged(s, y64, "increase", wide)
     room = 2 * moved + np.sqrt(2 * one.gap) + np.sqrt(2 * (other.gap + U * size**2))
-    apart = float(np.linalg.norm(h.model.sensitivity @ (one.x - other.x)))
-    margins.everywhere(CASE, f"S x, float32 from float64, {name}", apart / size, room / size, "|y|")
+    apart = float(np.linalg.norm(s @ (one.x - other.x)))
+    within(f"S x, float32 from float64, {name}", apart / size, room / size, "|y|")
 
 
 @pytest.mark.parametrize("name", SKINS)
@@ -82,14 +67,12 @@ def test_ill_conditioned_skins(same_everywhere, margins, name):
     )
     by_options = [outcomes[k * FRAMES : (k + 1) * FRAMES] for k in range(len(chosen))]
     for one in by_options[0]:
-        assert one.status == 0
-        assert one.finite()
+        assert one.status == 0 and one.finite() and len(one.touches) <= usual.max_touches
         assert one.info.stop in ("iterations", "below-threshold")
-        assert len(one.touches) <= usual.max_touches
     data = data_of(h, sound, "float32")
     for of_solver in by_options[1:]:
         for y, one in zip(data, of_solver, strict=True):
             check_sound(margins, CASE, judged(h.model.sensitivity, y, "increase", one), one)
     _, wide = on_host(steps_for(h, precise), "float64")
     for k, y64 in enumerate(data_of(h, precise, "float64")):
-        compare_widths(margins, name, h, by_options[-1][k], wide[k], data[k], y64)
+        compare_widths(margins.of(CASE), name, h, by_options[-1][k], wide[k], data[k], y64)

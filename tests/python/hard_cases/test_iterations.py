@@ -1,15 +1,16 @@
 """From iteration to iteration, and float32 beside float64: bounds that follow from convexity."""
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
-from made_models import lipschitz_of, made_blob, plain_options
+from made_models import lipschitz_of
 from random_problems import RandomProblem, asked, gaussian, optimum_of, smooth, whitened
-from soundness import Judged, U, check_sound, judged
+from soundness import Judged, U, check_sound
 
 from eitskin.core.options_table import SIGNS, SOLVERS
-from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
+from eitskin_studies.harness.emulated_steps import Step
 from everywhere import on_host
 from margins import Margins
 
@@ -21,7 +22,6 @@ SHARE = 0.03
 
 @cache
 def optimum(name: str, sign: str) -> Judged:
-    """Of the problem of that name."""
     return optimum_of(PROBLEMS[name], sign, SHARE)
 
 
@@ -39,13 +39,11 @@ def allowance(best: Judged, k: int) -> float:
 
 
 def check_rate(margins: Margins, name: str, best: Judged, k: int, point: Judged) -> None:
-    """FISTA's promise."""
     half = 0.5 * float(best.y @ best.y)
     lacks = max(0.0, point.objective - best.objective) / half
     bound = (allowance(best, k) + best.gap + point.objective_rounding) / half
-    margins.everywhere(
-        CASE, f"objective above the optimum after k iterations of {name}", lacks, bound, "|y|^2/2"
-    )
+    what = f"objective above the optimum after k iterations of {name}"
+    margins.everywhere(CASE, what, lacks, bound, "|y|^2/2")
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -54,47 +52,31 @@ def test_iterations(same_everywhere, margins, solver):
     ripple; it stays within its rate, and so does the working set, whose columns left out are looked
     after."""
     steps: list[Step] = []
-    what: list[tuple[str, str, int]] = []
-    for name, problem in PROBLEMS.items():
-        steps.append(Load(made_blob(problem.s)))
-        for sign in SIGNS:
-            for k in COUNTS:
-                options = plain_options(
-                    problem.s, solver=solver, sign=sign, iterations=k, lambda_rel=SHARE
-                )
-                steps += [Choose(options), Solve(problem.y[None])]
-                what.append((name, sign, k))
+    what = list(product(PROBLEMS, SIGNS, COUNTS))
+    for name, sign, k in what:
+        problem = PROBLEMS[name]
+        options = problem.options(solver=solver, sign=sign, iterations=k, lambda_rel=SHARE)
+        steps += asked(problem, options)
     _, outcomes = same_everywhere.steps(steps)
     before: tuple[str, str, Judged] | None = None
     for (name, sign, k), one in zip(what, outcomes, strict=True):
-        problem = PROBLEMS[name]
-        point = judged(problem.s, problem.y, sign, one)
+        point = PROBLEMS[name].judged(sign, one)
         check_sound(margins, CASE, point, one)
         if solver in ("fista", "working-set"):
             check_rate(margins, solver, optimum(name, sign), k, point)
         elif before is not None and before[:2] == (name, sign):
             half = point.at_zero().objective
-            rise = max(0.0, point.objective - before[2].objective)
-            slack = point.objective_rounding + before[2].objective_rounding
-            margins.everywhere(
-                CASE,
-                f"objective risen by an iteration of {solver}",
-                rise / half,
-                slack / half,
-                "|y|^2/2",
-            )
+            rise = max(0.0, point.objective - before[2].objective) / half
+            slack = (point.objective_rounding + before[2].objective_rounding) / half
+            what_rose = f"objective risen by an iteration of {solver}"
+            margins.everywhere(CASE, what_rose, rise, slack, "|y|^2/2")
         before = (name, sign, point)
-
-
-def smallest_of(s: np.ndarray, columns: np.ndarray) -> float:
-    """The least singular value of those columns."""
-    return float(np.linalg.svd(s[:, columns], compute_uv=False)[-1]) if columns.any() else 1.0
 
 
 def precise(problem: RandomProblem, solver: str, sign: str) -> list[Step]:
     """To a gap of 1e-5 |y|^2/2."""
-    options = plain_options(
-        problem.s, solver=solver, sign=sign, iterations=100_000, gap_rel=1e-5, lambda_rel=SHARE
+    options = problem.options(
+        solver=solver, sign=sign, iterations=100_000, gap_rel=1e-5, lambda_rel=SHARE
     )
     return asked(problem, options)
 
@@ -106,47 +88,31 @@ def test_float32_against_float64(same_everywhere, margins, solver):
     results within the sum. On the columns where either is not zero x itself differs by at most that
     over their least singular value, where they are independent.
     """
-    steps: list[Step] = []
-    what: list[tuple[str, str]] = []
-    for name, problem in PROBLEMS.items():
-        for sign in SIGNS:
-            steps += precise(problem, solver, sign)
-            what.append((name, sign))
+    what = list(product(PROBLEMS, SIGNS))
+    steps = [step for name, sign in what for step in precise(PROBLEMS[name], solver, sign)]
     _, outcomes = same_everywhere.steps(steps)
-    compared = 0
+    compared, within = 0, margins.of(WIDTHS_CASE)
     for (name, sign), one in zip(what, outcomes, strict=True):
         problem = PROBLEMS[name]
         _, (in_float64,) = on_host(precise(problem, solver, sign), "float64")
-        narrow, wide = (judged(problem.s, problem.y, sign, each) for each in (one, in_float64))
+        narrow, wide = (problem.judged(sign, each) for each in (one, in_float64))
         check_sound(margins, WIDTHS_CASE, narrow, one)
         half, size = narrow.at_zero().objective, float(np.linalg.norm(problem.y))
-        margins.everywhere(
-            WIDTHS_CASE,
-            "gap reached",
-            narrow.gap / half,
-            1e-5 + narrow.gap_rounding / half,
-            "|y|^2/2",
-        )
+        bound = 1e-5 + narrow.gap_rounding / half
+        within("gap reached", narrow.gap / half, bound, "|y|^2/2")
         margins.record(
             WIDTHS_CASE, "gap reached", "host f64", wide.gap / half, 1e-5 * (1 + 1e-6), "|y|^2/2"
         )
         moved_lambda = abs(narrow.lam - wide.lam) * np.abs(wide.x).sum()
         room = sum(np.sqrt(2 * each) for each in (narrow.gap, wide.gap, moved_lambda))
         apart = float(np.linalg.norm(problem.s @ (narrow.x - wide.x)))
-        margins.everywhere(
-            WIDTHS_CASE, "S x, float32 from float64", apart / size, room / size, "|y|"
-        )
+        within("S x, float32 from float64", apart / size, room / size, "|y|")
         support = (narrow.x != 0) | (wide.x != 0)
-        least = smallest_of(problem.s, support)
+        columns = problem.s[:, support]
+        least = float(np.linalg.svd(columns, compute_uv=False)[-1]) if support.any() else 1.0
         if least > 0 and np.count_nonzero(support) <= problem.s.shape[0]:
             longest = float(np.linalg.norm(wide.x))
             moved = float(np.linalg.norm(narrow.x - wide.x))
-            margins.everywhere(
-                WIDTHS_CASE,
-                "x, float32 from float64",
-                moved / longest,
-                room / least / longest,
-                "|x|",
-            )
+            within("x, float32 from float64", moved / longest, room / least / longest, "|x|")
             compared += 1
     assert compared >= 2

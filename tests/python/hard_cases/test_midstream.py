@@ -2,6 +2,7 @@
 so."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -19,18 +20,11 @@ def of_the_frame(one: Outcome) -> tuple[object, ...]:
     """Every bit but those of what came before: ids, which count on, and the MACs of directions that
     were ready."""
     status, stop, iterations, _, _, image, info, _ = as_printed(one)
-    return (
-        status,
-        stop,
-        iterations,
-        image,
-        info,
-        tuple(replace(touch, id=0) for touch in one.touches),
-    )
+    touches = tuple(replace(touch, id=0) for touch in one.touches)
+    return status, stop, iterations, image, info, touches
 
 
 def unlike(some: list[Outcome], others: list[Outcome]) -> int:
-    """How many frames differ."""
     return sum(
         of_the_frame(one) != of_the_frame(other) for one, other in zip(some, others, strict=True)
     )
@@ -41,30 +35,22 @@ def test_model_swapped(same_everywhere, margins):
     taken; then nothing is left of the first, whatever its storage, data and size."""
     s, other = small(), small("l")
     quiet, frames = s.quiet(101, 8), s.frames(100, 2)
-    swaps = [
-        small_blob("i8"),
-        small_blob("f16", "normalised"),
-        small_blob(rank=16),
-        small_blob("i16", "log-ratio"),
+    streams = [
+        (blob, quiet, frames)
+        for blob in (
+            small_blob("i8"),
+            small_blob("f16", "normalised"),
+            small_blob(rank=16),
+            small_blob("i16", "log-ratio"),
+        )
     ]
+    streams.append((small_blob(outline="l"), other.quiet(103, 8), other.frames(102, 2)))
     steps: list[Step] = [Load(small_blob()), TareStep(quiet), Play(frames)]
-    for blob in swaps:
-        steps += [Load(blob), Play(frames[:1]), TareStep(quiet), Play(frames)]
-    steps += [
-        Load(small_blob(outline="l")),
-        Play(other.frames(102, 1)),
-        TareStep(other.quiet(103, 8)),
-        Play(other.frames(102, 2)),
-    ]
-    _, streamed = same_everywhere.steps(steps)
     fresh: list[Step] = []
-    for blob in swaps:
-        fresh += [Load(blob), TareStep(quiet), Play(frames)]
-    fresh += [
-        Load(small_blob(outline="l")),
-        TareStep(other.quiet(103, 8)),
-        Play(other.frames(102, 2)),
-    ]
+    for blob, quiet_v, frames_v in streams:
+        steps += [Load(blob), Play(frames_v[:1]), TareStep(quiet_v), Play(frames_v)]
+        fresh += [Load(blob), TareStep(quiet_v), Play(frames_v)]
+    _, streamed = same_everywhere.steps(steps)
     _, alone = same_everywhere.steps(fresh)
     after = streamed[2:]
     before_tare, taken = after[::3], [one for k, one in enumerate(after) if k % 3]
@@ -73,44 +59,26 @@ def test_model_swapped(same_everywhere, margins):
         for one in before_tare
     )
     assert all(one.image.any() for one in taken)
-    margins.everywhere(
-        "time/model-swapped",
-        "frames unlike those of the model alone",
-        unlike(taken, alone),
-        0,
-        "frames",
-    )
+    within = margins.of("time/model-swapped")
+    within("frames unlike those of the model alone", unlike(taken, alone), 0, "frames")
 
 
 def changes() -> list[Options]:
     """One option after another, from the usual ones."""
     usual = default_options(small_model())
-    named = [replace(usual, solver=solver) for solver in SOLVERS] + [
-        replace(usual, sign=sign) for sign in SIGNS
-    ]
-    named += [
-        replace(usual, project_reference=False),
-        replace(usual, lambda_rel=0.3),
-        replace(usual, lambda_abs=1e-3),
-    ]
-    named += [
-        replace(usual, iterations=3),
-        replace(usual, gap_rel=1e-3),
-        replace(usual, mac_limit=200_000),
-    ]
-    return [
-        *named,
-        replace(usual, touch_sweeps=0),
-        replace(usual, max_touches=1),
-        replace(usual, detection_factor=100.0),
-        usual,
-    ]
+    named: list[dict[str, object]] = [
+        *({"solver": solver} for solver in SOLVERS), *({"sign": sign} for sign in SIGNS),
+        {"project_reference": False}, {"lambda_rel": 0.3}, {"lambda_abs": 1e-3},
+        {"iterations": 3}, {"gap_rel": 1e-3}, {"mac_limit": 200_000}, {"touch_sweeps": 0},
+        {"max_touches": 1}, {"detection_factor": 100.0}, {},
+    ]  # fmt: skip
+    return [replace(usual, **changed) for changed in named]
 
 
 def test_options_changed(same_everywhere, margins):
     """Cold starts: each frame is as in a context that never had other options. Warm ones: a sign,
     once changed, leaves nothing that it forbids."""
-    s, blob, case = small(), small_blob(), "time/options-changed"
+    s, blob, within = small(), small_blob(), margins.of("time/options-changed")
     quiet, frames = s.quiet(111, 8), s.frames(110, 2)
     stream: list[Step] = [Load(blob), TareStep(quiet)]
     alone: list[Step] = []
@@ -119,28 +87,18 @@ def test_options_changed(same_everywhere, margins):
         alone += [Load(blob), TareStep(quiet), Choose(options), Play(frames)]
     _, streamed = same_everywhere.steps(stream)
     _, fresh = same_everywhere.steps(alone)
-    margins.everywhere(
-        case, "cold frames unlike those of a fresh context", unlike(streamed, fresh), 0, "frames"
-    )
+    within("cold frames unlike those of a fresh context", unlike(streamed, fresh), 0, "frames")
     warm: list[Step] = [Load(blob), TareStep(quiet)]
-    signs = [sign for _ in range(2) for sign in SIGNS]
-    for sign in signs:
-        for solver in SOLVERS:
-            warm += [
-                Choose(
-                    replace(
-                        default_options(small_model()), sign=sign, solver=solver, warm_start=True
-                    )
-                ),
-                Play(frames),
-            ]
+    usual, signs = replace(default_options(small_model()), warm_start=True), [*SIGNS, *SIGNS]
+    for sign, solver in product(signs, SOLVERS):
+        warm += [Choose(replace(usual, sign=sign, solver=solver)), Play(frames)]
     _, outcomes = same_everywhere.steps(warm)
     each = 2 * len(SOLVERS)
     for k, one in enumerate(outcomes):
         turn = {"increase": 1, "decrease": -1, "both": 0}[signs[k // each]]
         assert one.status == 0 and one.finite()
         wrong = np.count_nonzero(one.image * turn < 0)
-        margins.everywhere(case, "pixels of a sign no longer wanted", wrong, 0, "pixels")
+        within("pixels of a sign no longer wanted", wrong, 0, "pixels")
 
 
 def test_tare_in_midstream(same_everywhere, margins):
@@ -155,33 +113,19 @@ def test_tare_in_midstream(same_everywhere, margins):
     broken = quiet.copy()
     broken[5, 7] = np.nan
     head: list[Step] = [Load(blob), Choose(options)]
+    played = [
+        [TareStep(drifted), Play(1.1 * frames)],
+        [TareStep(held), Play(frames)],
+        [TareStep(quiet), Play(frames)],
+    ]
     statuses, outcomes = same_everywhere.steps(
-        [*head, TareStep(quiet), Play(frames), TareStep(drifted), Play(1.1 * frames),
-         TareStep(held),
-        Play(frames), TareStep(broken),
-         Play(frames[:1]), TareStep(quiet), Forget(), Play(frames)]
+        [*head, *played[2], *played[0], *played[1], TareStep(broken), Play(frames[:1]),
+         TareStep(quiet), Forget(), Play(frames)]
     )  # fmt: skip
-    _, alone = same_everywhere.steps(
-        [
-            *head,
-            TareStep(drifted),
-            Play(1.1 * frames),
-            *head,
-            TareStep(held),
-            Play(frames),
-            *head,
-            TareStep(quiet),
-            Play(frames),
-        ]
-    )
+    _, alone = same_everywhere.steps([step for one in played for step in (*head, *one)])
     assert [status == 0 for status in statuses] == [True] * 5 + [False, True]
     assert outcomes[9].status == NO_REFERENCE and not outcomes[9].image.any()
-    after = [*outcomes[3:9], *outcomes[10:13]]
-    margins.everywhere(
-        "time/tare-in-midstream",
-        "frames unlike those of a fresh context",
-        unlike(after, alone),
-        0,
-        "frames",
-    )
+    after = unlike([*outcomes[3:9], *outcomes[10:13]], alone)
+    within = margins.of("time/tare-in-midstream")
+    within("frames unlike those of a fresh context", after, 0, "frames")
     assert not outcomes[6].image.any()

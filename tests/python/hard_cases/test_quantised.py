@@ -3,14 +3,13 @@ quantiser."""
 
 import numpy as np
 import pytest
-from made_models import made_model, plain_options
+from made_models import made_model
 from random_problems import RandomProblem, asked, gaussian, rounded, smooth, with_data
 from soundness import check_sound, judged, objective_of
 
 from eitskin.core.options_table import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.model.storage import STORAGES, store
-from eitskin_studies.harness.emulated_steps import Step
 from everywhere import on_host
 
 CASE = "problem/quantised"
@@ -53,21 +52,14 @@ def test_quantised(same_everywhere, margins, solver):
     e(x')^2 / 2 + |r*| e(x*) + e(x*)^2 / 2 in the problem of S, and by strong convexity |S (x' -
     x*)| <= sqrt(2 (f(x') - f*)). E is bounded by the step, before anything is measured.
     """
-    steps: list[Step] = []
-    what = []
+    steps, what, within = [], [], margins.of(CASE)
     for name, problem in PROBLEMS.items():
         lam = 0.1 * problem.lambda_max("both")
-        options = plain_options(
-            problem.s,
-            solver=solver,
-            sign="both",
-            iterations=3000,
-            gap_rel=1e-5,
-            lambda_abs=lam,
+        options = problem.options(
+            solver=solver, sign="both", iterations=3000, gap_rel=1e-5, lambda_abs=lam,
             lambda_rel=0.0,
-        )
-        wide = on_host(asked(problem, options), "float64")[1][0]
-        best = judged(problem.s, problem.y, "both", wide)
+        )  # fmt: skip
+        best = problem.judged("both", on_host(asked(problem, options), "float64")[1][0])
         for storage in STORAGES:
             steps += asked(problem, options, storage=storage)
             what.append((name, storage, problem, best))
@@ -79,25 +71,16 @@ def test_quantised(same_everywhere, margins, solver):
         point = judged(stored, problem.y, "both", one)
         check_sound(margins, CASE, point, one)
         sizes = np.linalg.norm(allowed, axis=0)
-        mine, its = float(np.abs(point.x) @ sizes), float(np.abs(best.x) @ sizes)
-        residual, best_residual = (
-            float(np.linalg.norm(r)) for r in (point.residual, best.residual)
-        )
         room = point.gap + best.gap + point.objective_rounding
-        room += residual * mine + 0.5 * mine**2 + best_residual * its + 0.5 * its**2
+        for each in (point, best):
+            error = float(np.abs(each.x) @ sizes)
+            room += float(np.linalg.norm(each.residual)) * error + 0.5 * error**2
         lacks = max(0.0, objective_of(problem.s, problem.y, point.x, best.lam) - best.objective)
         half, size = best.at_zero().objective, float(np.linalg.norm(problem.y))
-        margins.everywhere(
-            CASE, f"objective above that of f32, {storage}", lacks / half, room / half, "|y|^2/2"
-        )
+        within(f"objective above that of f32, {storage}", lacks / half, room / half, "|y|^2/2")
         moved = float(np.linalg.norm(problem.s @ (point.x - best.x)))
-        margins.everywhere(
-            CASE,
-            f"S x from that of f32, {storage}",
-            moved / size,
-            np.sqrt(2 * (room + best.gap)) / size,
-            "|y|",
-        )
+        bound = np.sqrt(2 * (room + best.gap)) / size
+        within(f"S x from that of f32, {storage}", moved / size, bound, "|y|")
 
 
 @pytest.mark.parametrize("storage", STORAGES)
@@ -110,6 +93,5 @@ def test_what_does_not_fit_is_refused(storage):
         assert "\n" not in str(error.value)
     tiny = store(np.full((3, 4), 1e-44), storage).decode(3)
     assert (np.abs(tiny) <= 2e-44).all()
-    assert np.isfinite(
-        store(np.full((3, 4), 3e38 if storage != "f16" else 6.5e4), storage).decode(3)
-    ).all()
+    greatest = 6.5e4 if storage == "f16" else 3e38
+    assert np.isfinite(store(np.full((3, 4), greatest), storage).decode(3)).all()

@@ -13,7 +13,7 @@ HOUR_S = 3600.0
 def test_gain_drift(same_everywhere, margins):
     """The whole gain off by 1 to 20 %: the peak follows it and loses no more; at 5 % at most 2
     %."""
-    case = "frames/gain-drift"
+    within = margins.of("frames/gain-drift")
     gained = played(lambda k: [noisy(k, g * simulated()[k]["touched"], 1) for g in (1.0, *GAINS)])
     lost, worse = np.zeros((COUNT, len(GAINS))), np.zeros((COUNT, len(GAINS)))
     for k, (clean, *drifted) in enumerate(run(same_everywhere, gained, options())):
@@ -23,8 +23,8 @@ def test_gain_drift(same_everywhere, margins):
             worse[k, g] = miou(clean.image, k) - miou(one.image, k)
     for g, gain in enumerate(GAINS):
         bound = 0.02 if abs(gain - 1) <= 0.05 else 0.05
-        margins.everywhere(case, f"peak lost at gain {gain:g}", lost[:, g].mean(), bound)
-        margins.everywhere(case, f"MIoU lost at gain {gain:g}", worse[:, g].mean(), 0.02)
+        within(f"peak lost at gain {gain:g}", lost[:, g].mean(), bound)
+        within(f"MIoU lost at gain {gain:g}", worse[:, g].mean(), 0.02)
 
 
 def test_drying(same_everywhere, margins):
@@ -52,19 +52,10 @@ def test_common_mode_jump(same_everywhere, margins):
             assert one.status == 0 and one.info.masked == 0
             losses[k, j] = miou(clean.image, k) - miou(one.image, k)
             named += abs(JUMPS[j]) > 0.01 and one.info.diagnostics != 0
+    within = margins.of("frames/common-mode")
     for jump, loss in zip(JUMPS, losses.mean(axis=0), strict=True):
-        margins.everywhere(
-            "frames/common-mode",
-            f"MIoU lost to {jump:g} rms(V0)",
-            loss,
-            0.1 if abs(jump) <= 0.01 else 0.4,
-        )
-    margins.everywhere(
-        "frames/common-mode",
-        "frames of 5 % that nothing was found about",
-        1 - named / (2 * COUNT),
-        0.5,
-    )
+        within(f"MIoU lost to {jump:g} rms(V0)", loss, 0.1 if abs(jump) <= 0.01 else 0.4)
+    within("frames of 5 % that nothing was found about", 1 - named / (2 * COUNT), 0.5)
 
 
 def test_touch_during_tare(same_everywhere, margins):

@@ -11,6 +11,7 @@ from eitskin.core.results import Options
 from eitskin.model.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from everywhere import Outcome, SameEverywhere
+from margins import Margins
 from small_models import prebuilt
 
 OUTLIERS = (0.05, 0.3, 1.0, 5.0)  # of rms(V0)
@@ -18,7 +19,6 @@ CHANNELS, ZERO = -11, -12  # eits_status
 
 
 def options(**changes: object) -> Options:
-    """The model's own, with some changed."""
     return replace(default_options(prebuilt()[0]), **changes)
 
 
@@ -34,6 +34,22 @@ def run(
     assert all(one.finite() for one in outcomes)
     lengths = np.cumsum([0, *(len(frames) for _, frames in pairs)])
     return [outcomes[a:b] for a, b in pairwise(lengths)]
+
+
+def in_scene_0(
+    same_everywhere: SameEverywhere, frames: list[np.ndarray] | np.ndarray, **changes: object
+) -> list[Outcome]:
+    """Of frames after a tare on its quiet frames."""
+    (found,) = run(same_everywhere, [(quiet_frames(0), np.array(frames))], options(**changes))
+    return found
+
+
+def check_loss(
+    margins: Margins, case: str, to: str, clean: Outcome, one: Outcome, most: float = 0.02
+) -> None:
+    """In scene 0."""
+    loss = miou(clean.image, 0) - miou(one.image, 0)
+    margins.everywhere(case, f"MIoU lost to {to}", loss, most)
 
 
 def damaged(k: int, amplitude: float) -> np.ndarray:
@@ -76,41 +92,29 @@ def test_outlier_in_half_scans(same_everywhere, margins):
 def test_outlier_in_the_reference(same_everywhere, margins):
     """One reading of one of 16 quiet frames off by rms(V0) / 2: left out of the reference and of
     its noise."""
-    pairs = []
+    pairs, within = [], margins.of("frames/outlier-while-taring")
     for k in range(COUNT):
-        quiet = quiet_frames(k)
+        quiet, frames = quiet_frames(k), touched(k)[None]
         quiet[(3 * k) % len(quiet), 17 * k + 5] += 0.5 * rms_v(k)
-        frames = touched(k)[None]
         pairs += [(quiet_frames(k), frames), (quiet, frames)]
     results = run(same_everywhere, pairs, options())
     for k, ((clean,), (spoilt,)) in enumerate(zip(results[::2], results[1::2], strict=True)):
         off = abs(spoilt.info.lambda_noise - clean.info.lambda_noise) / clean.info.lambda_noise
-        margins.everywhere("frames/outlier-while-taring", "change of lambda_noise", off, 0.3)
-        loss = miou(clean.image, k) - miou(spoilt.image, k)
-        margins.everywhere("frames/outlier-while-taring", "MIoU lost", loss, 0.02)
+        within("change of lambda_noise", off, 0.3)
+        within("MIoU lost", miou(clean.image, k) - miou(spoilt.image, k), 0.02)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_not_finite(same_everywhere, margins, value):
     """One, 10 or 40 rows: left out. More than half of them: refused, the image cleared, and the
     next frame as ever."""
-    good, generator = touched(0), np.random.default_rng(5)
-    frames, counts = [good], (1, 10, 40)
-    for count in (*counts, 105):
-        frame = good.copy()
-        frame[generator.permutation(len(good))[:count]] = value
-        frames.append(frame)
-    ((clean, *spoilt, refused, again),) = run(
-        same_everywhere, [(quiet_frames(0), np.array([*frames, good]))], options()
-    )
+    frames, counts, generator = np.tile(touched(0), (6, 1)), (1, 10, 40), np.random.default_rng(5)
+    for frame, count in zip(frames[1:5], (*counts, 105), strict=True):
+        frame[generator.permutation(len(frame))[:count]] = value
+    clean, *spoilt, refused, again = in_scene_0(same_everywhere, frames)
     for count, one in zip(counts, spoilt, strict=True):
         assert one.status == 0 and one.info.masked == count
-        margins.everywhere(
-            "frames/not-finite",
-            f"MIoU lost to {count} rows",
-            miou(clean.image, 0) - miou(one.image, 0),
-            0.1,
-        )
+        check_loss(margins, "frames/not-finite", f"{count} rows", clean, one, 0.1)
     assert refused.status == CHANNELS and not refused.image.any() and refused.touches == ()
     assert (again.image == clean.image).all()
 
@@ -119,9 +123,8 @@ def test_zero_and_denormal(same_everywhere):
     """All zero: a dead front end, refused as such, though every electrode looks open. Denormal
     numbers: no touch."""
     good = touched(0)
-    frames = np.array([good, np.zeros_like(good), -np.zeros_like(good), 1e-39 * good, good])
-    ((clean, zero, minus, tiny, again),) = run(
-        same_everywhere, [(quiet_frames(0), frames)], options()
+    clean, zero, minus, tiny, again = in_scene_0(
+        same_everywhere, [good, 0.0 * good, -0.0 * good, 1e-39 * good, good]
     )
     for one in (zero, minus):
         assert one.status == ZERO and not one.image.any() and one.info.diagnostics_by_name == ()
@@ -132,37 +135,23 @@ def test_zero_and_denormal(same_everywhere):
 def test_one_denormal_row(same_everywhere, margins):
     """A row that fell to 1e-39 V is an outlier like any other."""
     good = touched(0)
-    row = int(np.abs(simulated()[0]["quiet"]).argmax())
     spoilt = good.copy()
-    spoilt[row] = 1e-39
-    ((clean, one),) = run(same_everywhere, [(quiet_frames(0), np.array([good, spoilt]))], options())
+    spoilt[int(np.abs(simulated()[0]["quiet"]).argmax())] = 1e-39
+    clean, one = in_scene_0(same_everywhere, [good, spoilt])
     assert one.info.outliers in (1, 2)
-    margins.everywhere(
-        "frames/zero-and-denormal",
-        "MIoU lost to one row",
-        miou(clean.image, 0) - miou(one.image, 0),
-        0.02,
-    )
+    check_loss(margins, "frames/zero-and-denormal", "one row", clean, one)
 
 
 def test_saturation_in_touch(same_everywhere, margins):
     """Rows at the limit are left out and counted apart."""
-    good = touched(0)
+    good, rows = touched(0), [3, 50, 171]
     limit = 1.05 * float(np.abs(quiet_frames(0)).max())
-    rows = np.array([3, 50, 171])
     spoilt = good.copy()
-    spoilt[rows] = np.array([limit, -limit, limit])
-    ((clean, one),) = run(
-        same_everywhere, [(quiet_frames(0), np.array([good, spoilt]))], options(saturation_v=limit)
-    )
+    spoilt[rows] = limit, -limit, limit
+    clean, one = in_scene_0(same_everywhere, [good, spoilt], saturation_v=limit)
     assert one.info.saturated == one.info.masked == len(rows)
     assert one.info.diagnostics_by_name == ("saturated",)
-    margins.everywhere(
-        "frames/saturation",
-        "MIoU lost to three rows",
-        miou(clean.image, 0) - miou(one.image, 0),
-        0.02,
-    )
+    check_loss(margins, "frames/saturation", "three rows", clean, one)
 
 
 def test_saturation_in_the_reference(same_everywhere):
@@ -181,10 +170,6 @@ def test_clean_frames_are_left_alone(same_everywhere, margins):
         run(same_everywhere, clean, options(diagnostics=which)) for which in (uncrowded, 0)
     )
     for (one,), (other,) in zip(looked, blind, strict=True):
-        margins.everywhere(
-            "frames/clean",
-            "diagnostics and rows left out",
-            one.info.diagnostics + one.info.masked,
-            0,
-        )
+        seen = one.info.diagnostics + one.info.masked
+        margins.everywhere("frames/clean", "diagnostics and rows left out", seen, 0)
         assert (one.coefficients == other.coefficients).all() and one.touches == other.touches

@@ -1,14 +1,15 @@
 """A model that states too small a Lipschitz constant makes FISTA's step too long: the guard halves
 it, or gives zero and says so."""
 
+from itertools import product
+
 import numpy as np
 import pytest
-from made_models import lipschitz_of, made_blob, plain_options
-from random_problems import gaussian, optimum_of, smooth, whitened
-from soundness import check_sound, judged
+from made_models import lipschitz_of
+from random_problems import asked, gaussian, optimum_of, smooth, whitened
+from soundness import check_sound
 
 from eitskin.core.options_table import SIGNS, SOLVERS
-from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 
 CASE = "problem/step-too-long"
 MAX_HALVINGS = 8
@@ -23,20 +24,17 @@ def test_step_too_long(same_everywhere, margins, solver, iterations):
     the objective can lose is lost. Where the step cannot be brought down, or there is no time, the
     image is zero and the stop is "diverged". Coordinate descent and active set take no step from
     the constant."""
-    steps: list[Step] = []
-    asked = []
-    for name, problem in PROBLEMS.items():
-        for factor in FACTORS:
-            blob = made_blob(problem.s, lipschitz=lipschitz_of(problem.s) / factor)
-            for sign in SIGNS:
-                options = plain_options(problem.s, solver=solver, sign=sign, iterations=iterations)
-                steps += [Load(blob), Choose(options), Solve(problem.y[None])]
-                asked.append((name, factor, sign))
+    within, steps = margins.of(CASE), []
+    what = list(product(PROBLEMS, FACTORS, SIGNS))
+    for name, factor, sign in what:
+        problem = PROBLEMS[name]
+        options = problem.options(solver=solver, sign=sign, iterations=iterations)
+        steps += asked(problem, options, lipschitz=lipschitz_of(problem.s) / factor)
     _, outcomes = same_everywhere.steps(steps)
     halved = gave_up = 0
-    for (name, factor, sign), one in zip(asked, outcomes, strict=True):
+    for (name, factor, sign), one in zip(what, outcomes, strict=True):
         problem = PROBLEMS[name]
-        point = judged(problem.s, problem.y, sign, one)
+        point = problem.judged(sign, one)
         check_sound(margins, CASE, point, one)
         assert one.info.step_halvings <= MAX_HALVINGS
         halved += one.info.step_halvings > 0
@@ -46,13 +44,7 @@ def test_step_too_long(same_everywhere, margins, solver, iterations):
         elif iterations == 300:
             best, start = optimum_of(problem, sign), point.at_zero()
             left = max(0.0, point.objective - best.objective) / (start.objective - best.objective)
-            margins.everywhere(
-                CASE,
-                f"left to do after 300 iterations of {solver}",
-                left,
-                0.01,
-                "of what there was",
-            )
+            within(f"left to do after 300 iterations of {solver}", left, 0.01, "of what there was")
         if solver not in ("fista", "working-set"):
             assert one.info.step_halvings == 0
         elif iterations == 300:

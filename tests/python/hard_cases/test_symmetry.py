@@ -2,10 +2,11 @@
 scaled."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
-from made_models import made_blob, plain_options
+from made_models import made_blob
 from random_problems import gaussian
 from soundness import U, judged
 
@@ -35,36 +36,23 @@ def test_powers_of_two_and_turned_signs(same_everywhere, margins, solver):
     turned. Both bit for bit."""
     problem = gaussian(51)
     steps: list[Step] = [Load(made_blob(problem.s))]
-    scales = (1.0, 2.0**-40, 2.0**-7, 2.0**5, 2.0**40)
-    for sign in SIGNS:
-        lam = 0.05 * problem.lambda_max(sign)
-        for scale in scales:
-            options = plain_options(
-                problem.s,
-                solver=solver,
-                sign=sign,
-                iterations=40,
-                lambda_abs=scale * lam,
-                lambda_rel=0.0,
-            )
-            steps += [Choose(options), Solve(scale * problem.y[None])]
-    for sign, turn in (("increase", "decrease"), ("both", "both")):
-        for name, y in ((sign, problem.y), (turn, -problem.y)):
-            steps += [
-                Choose(plain_options(problem.s, solver=solver, sign=name, iterations=40)),
-                Solve(y[None]),
-            ]
+    scales, within = (1.0, 2.0**-40, 2.0**-7, 2.0**5, 2.0**40), margins.of(CASE)
+    for sign, scale in product(SIGNS, scales):
+        lam = {"lambda_abs": scale * 0.05 * problem.lambda_max(sign), "lambda_rel": 0.0}
+        options = problem.options(solver=solver, sign=sign, iterations=40, **lam)
+        steps += [Choose(options), Solve(scale * problem.y[None])]
+    for sign, turn in (("increase", 1), ("decrease", -1), ("both", 1), ("both", -1)):
+        options = problem.options(solver=solver, sign=sign, iterations=40)
+        steps += [Choose(options), Solve(turn * problem.y[None])]
     _, outcomes = same_everywhere.steps(steps)
     scaled, turned = outcomes[: len(SIGNS) * len(scales)], outcomes[len(SIGNS) * len(scales) :]
     for k, one in enumerate(scaled):
         base, scale = scaled[k - k % len(scales)], scales[k % len(scales)]
         unlike = np.count_nonzero(one.coefficients != np.float32(scale) * base.coefficients)
-        margins.everywhere(
-            CASE, "coefficients unlike, data times a power of two", unlike, 0, "pixels"
-        )
+        within("coefficients unlike, data times a power of two", unlike, 0, "pixels")
     for one, other in (turned[:2], turned[2:]):
         unlike = np.count_nonzero(one.coefficients != -other.coefficients)
-        margins.everywhere(CASE, "coefficients unlike, data turned", unlike, 0, "pixels")
+        within("coefficients unlike, data turned", unlike, 0, "pixels")
         assert one.image.any()
 
 
@@ -75,14 +63,9 @@ def test_polarity(same_everywhere, margins, data_kind):
     options = default_options(small_model("f32", data_kind))
     quiet, frames = s.quiet(61, 8), s.frames(60, 3)
     steps = [
-        Load(blob),
-        Choose(options),
-        TareStep(quiet),
-        Play(frames),
-        Load(blob),
-        Choose(options),
-        TareStep(-quiet),
-        Play(-frames),
+        step
+        for turn in (1, -1)
+        for step in (Load(blob), Choose(options), TareStep(turn * quiet), Play(turn * frames))
     ]
     _, outcomes = same_everywhere.steps(steps)
     for one, other in zip(outcomes[:3], outcomes[3:], strict=True):
@@ -157,29 +140,17 @@ def test_electrodes_relabelled(same_everywhere, margins, what):
     """The same electrodes under other numbers, and the protocol's table in those numbers: the same
     rows, from mesh to image."""
     s = small()
-    turn = (
-        {"start_angle_deg": 90.0 - 360 / COUNT}
-        if what.startswith("rotation")
-        else {"clockwise": True}
-    )
-    numbers = (
-        (np.arange(COUNT) + 1) % COUNT if what.startswith("rotation") else -np.arange(COUNT) % COUNT
-    )
-    skin = Skin(
-        "relabelled",
-        s.skin.outline,
-        Electrodes(COUNT, 3.0, **turn),
-        conductivity_s_per_m=0.02,
-        thickness_mm=5.0,
-    )
+    turned = what.startswith("rotation")
+    turn = {"start_angle_deg": 90.0 - 360 / COUNT} if turned else {"clockwise": True}
+    numbers = (np.arange(COUNT) + 1 if turned else -np.arange(COUNT)) % COUNT
+    skin = Skin("relabelled", s.skin.outline, Electrodes(COUNT, 3.0, **turn), 0.02, 5.0)
     protocol = table(COUNT, numbers[s.protocol.drive_measure.astype(int)])
     linear = linearise(skin, protocol, pixels_across=PIXELS, elements=ELEMENTS)
     assert np.abs(linear.v0_v - s.linear.v0_v).max() < 1e-9 * np.abs(s.linear.v0_v).max()
     models = model_of(s.skin, s.protocol, s.linear), model_of(skin, protocol, linear)
     given = s.quiet(71, 8), s.frames(70, 2)
-    check_alike(
-        same_everywhere, margins, what, models, (given, given), np.arange(models[0].grid.n_pixels)
-    )
+    same = np.arange(models[0].grid.n_pixels)
+    check_alike(same_everywhere, margins, what, models, (given, given), same)
 
 
 def test_channels_permuted_with_the_protocol(same_everywhere, margins):
@@ -190,14 +161,8 @@ def test_channels_permuted_with_the_protocol(same_everywhere, margins):
     models = model_of(s.skin, s.protocol, s.linear), model_of(s.skin, protocol, linear)
     quiet, frames = s.quiet(73, 8), s.frames(72, 2)
     given = (quiet, frames), (quiet[:, order], frames[:, order])
-    check_alike(
-        same_everywhere,
-        margins,
-        "channels permuted",
-        models,
-        given,
-        np.arange(models[0].grid.n_pixels),
-    )
+    same = np.arange(models[0].grid.n_pixels)
+    check_alike(same_everywhere, margins, "channels permuted", models, given, same)
 
 
 def quarter_turn(grid: Grid) -> np.ndarray:
@@ -216,16 +181,10 @@ def rows_moved(protocol: Protocol, electrode: np.ndarray) -> tuple[np.ndarray, n
     place = {tuple(row): k for k, row in enumerate(protocol.drive_measure.tolist())}
     to, sign = [], []
     for a, b, c, d in electrode[protocol.drive_measure.astype(int)].tolist():
-        for turned, key in (
-            (1, (a, b, c, d)),
-            (-1, (b, a, c, d)),
-            (-1, (a, b, d, c)),
-            (1, (b, a, d, c)),
-        ):
-            if key in place:
-                to.append(place[key])
-                sign.append(turned)
-                break
+        turns = {(a, b, c, d): 1, (b, a, c, d): -1, (a, b, d, c): -1, (b, a, d, c): 1}
+        (key,) = turns.keys() & place.keys()
+        to.append(place[key])
+        sign.append(turns[key])
     return np.array(to), np.array(sign)
 
 
@@ -269,11 +228,5 @@ def test_the_disk_turned_and_mirrored(same_everywhere, margins, what):
     quiet, frames = clean.quiet(75, 8), clean.frames(74, 2)
     moved_quiet, moved_frames = np.empty_like(quiet), np.empty_like(frames)
     moved_quiet[:, to], moved_frames[:, to] = sign * quiet, sign * frames
-    check_alike(
-        same_everywhere,
-        margins,
-        what,
-        (model, model),
-        ((quiet, frames), (moved_quiet, moved_frames)),
-        pixel,
-    )
+    given = (quiet, frames), (moved_quiet, moved_frames)
+    check_alike(same_everywhere, margins, what, (model, model), given, pixel)

@@ -8,7 +8,6 @@ import numpy as np
 from eitskin.core.results import Options
 from eitskin.model.options import default_options, tracking
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
-from everywhere import Outcome
 from small_models import small, small_blob, small_model
 
 NOISE = 1e-3
@@ -34,13 +33,7 @@ def frames_of(places_mm: list[tuple[float, float] | None], share: float, seed: i
 
 
 def head(chosen: Options) -> list[Step]:
-    """A model, its options and a reference with noise."""
     return [Load(small_blob()), Choose(chosen), TareStep(small().quiet(131, 32, NOISE))]
-
-
-def ids(outcomes: list[Outcome]) -> list[tuple[int, ...]]:
-    """Of each frame, strongest first."""
-    return [tuple(touch.id for touch in one.touches) for one in outcomes]
 
 
 def test_noise_that_flickers(same_everywhere, margins):
@@ -48,36 +41,28 @@ def test_noise_that_flickers(same_everywhere, margins):
     comes is another; with it a touch has to come twice to one place."""
     low = options(detection_factor=0.6)
     quiet = frames_of([None] * 40, 0, 132)
-    _, bare = same_everywhere.steps(
-        [*head(replace(low, track_confirm=0, track_hold=0, track_smooth=0.0)), Play(quiet)]
+    off = replace(low, track_confirm=0, track_hold=0, track_smooth=0.0)
+    untracked, tracked = (
+        sum(len(one.touches) for one in same_everywhere.steps([*head(each), Play(quiet)])[1])
+        for each in (off, low)
     )
-    _, told = same_everywhere.steps([*head(low), Play(quiet)])
-    untracked, tracked = (sum(len(one.touches) for one in some) for some in (bare, told))
     assert untracked >= 10
-    margins.everywhere(
-        FLICKER, "touches reported in 40 quiet frames", tracked, untracked / 5, "touches"
-    )
+    what = "touches reported in 40 quiet frames"
+    margins.everywhere(FLICKER, what, tracked, untracked / 5, "touches")
 
 
 def test_a_finger_that_lifts(same_everywhere, margins):
     """A clear touch that is lifted is told no more from the next frame on, and one that comes at
     its place later is another."""
     place = (10.0, 15.0)
-    _, outcomes = same_everywhere.steps(
-        [
-            *head(options()),
-            Play(
-                frames_of([place] * 8 + [None] * 5 + [place] * 3 + [None] + [place] * 2, 1.0, 133)
-            ),
-        ]
-    )
-    seen = ids(outcomes)
+    path = [place] * 8 + [None] * 5 + [place] * 3 + [None] + [place] * 2
+    _, outcomes = same_everywhere.steps([*head(options()), Play(frames_of(path, 1.0, 133))])
+    seen = [tuple(touch.id for touch in one.touches) for one in outcomes]
     assert seen[0] and seen[:8] == [seen[0]] * 8
     ghosts = sum(touch.id == seen[0][0] for one in outcomes[8:] for touch in one.touches)
     margins.everywhere(LIFT, "frames with a touch that was lifted", ghosts, 0, "frames")
-    assert (
-        seen[13] == seen[15] == seen[17] and seen[13] > seen[0]
-    )  # a missed frame between does not make another
+    # a missed frame between does not make another
+    assert seen[13] == seen[15] == seen[17] and seen[13] > seen[0]
     assert seen[16] == ()
 
 
@@ -90,19 +75,15 @@ def test_frames_that_are_missing(same_everywhere, margins):
     refused[[6, 7, 13]] = np.nan
     dropped = np.delete(frames, [6, 7, 13], axis=0)
     switched, off = 0, 0.0
-    for played, true in (
-        (refused, path),
-        (dropped, [one for k, one in enumerate(path) if k not in (6, 7, 13)]),
-    ):
+    left = [one for k, one in enumerate(path) if k not in (6, 7, 13)]
+    for played, true in ((refused, path), (dropped, left)):
         _, outcomes = same_everywhere.steps([*head(options()), Play(played)])
         good = [(one, place) for one, place in zip(outcomes, true, strict=True) if one.status == 0]
         assert len(good) == 21 and all(len(one.touches) == 1 for one, _ in good)
         switched += len({one.touches[0].id for one, _ in good}) - 1
         assert all(one.finite() for one in outcomes)
-        for one, place in good[3:]:
-            assert place is not None
-            off = max(
-                off, float(np.hypot(one.touches[0].x_mm - place[0], one.touches[0].y_mm - place[1]))
-            )
+        for one, (x_mm, y_mm) in good[3:]:
+            (touch,) = one.touches
+            off = max(off, float(np.hypot(touch.x_mm - x_mm, touch.y_mm - y_mm)))
     margins.everywhere(MISSING, "ids a finger changes", switched, 0, "ids")
     margins.everywhere(MISSING, "off its place, at most", off, 6.0, "mm")

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_models import made_blob, made_model, plain_options
+from made_models import made_blob, made_model
 from random_problems import gaussian, rounded
 from soundness import Judged, U, check_sound, judged
 
@@ -23,10 +23,8 @@ from small_models import DATA_KINDS, small, small_blob, small_model
 
 CASE, FRAMES_CASE = "problem/units", "problem/units-of-frames"
 EXPONENTS = tuple(range(-30, 31, 5))
-MIN_DATA, MAX_DATA = (
-    2.0**-51,
-    2.0**63,
-)  # |y| whose square float32 holds with 24 bits to spare, and |y|^2 below its end
+# |y| whose square float32 holds with 24 bits to spare, and |y|^2 below its end
+MIN_DATA, MAX_DATA = 2.0**-51, 2.0**63
 NOT_FINITE = -15
 
 
@@ -38,13 +36,6 @@ def refused(s: np.ndarray) -> bool:
         assert "\n" not in str(error)
         return True
     return False
-
-
-def expected_end(size: float) -> str:
-    """What becomes of data of norm ``size``."""
-    if size < MIN_DATA:
-        return "zero"
-    return "solved" if size < MAX_DATA else "refused"
 
 
 def check_scaled(
@@ -61,9 +52,8 @@ def check_scaled(
         np.sqrt(2 * (j.gap + j.gap_rounding)) / float(np.linalg.norm(j.y)) * size
         for j in (base, one)
     )
-    margins.everywhere(
-        case, "S x in other units", off / size, (2 * data_off + stored + gaps) / size, "|y|"
-    )
+    room = (2 * data_off + stored + gaps) / size
+    margins.everywhere(case, "S x in other units", off / size, room, "|y|")
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -71,32 +61,27 @@ def test_units_of_model_and_data(same_everywhere, margins, solver):
     """S times a, y times b, each alone and both together: x times b / a, while squares are
     numbers."""
     problem = gaussian(1)
-    options = plain_options(
-        problem.s, solver=solver, sign="both", iterations=20_000, gap_rel=1e-4, lambda_rel=0.2
+    options = problem.options(
+        solver=solver, sign="both", iterations=20_000, gap_rel=1e-4, lambda_rel=0.2
     )
-    chosen = (
-        [(0, 0)]
-        + [(0, e) for e in EXPONENTS]
-        + [(e, 0) for e in EXPONENTS]
-        + [(e, e) for e in EXPONENTS]
-    )
+    chosen = [(0, 0), *((0, e) for e in EXPONENTS), *((e, 0) for e in EXPONENTS)]
+    chosen += [(e, e) for e in EXPONENTS]
     chosen += [(-15, 15), (15, -15), (0, -44), (0, -40), (-18, 0), (18, 0)]
     steps: list[Step] = []
     kept: list[tuple[int, int]] = []
     for a, b in chosen:
         s = rounded(problem.s * 10.0**a)
-        if refused(s):
-            assert abs(a) > 18
-            continue
-        assert abs(a) < 19
-        steps += [Load(made_blob(s)), Choose(options), Solve(problem.y[None] * 10.0**b)]
-        kept.append((a, b))
+        assert refused(s) == (abs(a) > 18)
+        if abs(a) <= 18:
+            steps += [Load(made_blob(s)), Choose(options), Solve(problem.y[None] * 10.0**b)]
+            kept.append((a, b))
     _, outcomes = same_everywhere.steps(steps)
     size = float(np.linalg.norm(problem.y))
-    base = judged(problem.s, problem.y, "both", outcomes[0])
+    base = problem.judged("both", outcomes[0])
     ends = set()
     for (a, b), one in zip(kept, outcomes, strict=True):
-        end = expected_end(size * 10.0**b)
+        norm = size * 10.0**b
+        end = "zero" if norm < MIN_DATA else "solved" if norm < MAX_DATA else "refused"
         ends.add(end)
         assert one.finite()
         if end == "solved":
@@ -105,9 +90,8 @@ def test_units_of_model_and_data(same_everywhere, margins, solver):
             check_sound(margins, CASE, point, one)
             check_scaled(margins, CASE, base, point, U * size, 10.0 ** (a - b))
             continue
-        margins.everywhere(
-            CASE, "pixels of refused or vanishing data", np.count_nonzero(one.image), 0, "pixels"
-        )
+        left = np.count_nonzero(one.image)
+        margins.everywhere(CASE, "pixels of refused or vanishing data", left, 0, "pixels")
         assert one.status == (NOT_FINITE if end == "refused" else 0)
         assert one.info.stop == ("diverged" if end == "refused" else "zero") and one.touches == ()
     assert ends == {"zero", "solved", "refused"}
@@ -137,40 +121,26 @@ def test_units_of_frames(same_everywhere, margins, data_kind):
     exponents = [0, -38, -37, *EXPONENTS, 37]
     steps: list[Step] = []
     for e in exponents:
-        steps += [
-            Load(blob),
-            Choose(options),
-            TareStep(as_float32(quiet * 10.0**e)),
-            Play(as_float32(frames * 10.0**e)),
-        ]
+        steps += [Load(blob), Choose(options)]
+        steps += [TareStep(as_float32(quiet * 10.0**e)), Play(as_float32(frames * 10.0**e))]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     per_row = np.ones(len(model.v_ref_v)) if data_kind == "normalised" else np.abs(model.v_ref_v)
-    data_off = (
-        12
-        * U
-        * float(np.linalg.norm(model.projection.astype(np.float64), 2))
-        * float(np.linalg.norm(per_row))
-    )
+    norm = float(np.linalg.norm(model.projection.astype(np.float64), 2))
+    data_off = 12 * U * norm * float(np.linalg.norm(per_row))
     points = [
         [reduced(model, blob, options, quiet * 10.0**e, frame * 10.0**e) for frame in frames]
         for e in exponents
     ]
+    what = f"y, frames in other volts, {data_kind}"
     for k, e in enumerate(exponents):
         for frame, one in enumerate(outcomes[2 * k : 2 * k + 2]):
-            assert one.status == 0
-            assert one.finite()
+            assert one.status == 0 and one.finite()
             assert len(one.touches) == len(outcomes[frame].touches)
             worst = (20 if e == -38 else 1) * data_off
             size = float(np.linalg.norm(points[0][frame]))
             off = float(np.linalg.norm(points[k][frame] - points[0][frame]))
-            margins.everywhere(
-                FRAMES_CASE,
-                f"y, frames in other volts, {data_kind}",
-                off / size,
-                2 * worst / size,
-                "|y|",
-            )
+            margins.everywhere(FRAMES_CASE, what, off / size, 2 * worst / size, "|y|")
             both = [
                 judged(model.sensitivity, points[j][frame], "increase", outcomes[2 * j + frame])
                 for j in (0, k)

@@ -18,9 +18,7 @@ from small_models import prebuilt, session
 def law(order: int = 2) -> LoadLaw:
     strength = np.array([0.0, 1.0, 2.5, 4.0], dtype=np.float32)
     load = np.array([0.0, 0.4, 1.2, 2.6], dtype=np.float32)
-    gain = np.resize(
-        np.array([1.0, 0.05, -0.1, 0.2, 0.03, 0.15], dtype=np.float32), len(terms_of(order))
-    )
+    gain = np.resize(np.float32([1.0, 0.05, -0.1, 0.2, 0.03, 0.15]), len(terms_of(order)))
     return LoadLaw(strength, load, gain, order, 97.0, 0.9, 0.03)
 
 
@@ -49,13 +47,13 @@ def test_touches_carry_the_load_of_strength_and_place(engine):
         one.tare(session().quiet_v)
     for frame in session().frames_v[:6]:
         touches, without = skin.reconstruct(frame).touches, bare.reconstruct(frame).touches
+        forces = [touch.force_n for touch in touches]
         assert touches == tuple(
-            replace(t, force_n=touches[k].force_n) for k, t in enumerate(without)
+            replace(touch, force_n=force) for touch, force in zip(without, forces, strict=True)
         )  # nothing else differs
         for touch in touches:
-            expected = law().forces_at(
-                np.array([(touch.x_mm, touch.y_mm)]), np.array([touch.strength_s_per_m_mm2])
-            )[0]
+            place, strength = [(touch.x_mm, touch.y_mm)], [touch.strength_s_per_m_mm2]
+            (expected,) = law().forces_at(np.array(place), np.array(strength))
             assert touch.force_n == pytest.approx(expected, rel=1e-5) and touch.force_n > 0
             seen += 1
         assert all(touch.force_n == 0 for touch in without)
@@ -66,7 +64,6 @@ WHOLE = encode_load(law())
 
 
 def changed(at: int, layout: str, value: float) -> bytes:
-    """The section with one number changed."""
     number = struct.pack(layout, value)
     return WHOLE[:at] + number + WHOLE[at + len(number) :]
 
@@ -86,16 +83,14 @@ WRONG = {
 
 @pytest.mark.parametrize("content", WRONG.values(), ids=WRONG)
 def test_both_readers_refuse_what_is_out_of_range(content, monkeypatch):
-    with pytest.raises(
-        ModelError, match=r"calibration \(section 'LOAD'\) that is out of range; calibrate again"
-    ):
+    said = r"calibration \(section 'LOAD'\) that is out of range; calibrate again"
+    with pytest.raises(ModelError, match=said):
         decode_load(content, "made")
     monkeypatch.setattr("eitskin.model.eitm_sections.encode_load", lambda _: content)
     blob = encode_model(replace(prebuilt()[0], load=law()))
-    with pytest.raises(ModelError):
-        decode_model(blob, "made")
-    with pytest.raises(ModelError):
-        CoreEngine(blob, "float32")
+    for read in (lambda: decode_model(blob, "made"), lambda: CoreEngine(blob, "float32")):
+        with pytest.raises(ModelError):
+            read()
 
 
 def test_what_no_reader_takes_is_not_written():

@@ -76,8 +76,7 @@ def damaged(tag: str) -> list[Any]:
     place, said = sections_of(blob)[tag], []
     for at in range(place.offset, place.offset + min(place.size, 48), 4):
         for value in NUMBERS:
-            other = bytearray(blob)
-            other[at : at + 4] = value
+            other = blob[:at] + value + blob[at + 4 :]
             said.append(words_of(sealed(other, rehash=tag in ("DIMS", "PROT"))))
     return said
 
@@ -96,9 +95,8 @@ def of_other_sizes() -> list[Any]:
         for tag in sections_of(blob):
             at = entry_place(blob, tag) + 8
             for change in (-4, 4):
-                other = bytearray(blob)
                 size = int.from_bytes(blob[at : at + 4], "little") + change
-                other[at : at + 4] = size.to_bytes(4, "little", signed=False)
+                other = blob[:at] + size.to_bytes(4, "little") + blob[at + 4 :]
                 said.append([tag, words_of(sealed(other))])
     return said
 

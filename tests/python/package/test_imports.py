@@ -38,7 +38,6 @@ ORDER = (
 
 
 def modules(package: str) -> dict[str, Path]:
-    """Every module below ``package`` by its dotted name."""
     found = {}
     for path in (PYTHON / package).rglob("*.py"):
         parts = path.relative_to(PYTHON).with_suffix("").parts

@@ -55,9 +55,8 @@ class Twins(Player):
         return c
 
     def drive(self, number: int, volts: np.ndarray, time_s: float) -> list[FastTouch]:
-        return self.both(
-            super().drive(number, volts, time_s), self.path.drive(number, volts, time_s)
-        )
+        drive = number, volts, time_s
+        return self.both(super().drive(*drive), self.path.drive(*drive))
 
     def aligned(self, frame: np.ndarray) -> AlignedFrame:
         c, numpy = super().aligned(frame), self.path.aligned(frame)
@@ -140,9 +139,8 @@ def test_a_press_that_lands_in_a_scan_spoils_only_that_frame(solved):
 
 
 def test_light_touches_come_from_whole_frames(solved):
-    outcomes = [
-        played(partial(fast_path._press, rise_s=0.0), solved["presses"], k, 40.0) for k in range(2)
-    ]
+    press = partial(fast_path._press, rise_s=0.0)
+    outcomes = [played(press, solved["presses"], k, 40.0) for k in range(2)]
     assert all(one.first[0] is not None and one.false == 0 for one in outcomes)
 
 
@@ -159,13 +157,14 @@ def test_what_is_not_a_drive_is_refused():
     fast = FastCore(engine)
     with pytest.raises(FrameError, match="no reference"):
         fast.begin()
-    quiet = load_prebuilt()[0].golden.reference_v + 1e-6 * np.random.default_rng(1).standard_normal(
-        (8, engine.n_rows)
-    )
+    noise = 1e-6 * np.random.default_rng(1).standard_normal((8, engine.n_rows))
+    quiet = load_prebuilt()[0].golden.reference_v + noise
     engine.set_reference(quiet)
     fast.begin()
-    for number, volts in ((0, np.zeros(12)), (16, np.zeros(13))):
+    for call in (
+        lambda: fast.drive(0, np.zeros(12), 0.0),
+        lambda: fast.drive(16, np.zeros(13), 0.0),
+        lambda: fast.aligned(np.zeros(7)),
+    ):
         with pytest.raises(FrameError, match="fast path"):
-            fast.drive(number, volts, 0.0)
-    with pytest.raises(FrameError, match="fast path"):
-        fast.aligned(np.zeros(7))
+            call()

@@ -9,6 +9,7 @@ import pytest
 from eitskin.model.build import BuildSettings, make_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
+from eitskin.model.reduction import fold_rows
 from eitskin_reference.disc_fit import Disc, Fit, Reduced, damped_step
 from eitskin_reference.engine import ReferenceEngine
 from eitskin_reference.fista import fista
@@ -30,17 +31,10 @@ def reference(model: Model, **options: object) -> ReferenceEngine:
 @pytest.mark.parametrize("sign", SIGNS)
 def test_shrink_minimises_its_objective(sign):
     """argmin over allowed x of (x - v)^2 / 2 + t |x|, by brute force on a fine grid."""
-    allowed = {
-        "increase": np.linspace(0, 4, 4001),
-        "decrease": np.linspace(-4, 0, 4001),
-        "both": np.linspace(-4, 4, 8001),
-    }
-    v = GENERATOR.uniform(-3, 3, 50)
-    best = [
-        allowed[sign][np.argmin(0.5 * (allowed[sign] - one) ** 2 + 0.7 * np.abs(allowed[sign]))]
-        for one in v
-    ]
-    assert shrink(v, 0.7, sign) == pytest.approx(np.array(best), abs=1e-3)
+    low, high = {"increase": (0, 4), "decrease": (-4, 0), "both": (-4, 4)}[sign]
+    allowed, v = np.linspace(low, high, 1000 * (high - low) + 1), GENERATOR.uniform(-3, 3, 50)
+    cost = 0.5 * (allowed - v[:, None]) ** 2 + 0.7 * np.abs(allowed)
+    assert shrink(v, 0.7, sign) == pytest.approx(allowed[cost.argmin(axis=1)], abs=1e-3)
 
 
 def test_greatest_is_the_lambda_at_which_zero_is_optimal():
@@ -51,9 +45,8 @@ def test_greatest_is_the_lambda_at_which_zero_is_optimal():
     y, basis, _ = reference(model).frame_stage(small().frames(2, 1)[0])
     top = greatest(model.sensitivity.T @ y, "increase")
     for share, zero in ((1.0001, True), (0.9999, False)):
-        x = fista(
-            model.sensitivity, y, share * top, model.lipschitz, default_options(model), basis
-        ).x
+        options = default_options(model)
+        x = fista(model.sensitivity, y, share * top, model.lipschitz, options, basis).x
         assert (not x.any()) == zero
 
 
@@ -90,11 +83,8 @@ def test_rows_left_out_are_whitened_anew(pairs):
     """What S sees, and the data that it is to meet, are those of the reduction by SVD of the rows
     that are left: S'S and S'y."""
     s, model = small(), small_model()
-    fold, lost = (
-        model.fold,
-        np.random.default_rng(pairs).choice(len(model.fold.first), pairs, replace=False),
-    )
-    damaged = s.frames(4, 1)[0]
+    fold, draw = model.fold, np.random.default_rng(pairs)
+    lost, damaged = draw.choice(len(fold.first), pairs, replace=False), s.frames(4, 1)[0]
     damaged[fold.first[lost]] = damaged[fold.second[lost]] = np.nan
     engine = reference(model, project_reference=False, diagnostics=0)
     y, basis, masked = engine.frame_stage(damaged)
@@ -125,9 +115,8 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise):
     regularisation."""
     s, frame = small(), small().frames(4, 1)[0]
     quiet = s.quiet(6, 8, noise=noise)
-    engine = reference(
-        small_model(), diagnostics=0
-    )  # of discs this strong some rows count as outliers
+    # of discs this strong some rows count as outliers
+    engine = reference(small_model(), diagnostics=0)
     learned = engine.set_reference(quiet)
     regularisation = min(5 * learned.noise_v / learned.v0_rms_v, 1.0)
     settings = BuildSettings(rank=37, regularisation=regularisation)
@@ -136,14 +125,12 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise):
     scale = (1 + regularisation) / 1.01
     y, expected = engine.frame_stage(frame)[0], other.frame_stage(frame)[0]
     assert engine.seen.T @ engine.seen == pytest.approx(scale * other.seen.T @ other.seen, abs=1e-5)
-    assert engine.seen.T @ y == pytest.approx(
-        scale * other.seen.T @ expected, abs=1e-5 * np.linalg.norm(y)
-    )
+    expected = scale * other.seen.T @ expected
+    assert engine.seen.T @ y == pytest.approx(expected, abs=1e-5 * np.linalg.norm(y))
     images = []
     for one in (engine, other):
-        one.set_options(
-            replace(one.options, solver="active-set", lambda_noise_factor=0.0, detection_factor=0.0)
-        )
+        exact = {"solver": "active-set", "lambda_noise_factor": 0.0, "detection_factor": 0.0}
+        one.set_options(replace(one.options, **exact))
         result = one.reconstruct(frame)
         assert result.info.regularisation == pytest.approx(regularisation, rel=1e-4)
         images.append(result.image)
@@ -155,9 +142,8 @@ def test_the_regularisation_stays_where_noise_is_little_or_unknown(quiet_frames)
     s = small()
     engine = reference(small_model(), diagnostics=0)
     engine.set_reference(s.quiet(6, quiet_frames, noise=1.5e-3 if quiet_frames > 1 else 0.1))
-    assert engine.reconstruct(s.frames(4, 1)[0]).info.regularisation == pytest.approx(
-        0.01, rel=1e-4
-    )
+    found = engine.reconstruct(s.frames(4, 1)[0]).info.regularisation
+    assert found == pytest.approx(0.01, rel=1e-4)
     assert engine.seen is small_model().sensitivity
 
 
@@ -170,9 +156,8 @@ def test_one_of_a_pair_stands_for_both():
     for side in (fold.first, fold.second):
         damaged = frame.copy()
         damaged[side[::2]] = np.nan
-        assert engine.frame_stage(damaged)[0] == pytest.approx(
-            whole, rel=1e-6, abs=1e-9 * np.abs(whole).max()
-        )
+        least = 1e-9 * np.abs(whole).max()
+        assert engine.frame_stage(damaged)[0] == pytest.approx(whole, rel=1e-6, abs=least)
 
 
 def test_lambda_noise_is_the_greatest_of_the_second_half():
@@ -186,11 +171,8 @@ def test_lambda_noise_is_the_greatest_of_the_second_half():
         probe.set_reference(quiet[:5].mean(axis=0)[None])
         direction = probe.frame_stage(quiet[k])[1]
         d = probe._gain * (quiet[k] - quiet[:k].mean(axis=0))
-        fold = model.fold
-        folded = 0.5 * (d[fold.first] + fold.sign * d[fold.second])
-        seen.append(
-            np.abs(model.sensitivity.T @ project(model.projection @ folded, direction)).max()
-        )
+        y = project(model.projection @ fold_rows(d, model.fold), direction)
+        seen.append(np.abs(model.sensitivity.T @ y).max())
     assert baseline.lambda_noise == pytest.approx(max(seen), rel=1e-9)
     assert baseline.noise_v == pytest.approx(quiet.std(axis=0, ddof=1).mean(), rel=0.1)
     assert baseline.frames == 10
@@ -202,10 +184,8 @@ def test_lambda_noise_is_the_greatest_of_the_second_half():
 
 def fit_of(model: Model, **options: object) -> Fit:
     chosen = replace(default_options(model), **options)
-    y = GENERATOR.normal(size=model.rank)
-    return Fit(
-        model, Reduced(y, None, model.sensitivity, np.zeros((0, model.rank)), 0.0, 0.0), chosen
-    )
+    y, none = GENERATOR.normal(size=model.rank), np.zeros((0, model.rank))
+    return Fit(model, Reduced(y, None, model.sensitivity, none, 0.0, 0.0), chosen)
 
 
 def test_a_discs_answer_is_that_of_the_pixels_it_covers():
@@ -213,9 +193,8 @@ def test_a_discs_answer_is_that_of_the_pixels_it_covers():
     fit = fit_of(model)
     disc = Disc(12.0, -20.0, 15.0, 1.0, 1.0)
     atom, _ = fit.answers(disc)
-    exact = model.sensitivity @ (
-        pixel_cover(model.grid, [(12.0, -20.0)], [15.0]) / model.column_weight
-    )
+    cover = pixel_cover(model.grid, [(12.0, -20.0)], [15.0])
+    exact = model.sensitivity @ (cover / model.column_weight)
     assert np.linalg.norm(atom - exact) < 0.05 * np.linalg.norm(exact)
 
 
@@ -226,12 +205,10 @@ def test_slopes_are_derivatives():
     _, slopes = fit.answers(disc)
     step = 1e-5
     for row, name in enumerate(("x_mm", "y_mm", "radius_mm")):
-        up, down = (
-            fit.answers(replace(disc, **{name: getattr(disc, name) + h}))[0] for h in (step, -step)
-        )
-        assert slopes[row] == pytest.approx(
-            (up - down) / (2 * step), rel=1e-4, abs=1e-6 * np.abs(slopes[row]).max()
-        )
+        near = (replace(disc, **{name: getattr(disc, name) + h}) for h in (step, -step))
+        up, down = (fit.answers(one)[0] for one in near)
+        least = 1e-6 * np.abs(slopes[row]).max()
+        assert slopes[row] == pytest.approx((up - down) / (2 * step), rel=1e-4, abs=least)
 
 
 def test_the_step_solves_the_damped_equations_and_leaves_what_nothing_moves():
@@ -246,10 +223,10 @@ def test_the_step_solves_the_damped_equations_and_leaves_what_nothing_moves():
 def test_expected_radius_from_strength():
     fit = fit_of(prebuilt()[0], touch_change_s_per_m=0.01)
     disc = Disc(0, 0, 10.0, 0.04, 1.0)
-    assert fit.expected_radius(disc) == pytest.approx(20.0)
-    assert fit.expected_radius(replace(disc, change=1.0)) == 30.0
-    assert fit.expected_radius(replace(disc, change=1e-6)) == 3.0
-    assert fit.expected_radius(replace(disc, change=-0.04, polarity=-1.0)) == pytest.approx(20.0)
+    free = pytest.approx(20.0)
+    for change, radius_mm in ((0.04, free), (1.0, 30.0), (1e-6, 3.0), (-0.04, free)):
+        one = replace(disc, change=change, polarity=float(np.sign(change)))
+        assert fit.expected_radius(one) == radius_mm
     assert fit_of(prebuilt()[0], touch_change_s_per_m=0.0).expected_radius(disc) == 9.0
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.model.build import BuildSettings, make_model
 from eitskin.model.model import Model
@@ -20,7 +20,6 @@ from same_results import check_same
 from small_models import prebuilt, sheet_without_mesh
 
 STORE = Path(__file__).with_suffix(".json")
-FloatArray = npt.NDArray[np.float64]
 TIMES = ("solve_us", "touch_us")
 
 

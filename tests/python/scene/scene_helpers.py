@@ -39,8 +39,6 @@ def moving_scene(frames: int = 8, **changes: Any) -> Scene:
 
 @dataclass(frozen=True)
 class Offset:
-    """Parameters of the effects made here."""
-
     offset_v: float = 0.001
 
 
@@ -58,19 +56,14 @@ def effect_module(
 
     module = ModuleType(f"effects_of_tests_{name}")
     vars(module).update(
-        NAME=name,
-        STAGE=stage,
-        ORDER=50,
-        SUMMARY="adds",
-        Parameters=Offset,
-        make=add_offset if make is None else make,
-    )
+        NAME=name, STAGE=stage, ORDER=50, SUMMARY="adds", Parameters=Offset,
+        make=make or add_offset,
+    )  # fmt: skip
     sys.modules[module.__name__] = module
     return module.__name__
 
 
 def scene_command(*arguments: str) -> int:
-    """``eitskin scene ARGUMENTS``; errors are raised."""
     parser = argparse.ArgumentParser()
     cmd_scene.add_options(parser)
     options = parser.parse_args(arguments)

@@ -38,9 +38,8 @@ def test_run_writes_frames_with_truth(scene, tmp_path, capsys):
     frames = load_frames(tmp_path / "f.npz")
     assert frames.n_frames == 3 and frames.truth_mask is not None and frames.touch_xy_mm is not None
     assert frames.meta["scene"] == TEXT
-    assert (
-        scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--truth-pixels", "0") == 0
-    )
+    again = scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--truth-pixels", "0")
+    assert again == 0
     assert "short: 3 frames after 2 quiet ones" in capsys.readouterr().out
     assert load_frames(tmp_path / "f.npz").truth_mask is None
 
@@ -59,20 +58,20 @@ def test_picture_is_a_picture(scene, tmp_path):
     assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_lists(capsys):
-    scene_command("list")
-    assert "pinch" in capsys.readouterr().out
-    scene_command("list", "--json")
-    assert "pinch" in json.loads(capsys.readouterr().out)
-    scene_command("effects", "--json")
-    assert json.loads(capsys.readouterr().out)["noise"]
-    scene_command("effects")
-    assert "gel_drying" in capsys.readouterr().out
-    scene_command("effects", "noise")
-    assert "snr_db" in capsys.readouterr().out
-    scene_command("effects", "noise", "--json")
-    found = {row["name"] for row in json.loads(capsys.readouterr().out)["parameters"]}
-    assert found == {"snr_db", "noise_v"}
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [("list", "pinch"), ("effects", "gel_drying"), ("effects noise", "snr_db")],
+)
+def test_lists(arguments, named, capsys):
+    for more in ([], ["--json"]):
+        scene_command(*arguments.split(), *more)
+        out = capsys.readouterr().out
+        assert named in out
+    content = json.loads(out)
+    if arguments == "effects noise":
+        assert {row["name"] for row in content["parameters"]} == {"snr_db", "noise_v"}
+    else:
+        assert content[named]
 
 
 def test_bad_input_is_refused_before_the_work(scene, tmp_path):
@@ -83,7 +82,6 @@ def test_bad_input_is_refused_before_the_work(scene, tmp_path):
     with pytest.raises(UsageError, match="pixels across"):
         scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--truth-pixels", "3")
     scene.write_text(TEXT.replace("snr_db", "snr"), encoding="utf-8")
-    with pytest.raises(
-        ConfigError, match=r"short.toml \[effects.noise\]: unknown key 'snr'; did you mean 'snr_db'"
-    ):
+    said = r"short.toml \[effects.noise\]: unknown key 'snr'; did you mean 'snr_db'"
+    with pytest.raises(ConfigError, match=said):
         scene_command("plan", str(scene))

@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -29,10 +30,11 @@ NEEDED: dict[str, dict[str, Any]] = {"noise": {"snr_db": 60.0}}
 def test_naming_an_effect_adds_exactly_one_step(name, mesh_cache):
     """The steps of the scene without it stay, in their order."""
     scene = moving_scene(4)
-    without = compile_scene(scene, mesh_cache=mesh_cache).plan.steps
-    named = compile_scene(
-        replace(scene, effects={name: NEEDED.get(name, {})}), mesh_cache=mesh_cache
-    ).plan.steps
+    effects: tuple[dict[str, Any], ...] = ({}, {name: NEEDED.get(name, {})})
+    without, named = (
+        compile_scene(replace(scene, effects=own), mesh_cache=mesh_cache).plan.steps
+        for own in effects
+    )
     assert len(named) == len(without) + 1
     assert [step.name for step in named if step.name != name] == [step.name for step in without]
     assert [step.name for step in named if step.effect] == [name]
@@ -41,9 +43,8 @@ def test_naming_an_effect_adds_exactly_one_step(name, mesh_cache):
 def test_frames_without_effects_are_the_forward_models_to_the_bit():
     for scene in (still_scene(), moving_scene(4, solver="factorise", frozen=True)):
         frames = run_scene(scene)
-        forward = ForwardModel(
-            mesh_for_elements(scene.skin, ELEMENTS), scene.skin, scene.protocol, 0.0
-        )
+        mesh = mesh_for_elements(scene.skin, ELEMENTS)
+        forward = ForwardModel(mesh, scene.skin, scene.protocol, 0.0)
         sheet = scene.skin.conductivity_s_per_m
         assert np.array_equal(frames.reference_voltage_v, np.tile(forward.voltages(sheet), (2, 1)))
         for k in range(scene.frames):
@@ -68,19 +69,11 @@ def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames():
     assert np.array_equal(simulate_frames(among).voltage_v, simulate_frames(alone).voltage_v)
 
 
-def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(
-    mesh_cache,
-):
+def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run():
     """V0 has patterns of its own; asking for it late does not disturb the scene's."""
 
     def make(parameters: Any, session: Any) -> VoltageStep:
-        return VoltageStep(
-            "late",
-            Stage.FRONT_END,
-            EffectCost(),
-            "",
-            lambda v, time_s, frame: v / session.v0_rms_v(),
-        )
+        return adding("late", lambda v: v / session.v0_rms_v())
 
     registry = Registry({**BUILT_IN, "late": effect_module("late", make)}, entry_points=False)
     effects: dict[str, Any] = {"bridged": {"electrodes": [2, 3]}, "gel_drying": {}}
@@ -89,6 +82,11 @@ def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(
     v0_v = run_scene(still_scene(1, touches=())).voltage_v[0]
     scaled = simulate_frames(with_late).voltage_v * np.sqrt(np.mean(v0_v**2))
     assert scaled == pytest.approx(plain, rel=1e-12)
+
+
+def adding(name: str, change: Callable[[Any], Any]) -> VoltageStep:
+    """A step of the front end."""
+    return VoltageStep(name, Stage.FRONT_END, EffectCost(), "", lambda v, time_s, frame: change(v))
 
 
 def test_update_and_factorisation_agree_to_1e_9(mesh_cache):
@@ -102,25 +100,22 @@ def test_update_and_factorisation_agree_to_1e_9(mesh_cache):
         {"detached": {"electrodes": [15]}},
         {"background": {}},
     ):
-        frames = {}
-        for solver in ("update", "factorise"):
-            compiled = compile_scene(
-                replace(around, effects=effects, solver=solver), mesh_cache=mesh_cache
-            )
+        done = {}
+        for solver, expected in (("update", 1), ("factorise", 17)):
+            scene = replace(around, effects=effects, solver=solver)
+            compiled = compile_scene(scene, mesh_cache=mesh_cache)
             assert compiled.method == solver
-            frames[solver] = simulate_frames(compiled)
-            assert frames[solver].work.factorisations == (
-                1 if solver == "update" else 17 - len(compiled.known)
-            )
-        largest = np.abs(frames["factorise"].voltage_v).max()
-        difference = np.abs(frames["update"].voltage_v - frames["factorise"].voltage_v).max()
-        assert difference < 1e-9 * largest, effects
+            done[solver] = simulate_frames(compiled)
+            known = len(compiled.known) if solver == "factorise" else 0
+            assert done[solver].work.factorisations == expected - known
+        v = done["factorise"].voltage_v
+        difference = np.abs(done["update"].voltage_v - v).max()
+        assert difference < 1e-9 * np.abs(v).max(), effects
 
 
 def test_the_way_with_fewer_multiplications_is_chosen(mesh_cache):
     many = compile_scene(moving_scene(60), mesh_cache=mesh_cache)
-    assert many.counted is not None
-    assert many.counted.update < many.counted.factorise
+    assert many.counted is not None and many.counted.update < many.counted.factorise
     assert many.method == "update"
     assert many.counted.update_solves == 16 + len(many.reach)
     done = simulate_frames(many)
@@ -138,12 +133,9 @@ def test_count_prefers_factorisations_where_few_states_touch_much():
 
 def test_the_plan_tells_what_the_run_then_does(mesh_cache):
     for effects in (
-        {},
-        {"noise": {"snr_db": 60.0}},
-        {"gel_drying": {}},
-        {"contact_impedance": {}},
+        {}, {"noise": {"snr_db": 60.0}}, {"gel_drying": {}}, {"contact_impedance": {}},
         {"phase": {}},
-    ):
+    ):  # fmt: skip
         for scene in (still_scene(5, effects=effects), moving_scene(5, effects=effects)):
             compiled = compile_scene(scene)
             done = simulate_frames(compiled)
@@ -175,42 +167,40 @@ def test_a_static_scene_of_a_thousand_frames_factorises_once_for_its_frames():
 
 
 def test_order_within_a_stage_is_that_of_order_then_name(mesh_cache):
-    scene = still_scene(
-        effects={"jitter": {}, "adc": {}, "noise": {"snr_db": 60.0}, "saturation": {}}
+    effects = {"jitter": {}, "adc": {}, "noise": {"snr_db": 60.0}, "saturation": {}}
+    names, turned = (
+        [
+            step.name
+            for step in compile_scene(scene, mesh_cache=mesh_cache).plan.steps
+            if step.effect
+        ]
+        for scene in (
+            still_scene(effects=effects),
+            still_scene(effects=dict(reversed(effects.items()))),
+        )
     )
-    names = [
-        step.name for step in compile_scene(scene, mesh_cache=mesh_cache).plan.steps if step.effect
-    ]
-    turned = replace(scene, effects=dict(reversed(scene.effects.items())))
-    assert names == [
-        step.name for step in compile_scene(turned, mesh_cache=mesh_cache).plan.steps if step.effect
-    ]
-    assert set(names[-1:]) == {"adc"}
+    assert names == turned and names[-1] == "adc"
 
 
 def test_contradictory_effects_are_refused(mesh_cache):
     name = effect_module("opposed")
     sys.modules[name].CONFLICTS = ("mains",)
     registry = Registry({**BUILT_IN, "opposed": name})
-    scene = still_scene(effects={"mains": {}, "opposed": {}}, where="f.toml")
-    with pytest.raises(
-        ConfigError, match=r"f.toml \[effects.opposed\]: it contradicts \[effects.mains\]"
-    ):
-        compile_scene(scene, registry=registry, mesh_cache=mesh_cache)
+    opposed = still_scene(effects={"mains": {}, "opposed": {}}, where="f.toml")
     varying = still_scene(effects={"gel_drying": {}}, solver="update", where="f.toml")
-    with pytest.raises(
-        ConfigError, match=r'f.toml \[scene\]: solver = "update" .* \[effects.gel_drying\]'
+    for scene, said in (
+        (opposed, r"f.toml \[effects.opposed\]: it contradicts \[effects.mains\]"),
+        (varying, r'f.toml \[scene\]: solver = "update" .* \[effects.gel_drying\]'),
     ):
-        compile_scene(varying, mesh_cache=mesh_cache)
+        with pytest.raises(ConfigError, match=said):
+            compile_scene(scene, registry=registry, mesh_cache=mesh_cache)
 
 
 def test_a_bridge_rescues_a_detached_electrode(mesh_cache):
     """Electrode 5 off, but joined to 6 by a wire: rows over both read 0, the others' rows are read
     through 6."""
-    effects = {
-        "detached": {"electrodes": [5]},
-        "bridged": {"electrodes": [5, 6], "resistance_ohm": 0.0},
-    }
+    off, bridge = {"electrodes": [5]}, {"electrodes": [5, 6], "resistance_ohm": 0.0}
+    effects = {"detached": off, "bridged": bridge}
     compiled = compile_scene(still_scene(effects=effects), mesh_cache=mesh_cache)
     v, rows = simulate_frames(compiled).voltage_v[-1], compiled.scene.protocol.drive_measure
     across = [set(row[2:]) == {5, 6} or set(row[:2]) == {5, 6} for row in rows.tolist()]
@@ -219,36 +209,24 @@ def test_a_bridge_rescues_a_detached_electrode(mesh_cache):
 
 
 def test_bad_steps_are_said_to_be_the_effects(mesh_cache):
-    def renamed(parameters: Any, session: Any) -> VoltageStep:
-        return VoltageStep("other", Stage.FRONT_END, EffectCost(), "", lambda v, time_s, frame: v)
-
     def negative(parameters: Any, session: Any) -> ContactStep:
         less = Contacts(np.full(16, -1.0), np.zeros(16, np.bool_))
         return ContactStep("negative", EffectCost(), "", lambda contacts, time_s, frame: less)
 
-    def endless(parameters: Any, session: Any) -> VoltageStep:
-        return VoltageStep(
-            "endless", Stage.FRONT_END, EffectCost(), "", lambda v, time_s, frame: v * np.inf
-        )
-
     modules = {
-        "renamed": effect_module("renamed", renamed),
-        "endless": effect_module("endless", endless),
+        "renamed": effect_module("renamed", lambda *_: adding("other", lambda v: v)),
+        "endless": effect_module("endless", lambda *_: adding("endless", lambda v: v * np.inf)),
+        "negative": effect_module("negative", negative, Stage.BOUNDARY),
     }
-    modules["negative"] = effect_module("negative", negative, Stage.BOUNDARY)
     registry = Registry(modules, entry_points=False)
     for name, said in (
-        ("renamed", "another name or stage"),
-        ("negative", "negative or not finite"),
+        ("renamed", r"scene \[effects.renamed\]: .*another name or stage"),
+        ("negative", r"scene \[effects.negative\]: .*negative or not finite"),
+        ("endless", "frame -2, row 0 is -?inf.*endless"),
     ):
-        with pytest.raises(ConfigError, match=rf"scene \[effects.{name}\]: .*{said}"):
-            compile_scene(still_scene(effects={name: {}}), registry=registry, mesh_cache=mesh_cache)
-    with pytest.raises(ConfigError, match=r"frame -2, row 0 is -?inf.*endless"):
-        simulate_frames(
-            compile_scene(
-                still_scene(effects={"endless": {}}), registry=registry, mesh_cache=mesh_cache
-            )
-        )
+        scene = still_scene(effects={name: {}})
+        with pytest.raises(ConfigError, match=said):
+            simulate_frames(compile_scene(scene, registry=registry, mesh_cache=mesh_cache))
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,6 @@ from eitskin_studies.datasets.ranges import drawn, ranges_of
 
 
 def dataset_command(*arguments: str) -> int:
-    """``eitskin dataset ARGUMENTS``; errors are raised."""
     parser = argparse.ArgumentParser()
     cmd_dataset.add_parser(parser.add_subparsers())
     options = parser.parse_args(["dataset", *arguments])
@@ -37,9 +36,8 @@ def dataset_command(*arguments: str) -> int:
 
 
 def small_job(count: int = 7, seed: int = 3, chunk: int = 3) -> Job:
-    return job_of(
-        replace(find_scene("random_touches"), elements=ELEMENTS), count, seed, chunk=chunk
-    )
+    scene = replace(find_scene("random_touches"), elements=ELEMENTS)
+    return job_of(scene, count, seed, chunk=chunk)
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -103,13 +101,10 @@ def test_a_scene_of_a_dataset_is_the_scene_run_alone(tmp_path):
     alone = drawn(job.scene, job.ranges, job.seed, 4)
     frames = frames_of(chunk, 1)
     assert np.array_equal(frames.voltage_v, simulate_frames(compile_scene(alone)).voltage_v[1:])
-    assert frames.touch_xy_mm is not None and frames.touch_strength is not None
-    assert frames.touch_xy_mm.tolist() == [
-        [t.keyframes[0].x_mm, t.keyframes[0].y_mm] for t in alone.touches
-    ]
-    assert frames.touch_strength == pytest.approx(
-        [t.law.contrast_at(np.ones(1))[0] - 1 for t in alone.touches]
-    )
+    places = [[t.keyframes[0].x_mm, t.keyframes[0].y_mm] for t in alone.touches]
+    strengths = [t.law.contrast_at(np.ones(1))[0] - 1 for t in alone.touches]
+    assert frames.touch_xy_mm.tolist() == places
+    assert frames.touch_strength == pytest.approx(strengths)
     assert chunk["range_name"].tolist() == ["effects.noise.snr_db"]
     assert chunk["range_value"][1, 0] == alone.effects["noise"]["snr_db"]
     with pytest.raises(UsageError, match="counted from 0"):
@@ -119,9 +114,8 @@ def test_a_scene_of_a_dataset_is_the_scene_run_alone(tmp_path):
 def test_ranges_are_kept_and_independent_of_each_other():
     scene = still_scene(effects={"adc": {"bits": 12}, "mains": {}})
     touch = {"0": {"radius_mm": [6.0, 9.0], "x_mm": [-40, 40]}}
-    ranges = ranges_of(
-        {"ranges": {"effects": {"adc": {"bits": [8, 14]}}, "touch": touch}}, scene, "f"
-    )
+    table = {"ranges": {"effects": {"adc": {"bits": [8, 14]}}, "touch": touch}}
+    ranges = ranges_of(table, scene, "f")
     found = [drawn(scene, ranges, 5, k) for k in range(60)]
     bits = {one.effects["adc"]["bits"] for one in found}
     radii = [one.touches[0].keyframes[0].radius_mm for one in found]
@@ -161,31 +155,27 @@ def test_bad_ranges_name_file_table_and_key(table, said):
 
 def test_bad_datasets_are_refused(tmp_path):
     scene = replace(find_scene("random_touches"), elements=ELEMENTS)
-    for change, said in (
-        ({"count": 0}, "--count 0"),
-        ({"seed": -1}, "--seed -1"),
-        ({"chunk": 0}, "--chunk 0"),
-    ):
-        with pytest.raises(UsageError, match=said):
-            job_of(scene, **{"count": 1, "seed": 1, **change})
-    with pytest.raises(ConfigError, match="nothing is drawn"):
-        job_of(still_scene(), 2, 1)
-    bad = still_scene(
-        effects={"mains": {}}, dataset={"ranges": {"effects": {"mains": {"amplitude": [0, 1]}}}}
-    )
-    with pytest.raises(ConfigError, match="unknown key 'amplitude'; did you mean 'amplitude_v'"):
-        job_of(bad, 2, 1)
-    outside = still_scene(dataset={"ranges": {"touch": {"0": {"x_mm": [200, 300]}}}})
-    with pytest.raises(ConfigError, match=r"dataset scene 0 \(from 0\): .* outside the skin"):
-        job_of(outside, 2, 1)
-    with pytest.raises(UsageError, match="--jobs 0"):
-        write_dataset(small_job(), tmp_path / "d", jobs=0)
     (tmp_path / "c.npz").write_bytes(b"no")
-    with pytest.raises(FileError):
-        load_chunk(tmp_path / "c.npz")
     (tmp_path / "r.toml").write_text("[other]\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"r.toml: a ranges file holds the table \[dataset\]"):
-        job_of(scene, 1, 1, ranges_file=tmp_path / "r.toml")
+    unknown = {"ranges": {"effects": {"mains": {"amplitude": [0, 1]}}}}
+    bad = still_scene(effects={"mains": {}}, dataset=unknown)
+    outside = still_scene(dataset={"ranges": {"touch": {"0": {"x_mm": [200, 300]}}}})
+    for make, error, said in (
+        (lambda: job_of(scene, 0, 1), UsageError, "--count 0"),
+        (lambda: job_of(scene, 1, -1), UsageError, "--seed -1"),
+        (lambda: job_of(scene, 1, 1, chunk=0), UsageError, "--chunk 0"),
+        (lambda: job_of(still_scene(), 2, 1), ConfigError, "nothing is drawn"),
+        (lambda: job_of(bad, 2, 1), ConfigError,
+         "unknown key 'amplitude'; did you mean 'amplitude_v'"),
+        (lambda: job_of(outside, 2, 1), ConfigError,
+         r"dataset scene 0 \(from 0\): .* outside the skin"),
+        (lambda: job_of(scene, 1, 1, ranges_file=tmp_path / "r.toml"), ConfigError,
+         r"r.toml: a ranges file holds the table \[dataset\]"),
+        (lambda: write_dataset(small_job(), tmp_path / "d", jobs=0), UsageError, "--jobs 0"),
+        (lambda: load_chunk(tmp_path / "c.npz"), FileError, None),
+    ):  # fmt: skip
+        with pytest.raises(error, match=said):
+            make()
 
 
 def test_without_dask_a_scheduler_asks_for_the_extra(tmp_path, monkeypatch):
@@ -213,9 +203,8 @@ def test_a_dask_cluster_gives_the_same_bytes(tmp_path):
 def test_the_command_takes_ranges_from_a_file_and_resumes(tmp_path, capsys):
     scene = tmp_path / "s.toml"
     touch = "[[touch]]\nradius_mm = 9\nx_mm = 10\ny_mm = 20\n"
-    scene.write_text(
-        f'[scene]\nname = "s"\nquiet_frames = 1\nelements = {ELEMENTS}\n{touch}', encoding="utf-8"
-    )
+    head = f'[scene]\nname = "s"\nquiet_frames = 1\nelements = {ELEMENTS}\n'
+    scene.write_text(head + touch, encoding="utf-8")
     ranges = tmp_path / "r.toml"
     ranges.write_text("[dataset.ranges.touch.0]\nx_mm = [-40.0, 40.0]\n", encoding="utf-8")
     command = [str(scene), "--ranges", str(ranges), "--count", "5", "--chunk", "2"]
@@ -225,9 +214,8 @@ def test_the_command_takes_ranges_from_a_file_and_resumes(tmp_path, capsys):
     chunk_path(tmp_path / "d", 1).unlink()
     assert dataset_command(*command, "--jobs", "2") == 0
     assert "2 scenes in 1 chunks, 2 chunks were there already" in capsys.readouterr().out
-    x = np.concatenate(
-        [load_chunk(chunk_path(tmp_path / "d", k))["touch_xy_mm"][:, 0] for k in range(3)]
-    )
+    chunks = (load_chunk(chunk_path(tmp_path / "d", k)) for k in range(3))
+    x = np.concatenate([chunk["touch_xy_mm"][:, 0] for chunk in chunks])
     assert len(set(x.tolist())) == 5 and np.abs(x).max() <= 40
     with pytest.raises(UsageError, match="give one of them"):
         dataset_command(*command, "--jobs", "2", "--scheduler", "tcp://h:1")

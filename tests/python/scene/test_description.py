@@ -35,9 +35,8 @@ def test_a_touch_comes_moves_and_goes(tmp_path):
 
 
 def test_hold_keeps_a_touch_and_standing_touches_need_no_path(tmp_path):
-    held = load_scene(
-        written(tmp_path, HEAD + TOUCH.replace("radius_mm", "hold = true\nradius_mm"))
-    )
+    touch = TOUCH.replace("radius_mm", "hold = true\nradius_mm")
+    held = load_scene(written(tmp_path, HEAD + touch))
     assert held.samples()[0].there[39] and held.samples()[0].x_mm[39] == 30.0
     text = HEAD + "[[touch]]\nradius_mm = 8\nx_mm = 1\ny_mm = 2\n"
     assert load_scene(written(tmp_path, text)).samples()[0].there.all()
@@ -63,59 +62,50 @@ def test_load_is_nearly_linear_and_saturates():
     assert change[3] == pytest.approx(10.0)
 
 
+def head(old: str, new: str) -> str:
+    return HEAD.replace(old, new)
+
+
+def touch(old: str, new: str) -> str:
+    return HEAD + TOUCH.replace(old, new)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (
-            HEAD.replace("frames = 40", "frams = 40"),
-            r"\[scene\]: unknown key 'frams'; did you mean 'frames'",
-        ),
-        (HEAD.replace("frames = 40", "frames = 0"), r"\[scene\]: frames = 0 is out of range"),
+        (head("frames = 40", "frams = 40"),
+         r"\[scene\]: unknown key 'frams'; did you mean 'frames'"),
+        (head("frames = 40", "frames = 0"), r"\[scene\]: frames = 0 is out of range"),
         (HEAD + "[touche]\n", "unknown key 'touche'; did you mean 'touch'"),
         (HEAD + "[touch]\nradius_mm = 8\n", r"two brackets"),
         (HEAD + "effects = 3\n", r"\[scene\]: unknown key 'effects'"),
-        (
-            HEAD + "[effects]\nnoise = 3\n",
-            r"\[effects\]: noise = 3 must be a table: write \[effects.noise\]",
-        ),
+        (HEAD + "[effects]\nnoise = 3\n",
+         r"\[effects\]: noise = 3 must be a table: write \[effects.noise\]"),
         (HEAD + 'skin = "nowhere.toml"\n', r"skin = 'nowhere.toml' is neither"),
         (HEAD + 'solver = "magic"\n', r"solver = 'magic' is not known"),
-        (
-            HEAD + TOUCH.replace("8.0", "0"),
-            r"\[\[touch\]\] 0 .* path 0 \(from 0\): radius_mm = 0 is out of range",
-        ),
-        (HEAD + TOUCH.replace("8.0", "-2"), "radius_mm = -2 is out of range"),
-        (
-            HEAD + TOUCH.replace("x_mm = 30", "x_mm = 92"),
-            r"\[\[touch\]\] 0 \(from 0\): at 1.5 s x_mm = 92.* outside",
-        ),
-        (
-            HEAD + TOUCH + TOUCH,
-            r"\[\[touch\]\] 1 \(from 0\): it overlaps touch 0 by 16 mm at 0.5 s",
-        ),
-        (
-            HEAD + TOUCH.replace("t_s = 1.5", "t_s = 0.5"),
-            r"path 1 \(from 0\): t_s = 0.5 is not after 0.5",
-        ),
+        (touch("8.0", "0"),
+         r"\[\[touch\]\] 0 .* path 0 \(from 0\): radius_mm = 0 is out of range"),
+        (touch("8.0", "-2"), "radius_mm = -2 is out of range"),
+        (touch("x_mm = 30", "x_mm = 92"),
+         r"\[\[touch\]\] 0 \(from 0\): at 1.5 s x_mm = 92.* outside"),
+        (HEAD + TOUCH + TOUCH,
+         r"\[\[touch\]\] 1 \(from 0\): it overlaps touch 0 by 16 mm at 0.5 s"),
+        (touch("t_s = 1.5", "t_s = 0.5"), r"path 1 \(from 0\): t_s = 0.5 is not after 0.5"),
         (HEAD + TOUCH + "contrast = -1\n", "contrast = -1 is out of range; it must be above 0"),
         (HEAD + TOUCH + "contrast = 0\n", "contrast = 0 is out of range"),
         (HEAD + TOUCH + "grams = 5\n", 'grams goes with law = "piezoresistive"'),
-        (
-            HEAD + TOUCH + 'law = "piezo"\n',
-            "law = 'piezo' is not known; did you mean 'piezoresistive'",
-        ),
-        (
-            HEAD + TOUCH + 'law = "piezoresistive"\n',
-            r"path 0 \(from 0\): the key 'grams' is required",
-        ),
+        (HEAD + TOUCH + 'law = "piezo"\n',
+         "law = 'piezo' is not known; did you mean 'piezoresistive'"),
+        (HEAD + TOUCH + 'law = "piezoresistive"\n',
+         r"path 0 \(from 0\): the key 'grams' is required"),
         (HEAD + TOUCH + "x_mm = 5\n", "x_mm beside path"),
-        (HEAD + TOUCH.replace("y_mm = 10", 'y_mm = "10"'), "y_mm must be a number"),
-        (HEAD + TOUCH.replace("radius_mm = 8.0\n", ""), "the key 'radius_mm' is required"),
+        (touch("y_mm = 10", 'y_mm = "10"'), "y_mm must be a number"),
+        (touch("radius_mm = 8.0\n", ""), "the key 'radius_mm' is required"),
         (HEAD + "[[touch]]\nradius_mm = 8\nx_mm = nan\ny_mm = 0\n", "x_mm = nan is out of range"),
         (HEAD + "[[touch]]\nradius_mm = 8\npath = []\n", "path must be a list of keyframes"),
         ("[scene\n", "not valid TOML"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_is_refused_in_one_line_naming_file_table_and_key(tmp_path, text, said):
     path = written(tmp_path, text)
     with pytest.raises(EitskinError, match=said) as caught:
@@ -123,15 +113,18 @@ def test_what_cannot_be_is_refused_in_one_line_naming_file_table_and_key(tmp_pat
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
-def test_scenes_made_in_python_are_checked_too():
-    with pytest.raises(ConfigError, match="outside"):
-        Scene("s", touches=(always(95, 0, 8),))
-    with pytest.raises(ConfigError, match="radius_mm must be above 0"):
-        Scene("s", touches=(always(0, 0, 0),))
-    with pytest.raises(ConfigError, match="contrast must be above 0"):
-        Scene("s", touches=(always(0, 0, 8, ShortCircuit(-1.0)),))
-    with pytest.raises(ConfigError, match="seed = -1"):
-        Scene("s", seed=-1)
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"touches": (always(95, 0, 8),)}, "outside"),
+        ({"touches": (always(0, 0, 0),)}, "radius_mm must be above 0"),
+        ({"touches": (always(0, 0, 8, ShortCircuit(-1.0)),)}, "contrast must be above 0"),
+        ({"seed": -1}, "seed = -1"),
+    ],
+)
+def test_scenes_made_in_python_are_checked_too(given, said):
+    with pytest.raises(ConfigError, match=said):
+        Scene("s", **given)
 
 
 def test_a_skin_file_beside_the_scene_is_found(tmp_path):

@@ -77,18 +77,16 @@ def test_an_infinite_number_is_refused_where_a_range_has_no_end():
 
 def test_parameters_describe_themselves():
     rows = {row["name"]: row for row in describe_parameters(MODULE)}
-    gain = {
+    assert rows["gain"] == {
         "name": "gain", "type": "float", "default": 1.0, "low": 0, "high": 2, "unit": "V",
         "doc": "a number",
     }  # fmt: skip
-    assert rows["gain"] == gain
     assert rows["kind"]["choices"] == ("slow", "fast")
 
 
 def test_an_unknown_effect_names_the_nearest():
-    with pytest.raises(
-        ConfigError, match=r"f.toml \[effects.nosie\]: unknown effect 'nosie'; did you mean 'noise'"
-    ):
+    said = r"f.toml \[effects.nosie\]: unknown effect 'nosie'; did you mean 'noise'"
+    with pytest.raises(ConfigError, match=said):
         Registry().load("nosie", "f.toml")
 
 
@@ -107,9 +105,10 @@ def test_a_package_adds_an_effect_by_an_entry_point(monkeypatch):
 def test_modules_that_break_the_contract_are_refused():
     name = effect_module("broken")
     del sys.modules[name].SUMMARY
-    with pytest.raises(ConfigError, match=r"\[effects.broken\]: its module defines no SUMMARY"):
-        Registry({"broken": name}).load("broken", "f")
-    with pytest.raises(ConfigError, match="NAME must be 'alias'"):
-        Registry({"alias": effect_module("other")}).load("alias", "f")
-    with pytest.raises(ConfigError, match="cannot be imported"):
-        Registry({"gone": "no_such_module_at_all"}).load("gone", "f")
+    for names, said in (
+        ({"broken": name}, r"\[effects.broken\]: its module defines no SUMMARY"),
+        ({"alias": effect_module("other")}, "NAME must be 'alias'"),
+        ({"gone": "no_such_module_at_all"}, "cannot be imported"),
+    ):
+        with pytest.raises(ConfigError, match=said):
+            Registry(names).load(*names, "f")

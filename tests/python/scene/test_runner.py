@@ -25,14 +25,10 @@ def test_frames_carry_the_truth_and_survive_their_file(tmp_path):
     assert np.array_equal(again.voltage_v, frames.voltage_v)
     assert again.reference_voltage_v.shape == (2, 208)
     assert again.time_s is not None and again.time_s[5] == 0.25
-    assert again.touch_frame is not None
-    assert again.touch_xy_mm is not None
-    assert again.touch_strength is not None
     assert again.touch_frame.tolist() == list(range(6))
     assert again.touch_strength.tolist() == [8.0] * 6
     assert again.touch_xy_mm[0].tolist() == [-80.0, 0.0]
     assert again.touch_xy_mm[5] == pytest.approx([60.0, 30.0])
-    assert again.truth_mask is not None and again.truth_conductivity_s_per_m is not None
     area = (again.truth_mask == 1).sum(axis=(1, 2)) * (194 / 32) ** 2
     assert area == pytest.approx(np.full(6, 314.0), rel=0.45)
     inside = again.truth_conductivity_s_per_m[again.truth_mask == 1]
@@ -55,9 +51,8 @@ def test_adding_an_effect_leaves_the_others_samples_as_they_were(added, mesh_cac
         return generator
 
     monkeypatch.setattr(session, "stream", watched)
-    effects = {name: {} for name in RANDOM if name not in (added, "noise")} | {
-        "noise": {"snr_db": 60.0}
-    }
+    names = set(RANDOM) - {added, "noise"}
+    effects = {**{name: {} for name in sorted(names)}, "noise": {"snr_db": 60.0}}
     steps, states = [], []
     for own in (effects, {added: {}, **effects}):
         drawn.clear()
@@ -99,37 +94,27 @@ def test_arithmetic_is_complex_only_with_phase(mesh_cache, monkeypatch):
 
     monkeypatch.setattr(cem, "factorise", watched)
     monkeypatch.setattr(forward_steps, "factorise", watched)
-    everything = {name: {} for name in BUILT_IN if name not in ("phase", "noise")} | {
-        "noise": {"snr_db": 60.0}
-    }
+    everything = {name: {} for name in BUILT_IN if name != "phase"} | {"noise": {"snr_db": 60.0}}
     for scene in (moving_scene(3), still_scene(3, effects=everything)):
         done = simulate_frames(compile_scene(scene))
         assert done.work.complex_factorisations == 0 and done.true_v.dtype == np.float64
     assert set(seen) == {np.dtype(np.float64)}
     seen.clear()
-    done = simulate_frames(
-        compile_scene(still_scene(3, effects={"phase": {}}), mesh_cache=mesh_cache)
-    )
+    with_phase = still_scene(3, effects={"phase": {}})
+    done = simulate_frames(compile_scene(with_phase, mesh_cache=mesh_cache))
     assert set(seen) == {np.dtype(np.complex128)} and done.work.complex_factorisations == 2
     assert done.true_v.dtype == np.complex128 and done.voltage_v.dtype == np.float64
 
 
 def test_a_conductivity_that_cannot_be_names_effect_and_time(mesh_cache):
-    def make(parameters: Any, session: Any) -> MaterialStep:
-        return MaterialStep(
-            "sinking",
-            EffectCost(),
-            "",
-            lambda c, time_s, frame: c - 0.08 * max(time_s + 0.1, 0.0),
-            True,
-        )
+    def sinking(c: Any, time_s: float, frame: int) -> Any:
+        return c - 0.08 * max(time_s + 0.1, 0.0)
 
-    registry = Registry(
-        {"sinking": effect_module("sinking", make, Stage.MATERIAL)}, entry_points=False
-    )
+    step = MaterialStep("sinking", EffectCost(), "", sinking, True)
+    module = effect_module("sinking", lambda *_: step, Stage.MATERIAL)
+    registry = Registry({"sinking": module}, entry_points=False)
     scene = still_scene(4, effects={"sinking": {}}, where="f.toml")
-    with pytest.raises(
-        ConfigError,
-        match=r"f.toml \[effects.sinking\]: at 0.05 s it makes a conductivity of -0.002",
-    ):
-        simulate_frames(compile_scene(scene, registry=registry, mesh_cache=mesh_cache))
+    compiled = compile_scene(scene, registry=registry, mesh_cache=mesh_cache)
+    said = r"f.toml \[effects.sinking\]: at 0.05 s it makes a conductivity of -0.002"
+    with pytest.raises(ConfigError, match=said):
+        simulate_frames(compiled)

@@ -1,6 +1,7 @@
 """Simulated sessions: areas, noise, converter, and the independence of their sources."""
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -34,15 +35,19 @@ def session(mesh) -> Simulated:
     return simulate(SKIN, PROTOCOL, TOUCHES, mesh=mesh)
 
 
+def scenes_of(*touches: tuple[TrueTouch, ...]) -> TouchSet:
+    scenes = tuple(TouchScene(str(k), each) for k, each in enumerate(touches))
+    return TouchSet("made", 0, scenes)
+
+
 @pytest.mark.parametrize(
     "touch", [TrueTouch(0, 0, 9, 5), TrueTouch(40.3, -51.7, 6, 3), TrueTouch(2, 80, 12, 8)]
 )
 def test_a_touch_covers_its_area(mesh, touch):
     elements, part = element_cover(mesh, touch)
     assert part.min() > 0 and 0.5 < part.max() <= 1.0
-    assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(
-        math.pi * touch.radius_mm**2, rel=0.01
-    )
+    covered_mm2 = (part * mesh.areas_mm2[elements]).sum()
+    assert covered_mm2 == pytest.approx(math.pi * touch.radius_mm**2, rel=0.01)
 
 
 def test_a_touch_smaller_than_an_element_is_not_lost(mesh):
@@ -63,9 +68,7 @@ def test_conductivity_is_the_mean_over_the_element(mesh):
 
 
 def test_a_touch_without_contrast_changes_nothing(mesh):
-    touches = TouchSet(
-        "none", 0, (TouchScene("same", (TrueTouch(10, 10, 9, 1.0),)), TouchScene("empty", ()))
-    )
+    touches = scenes_of((TrueTouch(10, 10, 9, 1.0),), ())
     clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
     assert np.abs(clean.differences_v()).max() < 1e-12 * np.abs(clean.exact_quiet_v).max()
     assert (clean.noise_v, clean.lsb_v, clean.clipped) == (0.0, 0.0, 0)
@@ -75,18 +78,10 @@ def test_a_touch_without_contrast_changes_nothing(mesh):
 def test_conductive_touches_lower_the_voltages_that_drive(mesh):
     """The power that a current source puts in falls when conductivity rises; adjacent rows sum to a
     drop across."""
-    touches = TouchSet(
-        "one",
-        0,
-        (
-            TouchScene("one", (TrueTouch(0, 60, 10, 8.0),)),
-            TouchScene("hole", (TrueTouch(0, 60, 10, 0.1),)),
-        ),
-    )
+    touches = scenes_of((TrueTouch(0, 60, 10, 8.0),), (TrueTouch(0, 60, 10, 0.1),))
     clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
-    across = np.array(
-        [np.abs(v.reshape(16, 13).sum(axis=1)).sum() for v in (clean.exact_quiet_v, *clean.exact_v)]
-    )
+    v = np.array([clean.exact_quiet_v, *clean.exact_v])
+    across = np.abs(v.reshape(-1, 16, 13).sum(axis=2)).sum(axis=1)
     assert across[1] < across[0] < across[2]
 
 
@@ -107,20 +102,16 @@ def test_converter_steps_are_whole_and_as_stated(session):
     steps = session.frames_v / session.lsb_v
     assert np.abs(steps - np.round(steps)).max() < 1e-6
     assert session.clipped == 0
-    assert (
-        np.abs(session.quiet_v - session.exact_quiet_v).max() < 5 * session.noise_v + session.lsb_v
-    )
+    off = np.abs(session.quiet_v - session.exact_quiet_v).max()
+    assert off < 5 * session.noise_v + session.lsb_v
 
 
 def test_a_small_converter_clips_and_says_so(mesh):
     how = replace(CLEAN, adc_bits=12, adc_headroom=0.5)
     tight = simulate(SKIN, PROTOCOL, TOUCHES, measurement=how, mesh=mesh)
     span = 0.5 * np.abs(tight.exact_quiet_v).max()
-    beyond = [
-        np.count_nonzero(np.abs(v) > span)
-        for v in (*tight.exact_v, tight.exact_quiet_v, tight.exact_quiet_v)
-    ]
-    assert tight.clipped == sum(beyond) > 0
+    seen = (*tight.exact_v, tight.exact_quiet_v, tight.exact_quiet_v)
+    assert tight.clipped == np.count_nonzero(np.abs(seen) > span) > 0
     assert tight.frames_v.min() >= -span and tight.frames_v.max() < span
 
 
@@ -142,12 +133,9 @@ def test_sources_do_not_disturb_each_other(session, mesh):
         return np.asarray((one.frames_v - one.exact_v) / one.noise_v)
 
     analog = replace(session.measurement, adc_bits=None)
-    with_contacts = simulate(SKIN, PROTOCOL, TOUCHES, measurement=analog, mesh=mesh)
-    without = simulate(
-        SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, contact_spread=0.0), mesh=mesh
-    )
-    louder = simulate(
-        SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, snr_db=40.0, quiet_frames=3), mesh=mesh
+    with_contacts, without, louder = (
+        simulate(SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, **changes), mesh=mesh)
+        for changes in ({}, {"contact_spread": 0.0}, {"snr_db": 40.0, "quiet_frames": 3})
     )
     assert noise_of(without) == pytest.approx(noise_of(with_contacts), abs=1e-6)
     assert noise_of(louder) == pytest.approx(noise_of(with_contacts), abs=1e-6)
@@ -167,9 +155,8 @@ def test_training_and_test_share_nothing(session, mesh):
 
 def test_reference_is_the_mean_quiet_frame(session):
     assert session.quiet_v.shape == (64, 208)
-    assert session.differences_v() == pytest.approx(
-        session.frames_v - session.quiet_v.sum(axis=0) / 64
-    )
+    quiet_v = session.quiet_v.sum(axis=0) / 64
+    assert session.differences_v() == pytest.approx(session.frames_v - quiet_v)
 
 
 def test_as_frames_carries_the_truth(session):
@@ -177,12 +164,8 @@ def test_as_frames_carries_the_truth(session):
     assert (frames.voltage_v == session.frames_v).all()
     assert frames.reference_voltage_v.shape == (64, 208)
     assert frames.frame_name[1] == "test-s5-1"
-    assert frames.touch_frame is not None
-    assert frames.touch_strength is not None
-    assert frames.touch_xy_mm is not None
-    assert frames.touch_frame.tolist() == [
-        k for k, s in enumerate(TOUCHES.scenes) for _ in s.touches
-    ]
+    of = [k for k, s in enumerate(TOUCHES.scenes) for _ in s.touches]
+    assert frames.touch_frame.tolist() == of
     first = TOUCHES.scenes[0].touches[0]
     assert frames.touch_strength[0] == first.contrast - 1
     assert frames.touch_xy_mm[0].tolist() == [first.x_mm, first.y_mm]
@@ -191,7 +174,7 @@ def test_as_frames_carries_the_truth(session):
 def test_progress_sees_every_scene(mesh):
     seen: list[TouchScene] = []
 
-    def watch(scenes: object) -> object:
+    def watch(scenes: Iterable[TouchScene]) -> Iterator[TouchScene]:
         for scene in scenes:
             seen.append(scene)
             yield scene
@@ -200,8 +183,7 @@ def test_progress_sees_every_scene(mesh):
     assert tuple(seen) == TOUCHES.scenes
 
 
-def test_impossible_measurements_are_refused():
-    with pytest.raises(UsageError, match="contact_spread"):
-        Measurement(contact_spread=1.0)
-    with pytest.raises(UsageError, match="adc_bits"):
-        Measurement(adc_bits=0)
+@pytest.mark.parametrize("given", [{"contact_spread": 1.0}, {"adc_bits": 0}])
+def test_impossible_measurements_are_refused(given):
+    with pytest.raises(UsageError, match=next(iter(given))):
+        Measurement(**given)

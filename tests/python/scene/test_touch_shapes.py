@@ -67,7 +67,6 @@ def test_frames_of_a_finger_carry_its_truth_and_the_plan_names_its_shape():
     scene = _scene({"x_mm": 10.0, "y_mm": 5.0, "radius_mm": 12.0, "shape": "finger", "aspect": 2.0})
     assert "shapes: hertz" in compile_scene(scene).plan.text()
     frames = run_scene(scene)
-    assert frames.touch_xy_mm is not None and frames.truth_mask is not None
     assert frames.touch_xy_mm.tolist() == [[10.0, 5.0]]
     columns, rows = (np.flatnonzero(frames.truth_mask[0].any(axis=axis)) for axis in (0, 1))
     assert np.ptp(columns) > 1.6 * np.ptp(rows)
@@ -110,7 +109,7 @@ def test_press_and_conduct_adds_contact_to_the_loads_own_change():
 def test_an_insulating_touch_is_resistive():
     scene = _scene({"x_mm": 0.0, "y_mm": 0.0, "radius_mm": 10.0, "law": "insulating"})
     frames = run_scene(scene)
-    assert frames.touch_sign is not None and frames.touch_sign.tolist() == [-1]
+    assert frames.touch_sign.tolist() == [-1]
 
 
 def test_a_sudden_change_costs_one_state_and_leaves_the_quiet_frames():
@@ -136,9 +135,8 @@ def test_a_slow_change_grows_until_it_is_whole():
 def test_contacts_change_after_the_tare_only_where_the_scene_says_so():
     table = {"mean_ohm_m2": 0.01, "spread": 0.2}
     stays = compile_scene(still_scene(4, touches=(), effects={"contact_impedance": table}))
-    changes = compile_scene(
-        still_scene(4, touches=(), effects={"contact_impedance": {**table, "change": 0.3}})
-    )
+    table = {**table, "change": 0.3}
+    changes = compile_scene(still_scene(4, touches=(), effects={"contact_impedance": table}))
     assert (len(stays.states), len(changes.states)) == (1, 2)
     first, second = (state.contacts.impedance_ohm_m2 for state in changes.states)
     assert np.array_equal(first, stays.states[0].contacts.impedance_ohm_m2)

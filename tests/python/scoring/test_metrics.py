@@ -55,11 +55,10 @@ def test_raster_has_the_area_of_the_skin_and_stays_inside():
     assert len(metrics.raster_inside(SQUARE, 3.0).points_mm) == 100
 
 
-def test_bad_rasters_are_refused():
-    with pytest.raises(UsageError, match="above 0"):
-        metrics.raster_inside(SQUARE, 0.0)
-    with pytest.raises(UsageError, match="no cell inside"):
-        metrics.raster_inside(SQUARE, 100.0)
+@pytest.mark.parametrize(("spacing_mm", "said"), [(0.0, "above 0"), (100.0, "no cell inside")])
+def test_bad_rasters_are_refused(spacing_mm, said):
+    with pytest.raises(UsageError, match=said):
+        metrics.raster_inside(SQUARE, spacing_mm)
 
 
 def test_mask_lookup_keeps_the_lowest_row_below():
@@ -75,10 +74,8 @@ def test_nearest_lookup_shows_the_containing_pixel_or_the_next_at_the_rim():
     lookup = metrics.lookup_for(raster.points_mm, grid, "nearest")
     assert lookup.pixel.shape == (len(raster.points_mm), 1) and (lookup.weight == 1).all()
     containing = grid.locate(raster.points_mm)
-    at_edge = (
-        np.abs((raster.points_mm - grid.origin_mm) / grid.pixel_mm % 1 - 0.5).max(axis=1)
-        > 0.5 - 1e-9
-    )
+    within = (raster.points_mm - grid.origin_mm) / grid.pixel_mm % 1  # of a pixel
+    at_edge = np.abs(within - 0.5).max(axis=1) > 0.5 - 1e-9
     clear = (containing >= 0) & ~at_edge
     assert np.count_nonzero(clear) > 0.9 * len(clear)
     assert (lookup.pixel[clear, 0] == containing[clear]).all()
@@ -124,9 +121,8 @@ def test_curves_equal_masks_on_the_raster(lookup):
     images[5] = -np.abs(images[5])
     images[6] = 0.0
     centres = generator.uniform(-20, 20, size=(7, 2))
-    truths = np.stack(
-        [metrics.disc_mask(image_scorer.raster.points_mm, [c], [6.0]) for c in centres]
-    )
+    points = image_scorer.raster.points_mm
+    truths = np.stack([metrics.disc_mask(points, [c], [6.0]) for c in centres])
     truths[4] = False
     thresholds = [0.0, 0.3, 0.8, 1.0]
     for sign in (1, -1):
@@ -144,9 +140,8 @@ def test_nearest_curve_is_the_pixel_mask_spread_over_cells():
     image = np.random.default_rng(2).uniform(size=36)
     truth = metrics.disc_mask(image_scorer.raster.points_mm, [[12, 17]], [6])
     mask = metrics.touch_mask(image, 0.6)[image_scorer.lookup.pixel[:, 0]]
-    assert miou_curves(image_scorer, image[None], truth[None], [0.6])[0, 0] == pytest.approx(
-        metrics.miou(mask, truth)
-    )
+    found = miou_curves(image_scorer, image[None], truth[None], [0.6])[0, 0]
+    assert found == pytest.approx(metrics.miou(mask, truth))
 
 
 def test_pixel_cover_is_exact_in_area():
@@ -179,19 +174,18 @@ def test_a_perfect_image_is_limited_by_its_pixels_only():
 def test_curves_refuse_what_they_cannot_judge():
     image_scorer = metrics.judge_for(SQUARE, grid_for(SQUARE, 6))
     truths = np.zeros((2, len(image_scorer.raster.points_mm)), dtype=bool)
-    with pytest.raises(UsageError, match=r"\(2, 36\)"):
-        miou_curves(image_scorer, np.zeros((2, 35)), truths)
-    with pytest.raises(UsageError, match="ascend"):
-        miou_curves(image_scorer, np.zeros((2, 36)), truths, [0.5, 0.4])
     broken = np.zeros((2, 36))
     broken[1, 3] = np.nan
-    with pytest.raises(UsageError, match="image 1"):
-        miou_curves(image_scorer, broken, truths)
+    for images, thresholds, said in (
+        (np.zeros((2, 35)), [0.5], r"\(2, 36\)"),
+        (np.zeros((2, 36)), [0.5, 0.4], "ascend"),
+        (broken, [0.5], "image 1"),
+    ):
+        with pytest.raises(UsageError, match=said):
+            miou_curves(image_scorer, images, truths, thresholds)
 
 
 def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals():
     curves = np.array([[0.2, 0.9, 0.5, 0.5], [0.2, 0.1, 0.6, 0.6]])
     assert best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
-    assert THRESHOLDS[0] == 0.02
-    assert THRESHOLDS[-1] == 0.98
-    assert len(THRESHOLDS) == 49
+    assert (THRESHOLDS[0], THRESHOLDS[-1], len(THRESHOLDS)) == (0.02, 0.98, 49)

@@ -24,23 +24,15 @@ SOLVED = Solved(
 
 def touches(*places: tuple[float, float], status: int = 0, time_us: int = 1000) -> LiveFrame:
     found = tuple(Touch(k + 1, x, y, 8.0, 3.0, 0.5) for k, (x, y) in enumerate(places))
-    return LiveFrame(
-        7,
-        0,
-        time_us,
-        touches=SolvedTouches(replace(SOLVED, status=status, count=len(found)), found),
-    )
+    solved = replace(SOLVED, status=status, count=len(found))
+    return LiveFrame(7, 0, time_us, touches=SolvedTouches(solved, found))
 
 
 def image(*places: tuple[float, float], sign: float = 1.0) -> LiveFrame:
-    """An image with a disc at each place."""
     centres = prebuilt()[0].grid.centres_mm()
-    values = sum(
-        (np.linalg.norm(centres - place, axis=1) < 10 for place in places), np.zeros(len(centres))
-    )
-    return LiveFrame(
-        7, 0, 1000, image=SolvedImage(SOLVED, (0.01 * sign * values).astype(np.float32))
-    )
+    near = (np.linalg.norm(centres - place, axis=1) < 10 for place in places)
+    values = (0.01 * sign * sum(near, np.zeros(len(centres)))).astype(np.float32)
+    return LiveFrame(7, 0, 1000, image=SolvedImage(SOLVED, values))
 
 
 def watcher(scene: str = "two_touch", sign: str = "increase") -> Watcher:
@@ -63,10 +55,8 @@ def test_touches_are_paired_with_the_true_ones():
         "frames": 1, "true": 2, "found": 2, "false": 1, "position_median_mm": pytest.approx(2.0),
         "position_worst_mm": pytest.approx(3.0),
     }  # fmt: skip
-    assert (
-        "2 of 2 touches found, 1 false; position error median 2.00 mm, worst 3.00 mm"
-        in look.score.text()
-    )
+    said = "2 of 2 touches found, 1 false; position error median 2.00 mm, worst 3.00 mm"
+    assert said in look.score.text()
 
 
 def test_nothing_found_is_no_error_of_zero():
@@ -102,35 +92,26 @@ def test_a_refused_frame_says_why_and_is_not_scored():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_an_image_in_brief(sign):
-    seen = Watcher(KnownModel(*prebuilt()), None).see(
-        image((-40.0, 10.0), (30.0, -25.0), sign=sign)
-    )
-    assert seen.view is not None and seen.view.places_mm is not None
-    distance = np.linalg.norm(
-        seen.view.places_mm[:, None] - np.array([(-40.0, 10.0), (30.0, -25.0)]), axis=2
-    )
+    places, look = [(-40.0, 10.0), (30.0, -25.0)], Watcher(KnownModel(*prebuilt()), None)
+    seen = look.see(image(*places, sign=sign))
+    distance = np.linalg.norm(seen.view.places_mm[:, None] - np.array(places), axis=2)
     assert (distance.min(axis=0) < 3).all() and len(distance) == 2
     assert seen.view.peak == pytest.approx(0.01 * sign) and seen.errors_mm is None
     assert "off by" not in line(seen)
-    assert Watcher(KnownModel(*prebuilt()), None).see(image()).view is not None
-    assert " s  image: flat; 60 iterations" in line(
-        Watcher(KnownModel(*prebuilt()), None).see(image())
-    )
+    flat = look.see(image())
+    assert flat.view is not None and " s  image: flat; 60 iterations" in line(flat)
 
 
 def test_raw_rows_that_are_missing_become_null():
     volts = np.linspace(1, 2, 5).astype(np.float32)
     volts[2] = np.nan
     quality = np.array([0, 0, Quality.OPEN | Quality.SATURATED, Quality.COPIED, 0], dtype=np.uint8)
-    seen = Watcher(None, None).see(
-        LiveFrame(3, 250_000, 9, raw=RawFrame(3, 9, 20_800, 0, volts, quality))
-    )
+    raw = RawFrame(3, 9, 20_800, 0, volts, quality)
+    seen = Watcher(None, None).see(LiveFrame(3, 250_000, 9, raw=raw))
     facts = json.loads(json.dumps(Frame(seen.frame, seen).message(), allow_nan=False))
-    assert facts["voltage_v"][2] is None
-    assert facts["voltage_v"][0] == 1.0
+    assert facts["voltage_v"][2] is None and facts["voltage_v"][0] == 1.0
     assert facts["time_s"] == 0.25
-    assert "5 rows in 20.80 ms" in line(seen)
-    assert "1 not usable" in line(seen)
+    assert "5 rows in 20.80 ms" in line(seen) and "1 not usable" in line(seen)
     assert "nan" not in line(seen)
 
 

@@ -34,14 +34,12 @@ BOX = '<rect id="skin" x="10" y="10" width="60" height="40"/>'
 
 
 def svg(folder: Path, body: str, head: str = MM) -> Path:
-    """A drawing."""
     path = folder / "a.svg"
     path.write_text(HEAD.format(head, body), encoding="utf-8")
     return path
 
 
 def outline(path: Path, element: str | None = None, **reading: float) -> Outline:
-    """The outline in a drawing."""
     return read_drawing(path, DrawingReading(**reading)).outline(element)
 
 
@@ -58,16 +56,14 @@ def described(
 
 
 def assert_centres(skin: Skin, wanted: list[tuple[float, float]]) -> None:
-    """Where the electrodes are, mm."""
     np.testing.assert_allclose(skin.electrode_centres_mm(), wanted, atol=1e-4)
 
 
 def test_y_goes_up_from_the_lower_edge_of_the_page(tmp_path):
     assert outline(svg(tmp_path, BOX)).bounding_box_mm == pytest.approx((10, 30, 70, 70), abs=1e-4)
     shifted = 'width="50mm" height="40mm" viewBox="10 20 100 80"'
-    assert outline(svg(tmp_path, BOX, shifted)).bounding_box_mm == pytest.approx(
-        (0, 25, 30, 45), abs=1e-4
-    )
+    shape = outline(svg(tmp_path, BOX, shifted))
+    assert shape.bounding_box_mm == pytest.approx((0, 25, 30, 45), abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -159,27 +155,28 @@ def test_marks_without_numbers_lie_along_the_rim(tmp_path):
     assert_centres(skin, [(70, 50), (40, 30), (10, 50), (40, 70)])
 
 
-def test_points_and_fractions(tmp_path):
-    skin = described(
-        tmp_path, BOX, electrodes="points_mm = [[40, 72], [8, 50], [40, 29], [70, 50]]"
-    )
-    assert_centres(skin, [(40, 70), (10, 50), (40, 30), (70, 50)])
-    skin = described(
-        tmp_path, BOX, electrodes="fractions = [0.0, 0.25, 0.5, 0.75]\nstart_angle_deg = 90"
-    )
-    assert_centres(skin, [(40, 70), (10, 50), (40, 30), (70, 50)])
+@pytest.mark.parametrize(
+    ("electrodes", "wanted"),
+    [
+        ("points_mm = [[40, 72], [8, 50], [40, 29], [70, 50]]",
+         [(40, 70), (10, 50), (40, 30), (70, 50)]),
+        ("fractions = [0.0, 0.25, 0.5, 0.75]\nstart_angle_deg = 90",
+         [(40, 70), (10, 50), (40, 30), (70, 50)]),
+    ],
+    ids=["points", "fractions"],
+)  # fmt: skip
+def test_places_on_a_drawings_rim(tmp_path, electrodes, wanted):
+    assert_centres(described(tmp_path, BOX, electrodes=electrodes), wanted)
+
+
+def test_points_on_a_disks_rim(tmp_path):
     path = tmp_path / "disk.toml"
-    path.write_text(
-        "[skin]\ndiameter_mm = 100\n[electrodes]\npoints_mm = [[0, 52], [-50, 0], [0, -50], [49,"
-        " 0]]\n"
-    )
-    np.testing.assert_allclose(
-        load_skin(path)[0].electrode_centres_mm(), [(0, 50), (-50, 0), (0, -50), (50, 0)], atol=1e-9
-    )
+    points = "[[0, 52], [-50, 0], [0, -50], [49, 0]]"
+    path.write_text(f"[skin]\ndiameter_mm = 100\n[electrodes]\npoints_mm = {points}\n")
+    assert_centres(load_skin(path)[0], [(0, 50), (-50, 0), (0, -50), (50, 0)])
 
 
 def dxf(folder: Path, units: int = 4) -> tuple[ezdxf.document.Drawing, Path]:
-    """An empty drawing and where it is to be saved."""
     document = ezdxf.new("R2000", units=units)
     return document, folder / "a.dxf"
 
@@ -214,10 +211,8 @@ def test_dxf_pieces_blocks_and_layers(tmp_path):
     assert shape.area_mm2 == pytest.approx(6000 + math.pi * 900, rel=2e-3)
     assert shape.bounding_box_mm == pytest.approx((-25, 7, 135, 67), abs=0.1)
     assert len(drawing.marked("contacts")) == 4
-    with pytest.raises(
-        GeometryError,
-        match=r"2 closed outlines; name one with element = \.\.\.; names in it are: notes, rim",
-    ):
+    said = r"2 closed outlines; name one with element = \.\.\.; names in it are: notes, rim"
+    with pytest.raises(GeometryError, match=said):
         drawing.outline()
 
 
@@ -260,15 +255,7 @@ def test_dxf_pieces_blocks_and_layers(tmp_path):
         ("<g>" * 2000 + "</g>" * 2000, "", "", MM, ConfigError, "within each other, over 100 deep"),
     ],
 )  # fmt: skip
-def test_refused(
-    tmp_path,
-    body,
-    skin,
-    electrodes,
-    head,
-    error,
-    message,
-):
+def test_refused(tmp_path, body, skin, electrodes, head, error, message):
     with pytest.raises(error, match=message) as caught:
         described(tmp_path, body, skin, electrodes, head)
     text = str(caught.value)
@@ -323,22 +310,19 @@ def test_examples_are_what_the_script_draws(tmp_path):
 
 
 def test_drawings_give_the_shapes_that_they_were_drawn_from():
-    hand, _ = load_skin(EXAMPLES / "hand.toml")
-    assert hand.outline.area_mm2 == pytest.approx(as_outline(hand_corners()).area_mm2, rel=1e-3)
-    np.testing.assert_allclose(hand.electrode_centres_mm(), hand_places_mm(), atol=0.3)
-    forearm, _ = load_skin(EXAMPLES / "forearm.toml")
-    assert forearm.outline.area_mm2 == pytest.approx(
-        as_outline(forearm_corners()).area_mm2, rel=1e-3
-    )
+    for name, corners in (("hand", hand_corners()), ("forearm", forearm_corners())):
+        skin, _ = load_skin(EXAMPLES / f"{name}.toml")
+        assert skin.outline.area_mm2 == pytest.approx(as_outline(corners).area_mm2, rel=1e-3)
+        if name == "hand":
+            np.testing.assert_allclose(skin.electrode_centres_mm(), hand_places_mm(), atol=0.3)
     with pytest.raises(GeometryError, match="the side after corner 0"):
         as_outline([Corner(0, 0, 9), Corner(10, 0, 9), Corner(10, 10, 9), Corner(0, 10, 9)])
 
 
 def test_a_model_does_not_need_the_drawing(tmp_path):
     skin = described(tmp_path, BOX)
-    model = build_model(
-        skin, adjacent(8), BuildSettings(rank=5, pixels_across=8, elements=300, samples=0)
-    )
+    settings = BuildSettings(rank=5, pixels_across=8, elements=300, samples=0)
+    model = build_model(skin, adjacent(8), settings)
     (tmp_path / "a.svg").unlink()
     assert decode_model(encode_model(model), "model").skin == skin
 

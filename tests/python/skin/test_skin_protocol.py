@@ -48,16 +48,12 @@ def test_adjacent_is_kit4s_table(shared_data):
 
 
 def test_opposite_and_skip():
-    across = opposite(16)
-    assert across.n_rows == 16 * 12
-    assert across.drive_measure[0].tolist() == [0, 8, 1, 2]
+    across, third = opposite(16), skip(16, 2)
+    assert across.n_rows == 16 * 12 and across.drive_measure[0].tolist() == [0, 8, 1, 2]
     folded = across.reciprocal_pairs()
-    assert len(folded.first) == 96
-    assert (folded.sign == -1).all()
+    assert len(folded.first) == 96 and (folded.sign == -1).all()
     assert np.array_equal(skip(16, 0).drive_measure, adjacent(16).drive_measure)
-    third = skip(16, 2)
-    assert third.drive_measure[0].tolist() == [0, 3, 1, 4]
-    assert third.n_rows == 208
+    assert third.drive_measure[0].tolist() == [0, 3, 1, 4] and third.n_rows == 208
     assert len(third.reciprocal_pairs().first) == 104
 
 
@@ -119,14 +115,9 @@ def test_hash_is_fnv_1a_of_the_documented_bytes():
 
 def test_reciprocity_with_flips():
     rows = [
-        [0, 1, 4, 5],
-        [5, 4, 0, 1],
-        [7, 6, 2, 3],
-        [2, 3, 7, 6],
-        [8, 9, 10, 11],
-        [1, 2, 6, 5],
+        [0, 1, 4, 5], [5, 4, 0, 1], [7, 6, 2, 3], [2, 3, 7, 6], [8, 9, 10, 11], [1, 2, 6, 5],
         [2, 1, 6, 5],
-    ]
+    ]  # fmt: skip
     pairs = table(16, rows).reciprocal_pairs()
     assert pairs.first.tolist() == [0, 2, 4, 5]
     assert pairs.second.tolist() == [1, 3, -1, 6]

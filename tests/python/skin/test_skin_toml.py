@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eitskin.errors import ConfigError, GeometryError, ProtocolError
+from eitskin.errors import ConfigError, EitskinError, GeometryError, ProtocolError
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.protocol import adjacent, opposite
@@ -46,25 +46,19 @@ def test_kit4_angles(shared_data):
 
 
 def test_positions_along_the_rim():
-    skin = Skin(
-        "r",
-        RECTANGLE,
-        Electrodes(4, 5, start_angle_deg=270, positions_mm=(0.0, 50.0, 150.0, 350.0)),
-    )
-    np.testing.assert_allclose(
-        skin.electrode_centres_mm(), [(100, 0), (150, 0), (200, 50), (50, 100)]
-    )
-    skin = Skin("r", RECTANGLE, Electrodes(4, 5, 270, True, (0.0, 50.0, 150.0, 350.0)))
-    np.testing.assert_allclose(
-        skin.electrode_centres_mm(), [(100, 0), (50, 0), (0, 50), (150, 100)]
-    )
+    places = (0.0, 50.0, 150.0, 350.0)
+    for clockwise, centres in (
+        (False, [(100, 0), (150, 0), (200, 50), (50, 100)]),
+        (True, [(100, 0), (50, 0), (0, 50), (150, 100)]),
+    ):
+        skin = Skin("r", RECTANGLE, Electrodes(4, 5, 270, clockwise, places))
+        np.testing.assert_allclose(skin.electrode_centres_mm(), centres)
 
 
 def test_evenly_by_arc_length_on_a_polygon():
     skin = Skin("r", RECTANGLE, Electrodes(12, 5, start_angle_deg=0))
-    np.testing.assert_allclose(
-        skin.electrode_centres_mm()[:4], [(200, 50), (200, 100), (150, 100), (100, 100)]
-    )
+    first = [(200, 50), (200, 100), (150, 100), (100, 100)]
+    np.testing.assert_allclose(skin.electrode_centres_mm()[:4], first)
     spans = skin.electrode_spans_mm()
     assert sorted(np.round(np.diff(np.sort(spans[:, 0])), 9).tolist()) == [50.0] * 11
 
@@ -139,9 +133,7 @@ def _write(folder: Path, text: str) -> Path:
 
 
 def test_load_the_documented_file(tmp_path):
-    path = _write(
-        tmp_path,
-        """
+    text = """
 [skin]
 name = "paper"
 diameter_mm = 194.0
@@ -156,91 +148,71 @@ contact_impedance_ohm_m2 = 0.01
 [protocol]
 kind = "adjacent"
 current_a = 0.001
-""",
-    )
-    skin, protocol = load_skin(path)
+"""
+    skin, protocol = load_skin(_write(tmp_path, text))
     assert skin == paper_skin()
-    assert protocol.hash == adjacent(16).hash
-    assert protocol.current_a == 1e-3
+    assert protocol.hash == adjacent(16).hash and protocol.current_a == 1e-3
 
 
 def test_load_with_defaults_and_a_polygon(tmp_path):
-    path = _write(
-        tmp_path,
-        """
-[skin]
-polygon_mm = [[0, 0], [0, 100], [200, 100], [200, 0]]
-[protocol]
-kind = "opposite"
-current_a = 0.002
-""",
-    )
-    skin, protocol = load_skin(path)
+    outline = "[skin]\npolygon_mm = [[0, 0], [0, 100], [200, 100], [200, 0]]\n"
+    scan = '[protocol]\nkind = "opposite"\ncurrent_a = 0.002\n'
+    skin, protocol = load_skin(_write(tmp_path, outline + scan))
     assert skin.electrodes == Electrodes()
     assert skin.outline.area_mm2 == pytest.approx(20000)
-    assert protocol.hash == opposite(16).hash
-    assert protocol.current_a == 0.002
+    assert protocol.hash == opposite(16).hash and protocol.current_a == 0.002
 
 
 DISK = "[skin]\ndiameter_mm = 194\n"
 
 
+CROSSED = "polygon_mm = [[0, 0], [5, 5], [5, 0], [0, 5]]"
+REFUSED: dict[type[EitskinError], dict[str, str]] = {
+    ConfigError: {
+        "[skin]\ndiametre_mm = 3\n": (
+            r"\[skin\]: unknown key 'diametre_mm'; did you mean 'diameter_mm'"
+        ),
+        DISK + "[electrode]\n": "unknown key 'electrode'; did you mean 'electrodes'",
+        DISK + "[electrodes]\nwidth = 3\n": "did you mean 'width_mm'",
+        DISK + "[protocol]\nknd = 'adjacent'\n": "did you mean 'kind'",
+        DISK + "[protocol]\nkind = 'adjacant'\n": "did you mean 'adjacent'",
+        DISK + "[electrodes]\ndirection = 'left'\n": "direction = 'left' is not known",
+        "[skin]\ndiameter_mm = '194'\n": "diameter_mm must be a number",
+        "[skin]\ndiameter_mm = -1\n": "out of range",
+        DISK + "thickness_mm = 0\n": "thickness_mm = 0 is out of range",
+        DISK + "name = 3\n": "name must be a word",
+        "[skin]\nname = 'x'\n": "either diameter_mm or polygon_mm",
+        DISK + "polygon_mm = []\n": "either diameter_mm or polygon_mm",
+        "[skin]\npolygon_mm = 3\n": "must be a list",
+        "[skin]\npolygon_mm = [[0, 0], [1]]\n": r"entry 1 \(from 0\)",
+        DISK + "[electrodes]\ncount = 16.5\n": "whole number",
+        DISK + "[electrodes]\npositions_mm = [1, 'a']\n": "list of numbers",
+        DISK + "[protocol]\nkind = 'skip'\n": "'skip' is required",
+        DISK + "[protocol]\nskip = 2\n": 'skip goes with kind = "skip"',
+        DISK + "[protocol]\nkind = 'table'\n": "needs table =",
+        DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2]]\n": "row 0",
+        DISK + "[protocol]\ncurrent_a = 0\n": "current_a = 0 is out of range",
+        "skin = 3\n": r"a table \[skin\] is needed",
+        "": r"a table \[skin\] is needed",
+        "[skin\n": "not valid TOML",
+    },
+    GeometryError: {
+        f"[skin]\n{CROSSED}\n": r"skin\.toml: outline: it crosses",
+        "[skin]\ndiameter_mm = 20\n": r"skin\.toml: skin 'skin': 16 electrodes .* do not fit",
+        DISK + "[electrodes]\npositions_mm = [1, 2]\n": "2 entries for 16",
+    },
+    ProtocolError: {
+        DISK + "[protocol]\nkind = 'skip'\nskip = 9\n": r"\[protocol\].*use 0 to 6",
+        DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2, 16]]\n": "0 to 15",
+    },
+}
+
+
 @pytest.mark.parametrize(
-    ("text", "error", "message"),
-    [
-        (
-            "[skin]\ndiametre_mm = 3\n",
-            ConfigError,
-            r"\[skin\]: unknown key 'diametre_mm'; did you mean 'diameter_mm'",
-        ),
-        (DISK + "[electrode]\n", ConfigError, "unknown key 'electrode'; did you mean 'electrodes'"),
-        (DISK + "[electrodes]\nwidth = 3\n", ConfigError, "did you mean 'width_mm'"),
-        (DISK + "[protocol]\nknd = 'adjacent'\n", ConfigError, "did you mean 'kind'"),
-        (DISK + "[protocol]\nkind = 'adjacant'\n", ConfigError, "did you mean 'adjacent'"),
-        (
-            DISK + "[electrodes]\ndirection = 'left'\n",
-            ConfigError,
-            "direction = 'left' is not known",
-        ),
-        ("[skin]\ndiameter_mm = '194'\n", ConfigError, "diameter_mm must be a number"),
-        ("[skin]\ndiameter_mm = -1\n", ConfigError, "out of range"),
-        (DISK + "thickness_mm = 0\n", ConfigError, "thickness_mm = 0 is out of range"),
-        (DISK + "name = 3\n", ConfigError, "name must be a word"),
-        ("[skin]\nname = 'x'\n", ConfigError, "either diameter_mm or polygon_mm"),
-        (DISK + "polygon_mm = []\n", ConfigError, "either diameter_mm or polygon_mm"),
-        ("[skin]\npolygon_mm = 3\n", ConfigError, "must be a list"),
-        ("[skin]\npolygon_mm = [[0, 0], [1]]\n", ConfigError, r"entry 1 \(from 0\)"),
-        (
-            "[skin]\npolygon_mm = [[0, 0], [5, 5], [5, 0], [0, 5]]\n",
-            GeometryError,
-            r"skin\.toml: outline: it crosses",
-        ),
-        (
-            "[skin]\ndiameter_mm = 20\n",
-            GeometryError,
-            r"skin\.toml: skin 'skin': 16 electrodes .* do not fit",
-        ),
-        (DISK + "[electrodes]\ncount = 16.5\n", ConfigError, "whole number"),
-        (DISK + "[electrodes]\npositions_mm = [1, 'a']\n", ConfigError, "list of numbers"),
-        (DISK + "[electrodes]\npositions_mm = [1, 2]\n", GeometryError, "2 entries for 16"),
-        (DISK + "[protocol]\nkind = 'skip'\n", ConfigError, "'skip' is required"),
-        (DISK + "[protocol]\nskip = 2\n", ConfigError, 'skip goes with kind = "skip"'),
-        (
-            DISK + "[protocol]\nkind = 'skip'\nskip = 9\n",
-            ProtocolError,
-            r"\[protocol\].*use 0 to 6",
-        ),
-        (DISK + "[protocol]\nkind = 'table'\n", ConfigError, "needs table ="),
-        (DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2]]\n", ConfigError, "row 0"),
-        (DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2, 16]]\n", ProtocolError, "0 to 15"),
-        (DISK + "[protocol]\ncurrent_a = 0\n", ConfigError, "current_a = 0 is out of range"),
-        ("skin = 3\n", ConfigError, r"a table \[skin\] is needed"),
-        ("", ConfigError, r"a table \[skin\] is needed"),
-        ("[skin\n", ConfigError, "not valid TOML"),
-    ],
+    ("error", "text", "message"),
+    [(error, *case) for error, cases in REFUSED.items() for case in cases.items()],
 )
 def test_refused_files(tmp_path, text, error, message):
     with pytest.raises(error, match=message) as caught:
         load_skin(_write(tmp_path, text))
-    assert "\n" not in str(caught.value)
-    assert "skin.toml" in str(caught.value)
+    assert "\n" not in str(caught.value) and "skin.toml" in str(caught.value)

@@ -51,10 +51,8 @@ def test_the_same_as_one_after_another(engine, threads):
         assert one.coefficients.tobytes() == other.coefficients.tobytes()
         assert one.touches == other.touches  # ids too
         assert one.info == other.info
-    assert (
-        sum(len(result.touches) for result in results if isinstance(result, Reconstruction))
-        > COUNT // 2
-    )
+    touches = sum(len(one.touches) for one in results if isinstance(one, Reconstruction))
+    assert touches > COUNT // 2
 
 
 def test_a_second_batch_and_no_touches():
@@ -84,10 +82,8 @@ def test_options_masks_and_engines_reach_every_thread():
 def test_reconstruct_many_names_the_frame():
     frames, quiet = small().frames(45, 5), small().quiet(42, 8)
     results = reconstruct_many(small_model(), frames, quiet, threads=2)
-    expected = [
-        r.info.macs for r in one_by_one("c", frames, quiet) if isinstance(r, Reconstruction)
-    ]
-    assert [r.info.macs for r in results] == expected
+    expected = one_by_one("c", frames, quiet)
+    assert [one.info.macs for one in results] == [one.info.macs for one in expected]
     frames[4] = np.nan
     with pytest.raises(FrameError, match=r"^frame 4 \(from 0\): "):
         reconstruct_many(small_model(), frames, quiet, threads=2)
@@ -97,11 +93,8 @@ def test_c_runs_without_pythons_lock():
     """While one thread is in C, this one counts: it would stand still for as long if the lock were
     held."""
     frames, quiet = small().frames(46, 4), small().quiet(42, 8)
-    batch = Batch(
-        small_model(),
-        threads=1,
-        options=replace(default_options(small_model()), iterations=60_000, solver="fista"),
-    )
+    options = replace(default_options(small_model()), iterations=60_000, solver="fista")
+    batch = Batch(small_model(), threads=1, options=options)
     batch.tare(quiet)
     counted, done = [0], threading.Event()
 
@@ -125,9 +118,8 @@ def test_refusals():
     with pytest.raises(UsageError, match="numpy"):
         Batch(small_model(), engine="numpy")
     batch = Batch(small_model(), threads=1)
-    with pytest.raises(FrameError, match="protocol has 208 rows"):
-        batch.tare(np.zeros((4, 7)))
-    with pytest.raises(FrameError, match="protocol has 208 rows"):
-        list(batch.each(np.zeros((4, 7))))
+    for use in (batch.tare, lambda frames: list(batch.each(frames))):
+        with pytest.raises(FrameError, match="protocol has 208 rows"):
+            use(np.zeros((4, 7)))
     unready = list(batch.each(small().frames(47, 2)))
     assert all(isinstance(result, FrameError) for result in unready)

@@ -6,6 +6,7 @@ import struct
 import numpy as np
 import pytest
 
+from all_engines import AllEngines
 from eitm_bytes import sealed, sections_of
 from eitskin.core.options_table import SOLVERS
 from eitskin.core.results import Reconstruction
@@ -25,26 +26,20 @@ SOLVED = ("iterations", "optimum")
 
 @pytest.fixture(params=SOLVERS)
 def solver(request) -> str:
-    """Each solver in turn."""
     return str(request.param)
 
 
-def engines(
-    storage: str, data_kind: str, solver: str, **options: object
-) -> dict[str, Reconstructor]:
-    """One of each, without a gate."""
-    made = {name: Reconstructor(small_model(storage, data_kind), engine=name) for name in ENGINES}
-    for reconstructor in made.values():
-        reconstructor.with_options(iterations=60, detection_factor=0.0, solver=solver, **options)
-    return made
+def engines(storage: str, data_kind: str, solver: str, **options: object) -> AllEngines:
+    """Without a gate."""
+    options = {"iterations": 60, "detection_factor": 0.0, "solver": solver, **options}
+    return AllEngines(small_model(storage, data_kind), **options)
 
 
-def share_lambda(made: dict[str, Reconstructor], frame: np.ndarray, share: float = 0.05) -> None:
-    """Give all engines the lambda that is ``share`` of numpy's lambda_max for ``frame``."""
+def share_lambda(made: AllEngines, frame: np.ndarray) -> None:
+    """Give all engines the lambda that is a twentieth of numpy's lambda_max for ``frame``."""
     made["numpy"].with_options(lambda_abs=1e30)
     greatest = made["numpy"].reconstruct(frame, touches=False).info.lambda_max
-    for reconstructor in made.values():
-        reconstructor.with_options(lambda_abs=share * greatest)
+    made.with_options(lambda_abs=0.05 * greatest)
 
 
 def narrow(frames: np.ndarray) -> np.ndarray:
@@ -58,10 +53,8 @@ def difference(result: Reconstruction, expected: Reconstruction) -> float:
     both."""
     peak = float(np.abs(expected.image).max())
     assert (peak > 0) == bool(np.abs(result.image).max() > 0) == (expected.info.stop in SOLVED)
-    if "optimum" not in (
-        result.info.stop,
-        expected.info.stop,
-    ):  # which rounding ends, a little sooner or later
+    # rounding ends at the optimum, a little sooner or later
+    if "optimum" not in (result.info.stop, expected.info.stop):
         assert result.info.iterations == expected.info.iterations
         assert result.info.stop == expected.info.stop
     assert (result.info.stop in SOLVED) == (expected.info.stop in SOLVED)
@@ -69,21 +62,15 @@ def difference(result: Reconstruction, expected: Reconstruction) -> float:
     return float(np.abs(result.image - expected.image).max()) / (peak or 1.0)
 
 
-def agree(
-    made: dict[str, Reconstructor], frames: np.ndarray, *, keep: bool = False
-) -> dict[str, float]:
+def agree(made: AllEngines, frames: np.ndarray, *, keep: bool = False) -> dict[str, float]:
     """The worst difference of each width over ``frames``; ``keep`` what an engine remembers from
     frame to frame."""
     worst = {"c64": 0.0, "c": 0.0}
     for frame in frames:
         if not keep:
             share_lambda(made, frame)
-            for reconstructor in made.values():
-                reconstructor.forget()
-        results = {
-            name: reconstructor.reconstruct(frame, touches=False)
-            for name, reconstructor in made.items()
-        }
+            made.forget()
+        results = made.reconstruct(frame, touches=False)
         solver, info = made["numpy"].options.solver, results["numpy"].info
         assert info.iterations == 60 or info.stop == "optimum" or (keep and info.stop == "zero")
         assert info.stop != "optimum" or solver not in FISTAS
@@ -98,9 +85,8 @@ def agree(
 def test_same_images(storage, data_kind, drift, solver):
     made = engines(storage, data_kind, solver, project_reference=drift)
     for seed, sign in enumerate(SIGNS):
-        for reconstructor in made.values():
-            reconstructor.with_options(sign=sign, lambda_abs=0.0)
-            reconstructor.tare(narrow(small().quiet(1, 8) if drift else small().linear.v0_v))
+        made.with_options(sign=sign, lambda_abs=0.0)
+        made.tare(narrow(small().quiet(1, 8) if drift else small().linear.v0_v))
         worst = agree(made, narrow(small().frames(5 + seed, FRAMES, sign)))
         assert worst["c64"] <= F64_BOUND and worst["c"] <= F32_BOUND[solver], (sign, worst)
 
@@ -119,9 +105,8 @@ def test_same_images_with_rows_left_out(storage, data_kind, solver):
     frames = s.frames(9, FRAMES)
     for k, frame in enumerate(frames):
         frame[generator.choice(208, k % 6, replace=False)] = (np.nan, np.inf)[k % 2]
-    for reconstructor in made.values():
-        reconstructor.mask_rows(mask)
-        reconstructor.tare(s.quiet(1, 8))
+    made.mask_rows(mask)
+    made.tare(s.quiet(1, 8))
     worst = agree(made, frames)
     assert worst["c64"] <= F64_BOUND and worst["c"] <= F32_BOUND[solver], worst
 
@@ -137,19 +122,16 @@ def test_same_images_without_electrodes(storage, data_kind, solver):
     made = engines(storage, data_kind, solver, max_masked=208)
     worst = {"c64": 0.0, "c": 0.0}
     for seed, sign in enumerate(SIGNS):
-        for reconstructor in made.values():
-            reconstructor.with_options(sign=sign, lambda_abs=0.0)
-            reconstructor.tare(narrow(s.quiet(1, 8)))
+        made.with_options(sign=sign, lambda_abs=0.0)
+        made.tare(narrow(s.quiet(1, 8)))
         frames = narrow(s.frames(15 + seed, 6, sign))
         for k, frame in enumerate(frames):
-            frame[
-                np.isin(s.protocol.drive_measure, np.arange(3, 4 + k % 3) * 5 % 16).any(axis=1)
-            ] = np.nan
+            lost = np.arange(3, 4 + k % 3) * 5 % 16
+            frame[np.isin(s.protocol.drive_measure, lost).any(axis=1)] = np.nan
         found = agree(made, frames)
         worst = {name: max(worst[name], found[name]) for name in worst}
-    assert worst["c64"] <= 1e-10 and worst["c"] <= (1e-2 if data_kind == "log-ratio" else 3e-3), (
-        worst
-    )
+    most = 1e-2 if data_kind == "log-ratio" else 3e-3
+    assert worst["c64"] <= 1e-10 and worst["c"] <= most, worst
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
@@ -157,20 +139,14 @@ def test_same_images_without_electrodes(storage, data_kind, solver):
 def test_same_images_after_a_noisy_tare(storage, data_kind, solver):
     """The regularisation is raised tenfold; also with an electrode out."""
     s, made = small(), engines(storage, data_kind, solver)
-    for reconstructor in made.values():
-        reconstructor.tare(narrow(s.quiet(1, 8, noise=0.02)))
+    made.tare(narrow(s.quiet(1, 8, noise=0.02)))
     frames = narrow(s.frames(5, 8, noise=0.02))
     frames[5:, (s.protocol.drive_measure == 3).any(axis=1)] = np.nan
     worst = agree(made, frames)
     assert worst["c64"] <= 1e-11 and worst["c"] <= 4 * F32_BOUND[solver], worst
     for k in (0, 6):
-        regularisations = [
-            reconstructor.reconstruct(frames[k]).info.regularisation
-            for reconstructor in made.values()
-        ]
-        assert min(regularisations) > 0.06 and regularisations == pytest.approx(
-            [regularisations[0]] * len(regularisations), rel=1e-4
-        )
+        found = [one.info.regularisation for one in made.reconstruct(frames[k]).values()]
+        assert min(found) > 0.06 and found == pytest.approx([found[0]] * len(found), rel=1e-4)
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
@@ -181,21 +157,18 @@ def test_same_facts_without_an_electrode(data_kind, solver):
     frame = s.frames(4, 1)[0]
     frame[(s.protocol.drive_measure == 4).any(axis=1)] = np.nan
     for masked in (np.zeros(208, dtype=bool), out):
-        for reconstructor in made.values():
-            reconstructor.mask_rows(masked)
-            reconstructor.tare(s.quiet(3, 21))
-            reconstructor.with_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
-        results = {name: reconstructor.reconstruct(frame) for name, reconstructor in made.items()}
-        expected = results["numpy"]
+        made.mask_rows(masked)
+        made.tare(s.quiet(3, 21))
+        made.with_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
+        results = made.reconstruct(frame)
+        expected, wide = results["numpy"], results["c64"]
         assert expected.touches and expected.info.stop in SOLVED
         for field in ("lambda_", "lambda_max", "lambda_noise", "residual", "data_norm"):
-            assert getattr(results["c64"].info, field) == pytest.approx(
-                getattr(expected.info, field), rel=1e-8
-            ), field
-        for one, other in zip(results["c64"].touches, expected.touches, strict=True):
-            assert (one.x_mm, one.y_mm, one.radius_mm) == pytest.approx(
-                (other.x_mm, other.y_mm, other.radius_mm), abs=1e-6
-            )
+            known = getattr(expected.info, field)
+            assert getattr(wide.info, field) == pytest.approx(known, rel=1e-8), field
+        for one, other in zip(wide.touches, expected.touches, strict=True):
+            size = other.x_mm, other.y_mm, other.radius_mm
+            assert (one.x_mm, one.y_mm, one.radius_mm) == pytest.approx(size, abs=1e-6)
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
@@ -216,8 +189,9 @@ def test_same_images_from_a_warm_start(data_kind, solver):
     for reconstructor in made.values():
         reconstructor.tare(s.quiet(1, 8))
     share_lambda(made, noisy[0])
-    for reconstructor in made.values():
-        reconstructor.forget()
+    made.tare(s.quiet(1, 8))
+    share_lambda(made, noisy[0])
+    made.forget()
     first = agree(made, noisy[:10], keep=True)
     for reconstructor in made.values():
         with pytest.raises(FrameError):
@@ -236,57 +210,46 @@ def test_same_recovery_from_a_step_too_long(factor, halvings, solver):
     place = sections_of(blob)["DIMS"].offset + 56
     struct.pack_into("<f", blob, place, factor * struct.unpack_from("<f", blob, place)[0])
     sealed_blob = sealed(blob)
-    model, frame, results = decode_model(sealed_blob, "x"), small().frames(9, 1)[0], {}
-    for name in ENGINES:
-        made = Reconstructor(model, engine=name, blob=sealed_blob)
-        made.with_options(iterations=300, gap_every=5, detection_factor=0.0, solver=solver)
-        made.tare(small().linear.v0_v)
-        results[name] = made.reconstruct(frame)
+    options = {"iterations": 300, "gap_every": 5, "detection_factor": 0.0, "solver": solver}
+    made = AllEngines(decode_model(sealed_blob, "x"), sealed_blob, **options)
+    made.tare(small().linear.v0_v)
+    results = made.reconstruct(small().frames(9, 1)[0])
     expected = results["numpy"]
     assert expected.info.step_halvings == halvings
     assert expected.info.stop == ("iterations" if factor > 1e-6 else "diverged")
     for name, bound in (("c64", 1e-10), ("c", 1e-3)):
         found = results[name].info.step_halvings, results[name].info.stop
         assert found == (halvings, expected.info.stop)
-        assert (
-            np.abs(results[name].image - expected.image).max()
-            <= bound * np.abs(expected.image).max()
-        )
+        off = np.abs(results[name].image - expected.image).max()
+        assert off <= bound * np.abs(expected.image).max()
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_same_facts(data_kind, solver):
     """LearnedReference and info of float64 C are the reference's."""
     made = engines("f16", data_kind, solver)
-    quiet = small().quiet(3, 21)
-    baselines = {name: reconstructor.tare(quiet) for name, reconstructor in made.items()}
-    for reconstructor in made.values():
-        reconstructor.with_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
-    frame = small().frames(4, 1)[0]
-    infos = {name: reconstructor.reconstruct(frame).info for name, reconstructor in made.items()}
+    baselines = made.tare(small().quiet(3, 21))
+    made.with_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
+    results = made.reconstruct(small().frames(4, 1)[0])
+    infos = {name: result.info for name, result in results.items()}
     for name, bound in (("c64", 1e-10), ("c", 1e-4)):
         for field in ("correlation", "gain", "v0_rms_v", "noise_v", "lambda_noise"):
             expected = getattr(baselines["numpy"], field)
             assert expected != 0
             # what is a small difference of voltages keeps fewer figures in float32
             loose = 20 if name == "c" and field in ("noise_v", "lambda_noise") else 1
-            assert getattr(baselines[name], field) == pytest.approx(expected, rel=loose * bound), (
-                field
-            )
-        nothing = {
-            "gap": bound**1.5 * infos["numpy"].data_norm ** 2,
-            "gap_rel": bound**1.5,
-        }  # at the optimum it is rounding
+            tolerance = loose * bound
+            assert getattr(baselines[name], field) == pytest.approx(expected, rel=tolerance), field
+        # at the optimum the gap is rounding
+        nothing = {"gap": bound**1.5 * infos["numpy"].data_norm ** 2, "gap_rel": bound**1.5}
         for field in ("lambda_", "lambda_max", "gap", "gap_rel", "residual", "data_norm"):
-            expected = pytest.approx(
-                getattr(infos["numpy"], field), rel=30 * bound, abs=nothing.get(field, 0.0)
-            )
-            assert getattr(infos[name], field) == expected, field
+            known, least = getattr(infos["numpy"], field), nothing.get(field, 0.0)
+            assert getattr(infos[name], field) == pytest.approx(known, rel=30 * bound, abs=least)
         assert infos[name].nonzeros == infos["numpy"].nonzeros
         assert infos[name].touches == infos["numpy"].touches
 
 
-@pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_frame_does_not_depend_on_those_before(engine):
     """Without a warm start the order of frames is nothing to an image, dropouts or not."""
     s = small()
@@ -304,7 +267,7 @@ def test_a_frame_does_not_depend_on_those_before(engine):
             assert (images.setdefault(k, image) == image).all(), (order, k)
 
 
-@pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_row_masked_at_the_reference_stays_out_until_the_next(engine):
     s = small()
     made = Reconstructor(small_model(), engine=engine)

@@ -24,8 +24,11 @@ from small_models import (
 BUILDS = [(True, False), (False, False), (True, True), (False, True)]
 
 
+def built(blob: bytes, width: str) -> list[CoreEngine]:
+    return [CoreEngine(blob, width, prepared=p, portable=q) for p, q in BUILDS]
+
+
 def same(results: list[Reconstruction]) -> None:
-    """Images, coefficients, touches and info, bit for bit."""
     first = results[0]
     for other in results[1:]:
         assert (other.image == first.image).all()
@@ -39,24 +42,20 @@ def same(results: list[Reconstruction]) -> None:
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_small_models(solver, storage, data_kind, width):
-    blob, s = small_blob(storage, data_kind), small()
-    built = [
-        CoreEngine(blob, width, prepared=prepared, portable=portable)
-        for prepared, portable in BUILDS
-    ]
+    s, engines = small(), built(small_blob(storage, data_kind), width)
     for sign in SIGNS:
         frames = s.frames(30, 3, sign)
         frames[1, 17:25] = np.nan
         frames[2, (s.protocol.drive_measure == 2).any(axis=1)] = np.nan
         results = []
-        for engine in built:
+        for engine in engines:
             chosen = default_options(small_model(storage, data_kind))
             engine.set_options(replace(chosen, solver=solver, sign=sign, warm_start=True))
             engine.set_reference(s.quiet(31, 8))
             engine.forget()
             results.append([engine.reconstruct(frame) for frame in frames])
-        for k in range(len(frames)):
-            same([of_build[k] for of_build in results])
+        for of_builds in zip(*results, strict=True):
+            same(list(of_builds))
         assert np.abs(results[0][0].image).max() > 0
 
 
@@ -64,16 +63,12 @@ def test_small_models(solver, storage, data_kind, width):
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_noisy_tare(solver, width):
     """The regularisation of the whitening is raised."""
-    blob, s = small_blob("i8"), small()
-    built = [
-        CoreEngine(blob, width, prepared=prepared, portable=portable)
-        for prepared, portable in BUILDS
-    ]
-    for engine in built:
+    s, engines = small(), built(small_blob("i8"), width)
+    for engine in engines:
         engine.set_options(replace(default_options(small_model("i8")), solver=solver))
         engine.set_reference(s.quiet(32, 8, noise=0.01))
     for frame in s.frames(33, 4, noise=0.01):
-        results = [engine.reconstruct(frame) for engine in built]
+        results = [engine.reconstruct(frame) for engine in engines]
         same(results)
         assert results[0].info.regularisation == pytest.approx(0.05, rel=0.1)
         assert results[0].image.any()
@@ -81,17 +76,11 @@ def test_a_noisy_tare(solver, width):
 
 @pytest.mark.parametrize("width", ["float32", "float64"])
 def test_touches_of_simulated_frames(width):
-    _, blob = prebuilt()
-    frames = session().as_frames()
-    found = 0
-    built = [
-        CoreEngine(blob, width, prepared=prepared, portable=portable)
-        for prepared, portable in BUILDS
-    ]
-    for engine in built:
+    frames, found, engines = session().as_frames(), 0, built(prebuilt()[1], width)
+    for engine in engines:
         engine.set_reference(frames.reference_voltage_v)
     for frame in frames.voltage_v:
-        results = [engine.reconstruct(frame) for engine in built]
+        results = [engine.reconstruct(frame) for engine in engines]
         same(results)
         found += len(results[0].touches)
     assert found >= 20
@@ -107,9 +96,6 @@ def test_names_and_sizes():
     assert portable.workspace_bytes - bare.workspace_bytes == 2 * 832 * 64 * 4 + to_align
     wide = CoreEngine(blob, "float64", prepared=False)
     held = 256 * 64 * 4  # held columns are floats in either width
-    assert (
-        1.7 * (bare.workspace_bytes - held)
-        < wide.workspace_bytes - held
-        < 2 * (bare.workspace_bytes - held)
-    )
+    narrow, wider = bare.workspace_bytes - held, wide.workspace_bytes - held
+    assert 1.7 * narrow < wider < 2 * narrow
     assert (bare.n_rows, bare.n_pixels) == (208, model.grid.n_pixels)

@@ -13,14 +13,13 @@ from eitskin.model.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_reference.fista import fista
 from eitskin_reference.frame_stage import orthonormal
-from eitskin_reference.problem import check_gap
+from eitskin_reference.problem import check_gap, greatest
 from small_models import prebuilt, session, small, small_model
 
 GAP_REL = 1e-6
 
 
 def objective(s: np.ndarray, y: np.ndarray, x: np.ndarray, lam: float) -> float:
-    """|y - S x|^2 / 2 + lambda |x|_1."""
     residual = y - s @ x
     return 0.5 * float(residual @ residual) + lam * float(np.abs(x).sum())
 
@@ -37,14 +36,8 @@ def lasso(s: np.ndarray, y: np.ndarray, lam: float, sign: str) -> np.ndarray:
 
 
 def options(sign: str, **changes: object) -> Options:
-    return replace(
-        default_options(small_model()),
-        sign=sign,
-        iterations=100_000,
-        gap_rel=GAP_REL,
-        detection_factor=0.0,
-        **changes,
-    )
+    own = {"iterations": 100_000, "gap_rel": GAP_REL, "detection_factor": 0.0}
+    return replace(default_options(small_model()), sign=sign, **(own | changes))
 
 
 def problem(
@@ -52,18 +45,11 @@ def problem(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """S, y and basis of one small frame, and a lambda that is ``share`` of lambda_max."""
     model, s = small_model(), small()
-    engine = Reconstructor(
-        model, engine="numpy", options=options(sign, project_reference=drift)
-    )._engine
+    chosen = options(sign, project_reference=drift)
+    engine = Reconstructor(model, engine="numpy", options=chosen)._engine
     engine.set_reference(s.linear.v0_v[None])
     y, basis, _ = engine.frame_stage(s.frames(seed, 1, sign)[0])
-    correlation = model.sensitivity.T @ y
-    top = {
-        "increase": correlation.max(),
-        "decrease": -correlation.min(),
-        "both": np.abs(correlation).max(),
-    }[sign]
-    return model.sensitivity, y, basis, share * float(top)
+    return model.sensitivity, y, basis, share * greatest(model.sensitivity.T @ y, sign)
 
 
 @pytest.mark.parametrize("drift", [True, False], ids=["project", "keep"])
@@ -79,13 +65,12 @@ def test_same_optimum(solver, sign, share, drift):
         result = fista(s, y, lam, small_model().lipschitz, options(sign, solver=solver), basis)
         assert result.stop == "gap" and result.step_halvings == 0
         scale = 0.5 * float(y @ y)
-        above = objective(projected, y, result.x, lam) - objective(projected, y, best, lam)
-        assert -1e-10 * scale <= above <= result.certificate.gap <= GAP_REL * scale
+        values = [objective(projected, y, x, lam) for x in (result.x, best)]
+        assert -1e-10 * scale <= values[0] - values[1] <= result.certificate.gap <= GAP_REL * scale
         # strong convexity in S x: |S x - S x*|^2 / 2 <= f(x) - f*
-        assert np.linalg.norm(projected @ (result.x - best)) <= np.sqrt(
-            2 * result.certificate.gap
-        ) * (1 + 1e-6)
-        assert np.linalg.norm(projected @ (result.x - best)) < 2e-3 * np.linalg.norm(y)
+        apart = np.linalg.norm(projected @ (result.x - best))
+        assert apart <= np.sqrt(2 * result.certificate.gap) * (1 + 1e-6)
+        assert apart < 2e-3 * np.linalg.norm(y)
         if sign != "both":
             assert (np.sign(result.x) * (1 if sign == "increase" else -1) >= 0).all()
 
@@ -100,12 +85,11 @@ def test_the_gap_bounds_the_error_all_the_way(solver, sign):
     best = objective(projected, y, lasso(projected, y, lam, sign), lam)
     gaps = []
     for iterations in (1, 2, 5, 10, 30, 60, 100, 300, 1000):
-        run = replace(options(sign, solver=solver), iterations=iterations, gap_rel=0.0)
+        run = options(sign, solver=solver, iterations=iterations, gap_rel=0.0)
         result = fista(s, y, lam, small_model().lipschitz, run, basis)
         assert result.iterations == iterations
-        assert (
-            result.certificate.gap >= objective(projected, y, result.x, lam) - best - 1e-12 * best
-        )
+        lacks = objective(projected, y, result.x, lam) - best
+        assert result.certificate.gap >= lacks - 1e-12 * best
         gaps.append(result.certificate.gap)
     # the working set's gap counts what the columns outside would do at the next look
     assert gaps[-1] < (1e-3 if solver == "fista" else 1e-2) * gaps[0]
@@ -120,11 +104,10 @@ def test_the_gap_is_that_of_the_dual_point():
     x = np.random.default_rng(2).normal(size=s.shape[1]) * 1e-3
     gap, value, residual = check_gap(s, y, x, s @ x, lam, "both", basis)
     r = y - s @ x
-    dual = min(1.0, lam / np.abs(s.T @ r).max()) * r
-    assert gap == pytest.approx(
-        objective(s, y, x, lam) - (0.5 * y @ y - 0.5 * (y - dual) @ (y - dual)), rel=1e-9
-    )
-    assert value == pytest.approx(objective(s, y, x, lam))
+    left = y - min(1.0, lam / np.abs(s.T @ r).max()) * r
+    primal = objective(s, y, x, lam)
+    assert gap == pytest.approx(primal - 0.5 * (y @ y - left @ left), rel=1e-9)
+    assert value == pytest.approx(primal)
     assert residual == pytest.approx(np.linalg.norm(r))
 
 
@@ -136,33 +119,21 @@ def test_the_core_stops_at_the_gap(solver, width):
     model, blob = prebuilt()
     gap_rel = 1e-6 if width == "float64" else 1e-4
     engine = CoreEngine(blob, width)
-    chosen = replace(
-        default_options(model),
-        solver=solver,
-        iterations=100_000,
-        gap_rel=gap_rel,
-        project_reference=False,
-    )
-    engine.set_options(chosen)
+    own = {"solver": solver, "iterations": 100_000, "gap_rel": gap_rel}
+    engine.set_options(replace(default_options(model), project_reference=False, **own))
     frames = session().as_frames()
     engine.set_reference(frames.reference_voltage_v)
     for frame in frames.voltage_v[:5]:
         result = engine.reconstruct(frame, touches=False)
         assert result.info.stop == "gap" and result.info.gap_rel <= gap_rel
+        s, lam = model.sensitivity, result.info.lambda_
         y = engine.reduced_data()[: model.rank].astype(np.float64)
-        x = result.coefficients.astype(np.float64)
-        best = objective(
-            model.sensitivity,
-            y,
-            lasso(model.sensitivity, y, result.info.lambda_, "increase"),
-            result.info.lambda_,
-        )
-        above = objective(model.sensitivity, y, x, result.info.lambda_) - best
+        best = objective(s, y, lasso(s, y, lam, "increase"), lam)
+        above = objective(s, y, result.coefficients.astype(np.float64), lam) - best
         rounding = 1e-12 if width == "float64" else 1e-6
         assert -rounding * best <= above <= result.info.gap * (1 + 1e-3) + rounding * best
-        assert result.info.gap == pytest.approx(
-            result.info.gap_rel * 0.5 * result.info.data_norm**2, rel=1e-3
-        )
+        start = 0.5 * result.info.data_norm**2
+        assert result.info.gap == pytest.approx(result.info.gap_rel * start, rel=1e-3)
 
 
 def test_orthonormal_basis():

@@ -24,6 +24,11 @@ def made(engine: str = "c", quiet: bool = True, **options: object) -> Reconstruc
     return reconstructor
 
 
+@pytest.fixture(params=ENGINES)
+def engine(request) -> str:
+    return str(request.param)
+
+
 def one_line(error: pytest.ExceptionInfo[EitskinError]) -> str:
     assert "\n" not in str(error.value)
     return str(error.value)
@@ -44,7 +49,6 @@ def test_another_protocol_is_refused_by_both_hashes(other):
     made().check_protocol(adjacent(16, current_a=5e-3))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     "frame", [np.ones(207), np.ones(209), np.ones((2, 208)), np.ones(0), 1.0, "volts", [1, [2]]]
 )
@@ -52,13 +56,11 @@ def test_frames_of_another_shape(engine, frame):
     with pytest.raises(FrameError) as error:
         made(engine).reconstruct(frame)
     assert one_line(error)
+    one = frame[:, :5] if isinstance(frame, np.ndarray) and frame.ndim == 2 else frame
     with pytest.raises(FrameError):
-        made(engine).tare(
-            frame if not isinstance(frame, np.ndarray) or frame.ndim != 2 else frame[:, :5]
-        )
+        made(engine).tare(one)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     "frames", [np.ones((0, 208)), np.ones((2, 2, 208)), [], [[1.0] * 208, [1.0] * 207]]
 )
@@ -68,20 +70,17 @@ def test_references_of_another_shape(engine, frames):
     assert one_line(error).startswith("reference")
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_no_frame_before_a_reference(engine):
     with pytest.raises(FrameError, match="no reference frame has been set"):
         made(engine, quiet=False).reconstruct(session().frames_v[0])
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("count", [1, 4, 16])
 def test_an_all_zero_reference_is_refused(engine, count):
     with pytest.raises(FrameError, match="all voltages are zero; is the skin driven and connected"):
         made(engine, quiet=False).tare(np.zeros((count, 208)))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_an_all_zero_frame_is_a_dead_front_end_not_a_quiet_skin(engine):
     reconstructor = made(engine)
     with pytest.raises(FrameError, match="all voltages are zero"):
@@ -89,15 +88,13 @@ def test_an_all_zero_frame_is_a_dead_front_end_not_a_quiet_skin(engine):
     assert len(reconstructor.reconstruct(session().frames_v[0]).touches) > 0
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_reference_must_be_whole(engine, value):
     for count in (1, 2, 8):
         quiet = session().quiet_v[:count].copy()
         quiet[count // 2, 11] = value
-        with pytest.raises(
-            FrameError, match=rf"reference frame {count // 2} \(from 0\): row 11 \(from 0\)"
-        ):
+        where = rf"reference frame {count // 2} \(from 0\): row 11 \(from 0\)"
+        with pytest.raises(FrameError, match=where):
             made(engine, quiet=False).tare(quiet)
     masked = made(engine, quiet=False)
     masked.mask_rows(np.arange(208) == 11)
@@ -105,7 +102,6 @@ def test_a_reference_must_be_whole(engine, value):
     assert masked.reconstruct(session().frames_v[0]).info.masked == 1
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_a_refused_single_reference_leaves_the_old_one(engine):
     reconstructor, frame = made(engine), session().frames_v[0]
     before = reconstructor.reconstruct(frame).image
@@ -114,7 +110,6 @@ def test_a_refused_single_reference_leaves_the_old_one(engine):
     assert (reconstructor.reconstruct(frame).image == before).all()
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_a_refused_series_leaves_no_reference(engine):
     reconstructor = made(engine)
     with pytest.raises(FrameError):
@@ -126,7 +121,6 @@ def test_a_refused_series_leaves_no_reference(engine):
 # ---- channels that cannot be used ----
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_too_many_bad_channels(engine):
     """Half of the rows are the default limit; max_masked changes it."""
     reconstructor, frame = made(engine), session().frames_v[0].copy()
@@ -144,7 +138,6 @@ def test_too_many_bad_channels(engine):
         reconstructor.reconstruct(np.full(208, np.nan))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_saturated_channels_are_left_out(engine):
     reconstructor, frame = made(engine), session().frames_v[1]
     whole = reconstructor.reconstruct(frame)
@@ -164,7 +157,6 @@ def test_saturated_channels_are_left_out(engine):
             reconstructor.tare(np.vstack([session().quiet_v[:before], damaged]))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     "rows", [np.zeros(207, dtype=bool), np.zeros(208), [1, 2], np.zeros((208, 1), dtype=bool)]
 )
@@ -176,7 +168,6 @@ def test_masks_of_another_shape(engine, rows):
 # ---- quiet skins ----
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_no_change_gives_no_touch(engine):
     reconstructor = made(engine)
     result = reconstructor.reconstruct(session().reference_v)
@@ -189,14 +180,10 @@ def test_no_change_gives_no_touch(engine):
     assert result.info.nonzeros == result.info.iterations == 0
 
 
-# ---- touches over time ----
-
-
 # ---- options ----
 
 
 def option_name(value: object) -> str:
-    """A case's name."""
     return "-".join(value) if isinstance(value, dict) else ""
 
 
@@ -248,7 +235,6 @@ BAD_OPTIONS = [
 ]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("changes", "text"), BAD_OPTIONS, ids=option_name)
 def test_bad_options_are_named_and_the_old_ones_stay(engine, changes, text):
     reconstructor = made(engine, iterations=7)
@@ -285,9 +271,8 @@ EDGES = {
 
 
 @pytest.mark.parametrize("name", EDGES)
-def test_the_edges_of_the_ranges_are_inside_for_all(name):
-    for engine in ENGINES:
-        made(engine, quiet=False, **{name: EDGES[name]})
+def test_the_edges_of_the_ranges_are_inside_for_all(engine, name):
+    made(engine, quiet=False, **{name: EDGES[name]})
 
 
 def test_every_option_has_a_range():
@@ -295,7 +280,6 @@ def test_every_option_has_a_range():
     assert tried == set(Options.__dataclass_fields__)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 def test_what_options_do(engine):
     frame = session(scenes=40).frames_v[2]
     base = made(engine).reconstruct(frame)
@@ -315,15 +299,13 @@ def test_what_options_do(engine):
 # ---- files and engines ----
 
 
-def test_from_a_file(tmp_path):
+def test_from_a_file(engine, tmp_path):
     path = tmp_path / "small.eitm"
     path.write_bytes(small_blob())
-    for engine in ENGINES:
-        reconstructor = Reconstructor.from_file(path, engine=engine)
-        reconstructor.tare(small().linear.v0_v)
-        assert reconstructor.reconstruct(small().frames(1, 1)[0]).image.shape == (
-            small_model().grid.n_pixels,
-        )
+    reconstructor = Reconstructor.from_file(path, engine=engine)
+    reconstructor.tare(small().linear.v0_v)
+    image = reconstructor.reconstruct(small().frames(1, 1)[0]).image
+    assert image.shape == (small_model().grid.n_pixels,)
     path.write_bytes(small_blob()[:-1])
     with pytest.raises(ModelError, match="truncated"):
         Reconstructor.from_file(path)

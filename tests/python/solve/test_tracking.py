@@ -36,12 +36,8 @@ def stream() -> tuple[np.ndarray, np.ndarray]:
         if k >= 8:
             touches.append(Put(30.0, 60.0 - k, 9.0, 6.0))
         scenes.append(TouchScene(str(k), tuple(touches)))
-    made = simulate(
-        paper_skin(),
-        adjacent(16),
-        TouchSet("stream", 5, tuple(scenes)),
-        measurement=Measurement(snr_db=40.0),
-    )
+    drawn = TouchSet("stream", 5, tuple(scenes))
+    made = simulate(paper_skin(), adjacent(16), drawn, measurement=Measurement(snr_db=40.0))
     return made.quiet_v, made.frames_v
 
 
@@ -74,35 +70,19 @@ def test_the_core_follows_as_the_reference_does(changes):
     quiet_v, frames_v = stream()
     chosen = options(**changes)
     bare = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1])
-    bare.set_options(
-        replace(default_options(prebuilt()[0]), detection_factor=chosen.detection_factor)
-    )
+    plain = default_options(prebuilt()[0])
+    bare.set_options(replace(plain, detection_factor=chosen.detection_factor))
     bare.tare(quiet_v)
     tracker, most = Tracker(prebuilt()[0].grid), 0
     for frame, expected in zip(frames_v, told(chosen), strict=True):
         result = bare.reconstruct(frame)
-        mine = tracker.step(
-            result.touches, chosen, result.info.lambda_max, result.info.lambda_noise
-        )
+        seen = result.info.lambda_max, result.info.lambda_noise
+        mine = tracker.step(result.touches, chosen, *seen)
         assert [touch.id for touch in mine] == [touch.id for touch in expected]
-        for one, other in zip(mine, expected, strict=True):
-            assert (
-                one.x_mm,
-                one.y_mm,
-                one.radius_mm,
-                one.strength_s_per_m_mm2,
-                one.explained,
-            ) == pytest.approx(
-                (
-                    other.x_mm,
-                    other.y_mm,
-                    other.radius_mm,
-                    other.strength_s_per_m_mm2,
-                    other.explained,
-                ),
-                rel=1e-9,
-                abs=1e-9,
-            )
+        for field in ("x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "explained"):
+            known = [getattr(touch, field) for touch in expected]
+            found = [getattr(touch, field) for touch in mine]
+            assert found == pytest.approx(known, rel=1e-9, abs=1e-9), field
         most = max(most, *(touch.id for touch in expected), 0)
     assert most >= 3
 
@@ -142,9 +122,8 @@ def test_each_frame_by_itself_is_as_it_was():
     for frame in frames_v:
         made[1].forget()
         followed, fresh = (one.reconstruct(frame).touches for one in made)
-        assert [replace(touch, id=0) for touch in followed] == [
-            replace(touch, id=0) for touch in fresh
-        ]
+        alike = [[replace(touch, id=0) for touch in some] for some in (followed, fresh)]
+        assert alike[0] == alike[1]
 
 
 def test_touches_stay_on_the_skin():
@@ -152,9 +131,8 @@ def test_touches_stay_on_the_skin():
     grid: Grid = prebuilt()[0].grid
     tracker, chosen = Tracker(grid), options(track_hold=50)
     for k in range(5):
-        tracker.step(
-            [Touch(0, 20.0 * k - 20, 0.0, 8.0, 1.0, 0.5)], chosen, 10.0 if k < 4 else 1.2, 1.0
-        )
+        touch = Touch(0, 20.0 * k - 20, 0.0, 8.0, 1.0, 0.5)
+        tracker.step([touch], chosen, 10.0 if k < 4 else 1.2, 1.0)
     places = [tracker.step([], chosen, 0.0, 1.0) for _ in range(30)]
     assert all(len(one) == 1 and one[0].explained == 0 for one in places)
     assert 80 < places[-1][0].x_mm < 97 + 2 * grid.pixel_mm

@@ -23,11 +23,22 @@ from eitskin_studies.harness.store import Store
 PAGES = Path(__file__).resolve().parents[3] / "docs" / "results"
 
 
+def workspace(folder: Path, share: float = 1.0, **settings: object) -> Workspace:
+    return workspace_in(folder, ExperimentSettings(share=share, **settings), plain)
+
+
 def coarse(folder: Path, share: float, elements: int = 2500, seed: int = 1) -> Workspace:
-    """A workspace for few scenes, solved on a mesh of few elements."""
-    made = workspace_in(folder, ExperimentSettings(seed, share), plain)
+    """For few scenes, solved on a mesh of few elements."""
+    made = workspace(folder, share, seed=seed)
     made.scenes = lambda skin, scan, _=0: SceneSolver(skin, scan, elements, folder / "frames")
     return made
+
+
+def page_copy(folder: Path, name: str) -> Path:
+    """Of a page of the results, in ``folder``."""
+    copy = folder / f"{name}.md"
+    copy.write_bytes((PAGES / copy.name).read_bytes())
+    return copy
 
 
 def goes_on(
@@ -53,8 +64,7 @@ def fills_its_page(
     for picture in outcome.pictures.keys() - set(but):
         outcome.pictures[picture](folder / picture)
         assert (folder / picture).read_bytes().startswith(b"\x89PNG")
-    page, settings = folder / f"{name}.md", ExperimentSettings(share=0.01)
-    page.write_bytes((PAGES / page.name).read_bytes())
+    page, settings = page_copy(folder, name), ExperimentSettings(share=0.01)
     write_page(outcome, folder, page, name, settings)
     text = page.read_text(encoding="utf-8")
     tables = {table.name for table in outcome.tables}

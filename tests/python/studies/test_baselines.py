@@ -13,10 +13,7 @@ DV = GENERATOR.normal(size=(4, 20))
 
 def test_back_projection_divides_by_the_sensitivity():
     image = baselines.back_projection(J).reconstruct(DV)
-    expected = [
-        [sum(J[i, j] * dv[i] for i in range(20)) / sum(abs(J[:, j])) for j in range(35)]
-        for dv in DV
-    ]
+    expected = [[J[:, j] @ dv / np.abs(J[:, j]).sum() for j in range(35)] for dv in DV]
     assert image == pytest.approx(np.array(expected))
     matched = [[float(J[:, j] @ dv / np.sqrt(J[:, j] @ J[:, j])) for j in range(35)] for dv in DV]
     assert baselines.back_projection(J, 2).reconstruct(DV) == pytest.approx(np.array(matched))
@@ -29,9 +26,8 @@ def test_back_projection_divides_by_the_sensitivity():
 def test_gauss_newton_solves_the_normal_equations(strength):
     a = strength * np.linalg.eigvalsh(J.T @ J).max()
     expected = np.linalg.solve(J.T @ J + a * np.eye(35), J.T @ DV.T).T
-    assert baselines.gauss_newton(J, strength).reconstruct(DV) == pytest.approx(
-        expected, rel=1e-8, abs=1e-10
-    )
+    found = baselines.gauss_newton(J, strength).reconstruct(DV)
+    assert found == pytest.approx(expected, rel=1e-8, abs=1e-10)
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0])
@@ -39,16 +35,10 @@ def test_noser_solves_the_weighted_normal_equations(exponent):
     prior = np.diag(J.T @ J) ** exponent
     a = 0.01 * np.linalg.eigvalsh(J.T @ J).max()
     expected = np.linalg.solve(J.T @ J + a * np.diag(prior / prior.mean()), J.T @ DV.T).T
-    assert baselines.noser(J, 0.01, exponent).reconstruct(DV) == pytest.approx(
-        expected, rel=1e-8, abs=1e-10
-    )
-
-
-def test_strength_is_free_of_units():
-    one = baselines.noser(J, 0.01).reconstruct(DV)
-    assert 1e6 * baselines.noser(J * 1e6, 0.01).reconstruct(DV) == pytest.approx(
-        one, rel=1e-7, abs=1e-10
-    )
+    found = baselines.noser(J, 0.01, exponent).reconstruct(DV)
+    assert found == pytest.approx(expected, rel=1e-8, abs=1e-10)
+    scaled = 1e6 * baselines.noser(J * 1e6, 0.01, exponent).reconstruct(DV)  # free of units
+    assert scaled == pytest.approx(found, rel=1e-7, abs=1e-10)
 
 
 @pytest.mark.parametrize("steps", [1, 2, 5])
@@ -68,9 +58,8 @@ def test_conjugate_gradient_ends_at_the_solution_and_stays():
     tall = J[:, :8]
     exact = np.linalg.lstsq(tall, DV.T, rcond=None)[0].T
     for steps in (8, 40):
-        assert baselines.ConjugateGradient(tall, steps).reconstruct(DV) == pytest.approx(
-            exact, abs=1e-8
-        )
+        found = baselines.ConjugateGradient(tall, steps).reconstruct(DV)
+        assert found == pytest.approx(exact, abs=1e-8)
     assert (baselines.ConjugateGradient(J, 5).reconstruct(np.zeros((1, 20))) == 0).all()
 
 
@@ -86,10 +75,10 @@ def test_fista_reaches_the_optimum_of_another_solver(signed):
         )
         best = lasso.fit(J, dv).coef_
 
-        def value(z: np.ndarray, dv: np.ndarray = dv, lam: float = lam) -> float:
-            return 0.5 * float(((J @ z - dv) ** 2).sum()) + lam * float(np.abs(z).sum())
-
-        assert value(x) == pytest.approx(value(best), rel=1e-8)
+        mine, its = (
+            0.5 * float(((J @ z - dv) ** 2).sum()) + lam * float(np.abs(z).sum()) for z in (x, best)
+        )
+        assert mine == pytest.approx(its, rel=1e-8)
         assert x == pytest.approx(best, abs=1e-4)
         assert 0 < np.count_nonzero(best) < 20
 
@@ -115,8 +104,7 @@ def test_fista_iterations_follow_the_paper():
     def prox(y: np.ndarray) -> np.ndarray:
         return np.maximum(y - step * ((y @ J.T - dv) @ J) - step * lam, 0)
 
-    x0 = np.zeros((1, 35))
-    x1 = prox(x0)
+    x1 = prox(np.zeros((1, 35)))
     x2 = prox(x1)
     t2 = (1 + 5**0.5) / 2
     t3 = (1 + (1 + 4 * t2**2) ** 0.5) / 2
@@ -125,28 +113,22 @@ def test_fista_iterations_follow_the_paper():
         assert baselines.PlainFista(J, k, 0.1).reconstruct(dv) == pytest.approx(x, abs=1e-13)
 
 
-def test_frame_of_nothing_gives_an_image_of_nothing():
-    for method in (
+@pytest.mark.parametrize(
+    "method",
+    [
         baselines.back_projection(J),
         baselines.gauss_newton(J, 0.1),
         baselines.noser(J, 0.1),
-        baselines.ConjugateGradient(J, 5),
-        baselines.PlainFista(J, 5, 0.1),
-        baselines.PlainFista(J, 5, 0.1, True),
-    ):
-        assert (method.reconstruct(np.zeros(20)) == np.zeros((1, 35))).all(), method.name
-
-
-def test_many_frames_are_as_one_by_one():
-    for method in (
         baselines.ConjugateGradient(J, 4),
         baselines.PlainFista(J, 30, 0.05),
-        baselines.noser(J, 0.1),
-    ):
-        together = method.reconstruct(DV)
-        assert together == pytest.approx(
-            np.concatenate([method.reconstruct(dv) for dv in DV]), abs=1e-12
-        )
+        baselines.PlainFista(J, 5, 0.1, True),
+    ],
+    ids=lambda method: method.name,
+)
+def test_nothing_gives_nothing_and_many_frames_are_as_one_by_one(method):
+    assert (method.reconstruct(np.zeros(20)) == np.zeros((1, 35))).all()
+    each = np.concatenate([method.reconstruct(dv) for dv in DV])
+    assert method.reconstruct(DV) == pytest.approx(each, abs=1e-12)
 
 
 def test_bad_frames_and_parameters_are_refused():

@@ -4,9 +4,11 @@ command wrote."""
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from study_pages import PAGES, page_copy
 
 from eitskin.cli.main import main
 from eitskin.model.prebuilt import load_prebuilt
@@ -23,69 +25,49 @@ from eitskin_studies.benchmarks.diagnostics_scenes import (
 )
 
 SCENES, SEED = 4, 6
-PAGE = Path(__file__).parents[3] / "docs" / "results" / "diagnostics.md"
 FIRST_CELL = re.compile(r"^\| ([^|]+) \|", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("diagnostics") / "page.md"
-    path.write_text(PAGE.read_text())
-    return path
+    return page_copy(tmp_path_factory.mktemp("diagnostics"), "diagnostics")
 
 
 @pytest.fixture(scope="module")
-def result(page) -> dict[str, list[dict[str, object]]]:
+def result(page) -> dict[str, Any]:
     """A small run, by the command line."""
     sizes = f"--scenes {SCENES} --crowds 2 --imperfect 1 --seed {SEED}"
     with pytest.MonkeyPatch.context() as patch:
         shown: list[str] = []
         patch.setattr("builtins.print", lambda text: shown.append(text))
         assert main(["bench", "diagnostics", *sizes.split(), "--json", "--page", str(page)]) == 0
-    whole: dict[str, list[dict[str, object]]] = json.loads("".join(shown))
-    return whole
+    return dict(json.loads("".join(shown)))
 
 
-def rate(
-    result: dict[str, list[dict[str, object]]], fault: str, snr_db: float = 60.0
-) -> dict[str, object]:
-    """One of them."""
+def rate(result: dict[str, Any], fault: str, snr_db: float = 60.0) -> dict[str, Any]:
     return next(one for one in result["rates"] if one["fault"] == fault and one["snr_db"] == snr_db)
 
 
-def lost(rate: dict[str, object], which: str = "lost") -> float:
-    """The mean."""
-    found = rate[which]
-    assert isinstance(found, dict)
-    return float(found["mean"])
+def lost(rate: dict[str, Any], which: str = "lost") -> float:
+    return float(rate[which]["mean"])
 
 
 def test_what_is_certain_is_counted(result):
     assert len(result["rates"]) == 3 * len(FAULTS) + 2
     assert all(one["scenes"] == SCENES for one in result["rates"])
     lifted = "touch during the tare, then lifted"
-    for fault in (
-        DETACHED,
-        "neighbours bridged by 10 ohm",
-        "neighbours swapped",
-        OUTLIER.format(0.3),
-        lifted,
-    ):
+    outlier, bridged = OUTLIER.format(0.3), "neighbours bridged by 10 ohm"
+    for fault in (DETACHED, bridged, "neighbours swapped", outlier, lifted):
         assert rate(result, fault)["named"] == 1.0 and rate(result, fault)["refused"] == 0
     for snr in (40.0, 50.0, 60.0, 80.0):
         clean = rate(result, NONE, snr)
         assert clean["named"] is None and clean["other"] == 0.0 and lost(clean) == 0.0
     assert lost(rate(result, DETACHED)) < 0.2 < lost(rate(result, DETACHED), "lost_blind")
-    assert (
-        lost(rate(result, OUTLIER.format(5.0)))
-        < 0.02
-        < 0.2
-        < lost(rate(result, OUTLIER.format(5.0)), "lost_blind")
-    )
+    strong = rate(result, OUTLIER.format(5.0))
+    assert lost(strong) < 0.02 < 0.2 < lost(strong, "lost_blind")
     assert abs(lost(rate(result, "gain off by +20 %", 80.0), "peak_lost")) < 0.02
-    assert [one["touches"] for one in result["crowds"]] == [
-        n for n in range(1, 13) for _ in range(3)
-    ]
+    crowds = [one["touches"] for one in result["crowds"]]
+    assert crowds == [n for n in range(1, 13) for _ in range(3)]
     assert all(one["frames"] == 2 for one in result["crowds"])
     assert {one["effect"] for one in result["imperfect"]} == set(IMPERFECT)
 
@@ -118,7 +100,7 @@ def test_intervals():
 
 def test_the_page_is_filled_and_has_its_rows(result, page):
     """The fixture's page is a copy of ours; what no command writes stays."""
-    written, ours = page.read_text(), PAGE.read_text()
+    written, ours = page.read_text(), (PAGES / page.name).read_text()
     assert "`eitskin bench diagnostics --scenes 4 " in written
     assert "--scenes 320 --crowds 24 --imperfect 40 --seed 4001" in ours  # nothing was chosen on it
     assert written.split("<!-- run -->")[0] == ours.split("<!-- run -->")[0]

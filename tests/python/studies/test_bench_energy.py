@@ -1,15 +1,13 @@
 """Energy a frame: what is summed, and that the page says so."""
 
 import json
-from pathlib import Path
 
 import pytest
+from study_pages import page_copy
 
 from eitskin.cli.main import main
 from eitskin.tuning.front import Conditions, load_front
 from eitskin_studies.benchmarks import energy
-
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "board-cost.md"
 
 
 def test_a_point_takes_the_processor_while_it_solves_and_all_else_for_the_frame():
@@ -34,8 +32,8 @@ def test_the_cheapest_keeps_its_accuracy_and_sleep_saves():
 
 
 def test_the_command_fills_its_marks_alone(tmp_path, capsys):
-    page = tmp_path / PAGE.name
-    page.write_bytes(PAGE.read_bytes())
+    page = page_copy(tmp_path, "board-cost")
+    before = page.read_text(encoding="utf-8")
     assert main(["bench", "energy", "--json", "--page", str(page)]) == 0
     assert json.loads(capsys.readouterr().out)["cheapest"] == energy.run().cheapest.name
-    assert page.read_text(encoding="utf-8") == PAGE.read_text(encoding="utf-8")
+    assert page.read_text(encoding="utf-8") == before

@@ -1,10 +1,10 @@
 """``eitskin bench growth`` and ``batches``: exact counts, series, the page and the picture."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from study_pages import page_copy
 
 from eitskin.cli.main import main
 from eitskin_studies.benchmarks import batches as bench_batches
@@ -12,7 +12,6 @@ from eitskin_studies.benchmarks import growth as bench_growth
 from eitskin_studies.harness.sections import fill_marks
 from eitskin_studies.pictures.growth_picture import draw_growth
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "benchmarks.md"
 POINTS = (
     bench_growth.GrowthPoint("pixels n", across=10, rank=20),
     bench_growth.GrowthPoint("pixels n", across=14, rank=20),
@@ -26,10 +25,9 @@ def test_counts_are_exact_and_models_are_kept(tmp_path):
     again = bench_growth.run(1, tmp_path, points=POINTS)
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == kept
     assert len(kept) == 4
-    assert [(p.macs, p.touch_macs) for p in first.points] == [
-        (p.macs, p.touch_macs) for p in again.points
-    ]
     few, many, one = first.points
+    counts = [(p.macs, p.touch_macs) for p in first.points]
+    assert counts == [(p.macs, p.touch_macs) for p in again.points]
     assert (few.sweep, few.value, few.n_pixels) == ("pixels n", few.n_pixels, few.n_pixels)
     assert few.n_pixels < many.n_pixels
     assert few.macs < many.macs and one.touch_macs < many.touch_macs and one.value == 1
@@ -39,8 +37,7 @@ def test_counts_are_exact_and_models_are_kept(tmp_path):
     texts, tables = bench_growth.for_page(first, "the command")
     assert "`the command`" in texts["growth-run"] and "pixels n: MACs ^" in texts["growth-run"]
     assert len(tables["growth"][1]) == 3
-    page = tmp_path / PAGE.name
-    page.write_bytes(PAGE.read_bytes())
+    page = page_copy(tmp_path, "benchmarks")
     fill_marks(page, "benchmarks", (texts, tables))
     assert "By `the command`" in page.read_text()
     assert f"{many.macs / 1e3:.0f}" in bench_growth.as_text(first)

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
+from study_pages import page_copy
 
 from eitskin.model.eitm import load_model
 from eitskin.scene.description import load_scene
@@ -13,8 +13,6 @@ from eitskin_studies.benchmarks import latency
 from eitskin_studies.benchmarks.latency import Press, Told, judge
 from eitskin_studies.harness.sections import fill_marks
 from eitskin_studies.pictures.latency_picture import draw_latency
-
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "latency.md"
 
 
 def told(number: int, *places: tuple[float, float], named: str = "") -> Told:
@@ -60,8 +58,7 @@ def test_a_run_fills_the_page(tmp_path, monkeypatch):
     drives, frames = (one.scan_ms[0] for one in result.judged)
     assert 0 < drives < 20 and drives < frames < 80
     assert list(result.parts_ms) == ["host"]
-    page = tmp_path / "latency.md"
-    page.write_text(PAGE.read_text())
+    page = page_copy(tmp_path, "latency")
     fill_marks(page, "latency", latency.for_page(result, "eitskin bench latency"))
     assert "1 presses a rise on `sim:`" in page.read_text()
     assert latency.DRIVES in latency.as_text(result)

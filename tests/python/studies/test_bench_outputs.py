@@ -1,14 +1,12 @@
 """``eitskin bench outputs``: parts add up, every contact and frame is counted."""
 
-from pathlib import Path
-
 import pytest
+from study_pages import page_copy
 
 from eitskin.scene.description import load_scene
 from eitskin_studies.benchmarks import outputs
 from eitskin_studies.harness.sections import fill_marks
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "outputs.md"
 PARTS = ["scan", "solve", "link", "host", "sink udp", "contact to udp", "sink tuio"]
 
 
@@ -24,8 +22,7 @@ def test_the_page_has_the_places(tmp_path):
     load = outputs.Load(600.0, 28800, counts, 120.0, 120.5, 0.15)
     times = dict.fromkeys([*PARTS, "contact to tuio"], (1.0, 2.0))
     result = outputs.OutputTimes(times, 23, 24, 960, load, "a machine")
-    page = tmp_path / "outputs.md"
-    page.write_text(PAGE.read_text())
+    page = page_copy(tmp_path, "outputs")
     fill_marks(page, "outputs", outputs.for_page(result, "eitskin bench outputs"))
     text = page.read_text()
     assert "23 of 24 contacts" in text and "120.5 MB at the end" in text

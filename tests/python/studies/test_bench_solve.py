@@ -14,7 +14,6 @@ OWN = {f"eitskin {solver}, {width}" for solver in SOLVERS for width in ("float32
 
 @pytest.fixture(scope="module")
 def problems() -> Problems:
-    """Two scenes."""
     model, blob = prebuilt()
     return make_problems("rank 64", model, blob, session(scenes=2))
 

@@ -35,9 +35,8 @@ def test_json_has_every_method_and_only_json(capsys):
     assert run(*FEW, "--json", "--lookup", "bilinear") == 0
     values = json.loads(capsys.readouterr().out)
     assert values["settings"]["lookup"] == "bilinear"
-    assert {"NOSER", "plain FISTA 300, non-negative"} <= {
-        method["name"] for method in values["methods"]
-    }
+    names = {method["name"] for method in values["methods"]}
+    assert {"NOSER", "plain FISTA 300, non-negative"} <= names
     assert all(0.4 < method["miou"]["mean"] < 1 for method in values["methods"])
 
 

@@ -49,12 +49,9 @@ def test_results_are_what_their_parts_give(comparison):
 
     def curves(strength: float, of: str) -> np.ndarray:
         session = getattr(comparison, of)
-        images = baselines.noser(setup.jacobian, strength).reconstruct(
-            session.frames_v - session.quiet_v.mean(axis=0)
-        )
-        return miou_curves(
-            image_scorer, images, truth_masks(session.touches, image_scorer.raster.points_mm)
-        )
+        images = baselines.noser(setup.jacobian, strength).reconstruct(session.differences_v())
+        truths = truth_masks(session.touches, image_scorer.raster.points_mm)
+        return miou_curves(image_scorer, images, truths)
 
     best = max((1e-5, 1e-2), key=lambda a: curves(a, "train").mean(axis=0).max())
     assert result.value == best
@@ -81,12 +78,10 @@ def test_counts_add_up(comparison):
     for result in comparison.results:
         assert sum(m.hits + m.misses for m in result.matchings) == touches
         assert result.hit_share == sum(m.hits for m in result.matchings) / touches
-        assert (
-            result.exact_count == sum(m.misses + m.false_touches == 0 for m in result.matchings) / 8
-        )
-        assert sum(m.hits + m.false_touches for m in result.matchings) == sum(
-            map(len, result.found_mm)
-        )
+        exact = sum(m.misses + m.false_touches == 0 for m in result.matchings)
+        assert result.exact_count == exact / 8
+        found = sum(map(len, result.found_mm))
+        assert sum(m.hits + m.false_touches for m in result.matchings) == found
         assert result.position_summary.count == sum(m.hits for m in result.matchings)
 
 
@@ -126,14 +121,12 @@ class Oracle:
         self.learned.append(quiet_v)
 
     def reconstruct(self, dv: np.ndarray) -> np.ndarray:
-        sets = {6: "train", 8: "test"}
-        scenes = random_touches(SKIN.outline, 3, len(dv), sets[len(dv)]).scenes
+        scenes = random_touches(SKIN.outline, 3, len(dv), {6: "train", 8: "test"}[len(dv)]).scenes
         return np.array([pixel_cover(self.grid, s.centres_mm(), s.radii_mm()) for s in scenes])
 
     def touches(self, dv: np.ndarray) -> Sequence[np.ndarray]:
-        return [
-            scene.centres_mm() for scene in random_touches(SKIN.outline, 3, len(dv), "test").scenes
-        ]
+        scenes = random_touches(SKIN.outline, 3, len(dv), "test").scenes
+        return [scene.centres_mm() for scene in scenes]
 
 
 def test_a_method_may_learn_and_may_find_touches_itself():
@@ -147,8 +140,7 @@ def test_a_method_may_learn_and_may_find_touches_itself():
     outcome = compare(SKIN, PROTOCOL, SMALL, families=families)
     result = outcome.results[0]
     assert result.exact_count == 1.0 and result.position_summary.p95 == 0.0
-    assert result.hit_share == 1.0
-    assert result.touch_threshold is None
+    assert result.hit_share == 1.0 and result.touch_threshold is None
     assert outcome.ceiling - 0.03 < result.miou_summary.mean <= outcome.ceiling + 1e-12
     assert [len(quiet) for quiet in made[0].learned] == [64, 64]
     assert (made[0].learned[0] == outcome.train.quiet_v).all()
@@ -163,16 +155,10 @@ def test_baselines_do_not_have_those_abilities():
     made = [family.make(family.values[0]) for family in families]
     assert not any(isinstance(method, (Learns, FindsTouches)) for method in made)
     assert [method.name for method in made] == [
-        "linear back projection",
-        "Gauss-Newton (Tikhonov)",
-        "NOSER",
-        "GREIT-like",
-        "conjugate gradient",
-        "plain FISTA 30, signed",
-        "plain FISTA 300, signed",
-        "plain FISTA 30, non-negative",
-        "plain FISTA 300, non-negative",
-    ]
+        "linear back projection", "Gauss-Newton (Tikhonov)", "NOSER", "GREIT-like",
+        "conjugate gradient", "plain FISTA 30, signed", "plain FISTA 300, signed",
+        "plain FISTA 30, non-negative", "plain FISTA 300, non-negative",
+    ]  # fmt: skip
     assert all(method.reconstruct(np.ones((2, 10))).shape == (2, grid.n_pixels) for method in made)
 
 
@@ -205,12 +191,8 @@ def test_json_is_json_and_csv_is_csv(comparison):
 
 
 def test_noise_free_frames_do_no_worse(comparison):
-    clean = compare(
-        SKIN,
-        PROTOCOL,
-        replace(SMALL, measurement=replace(SMALL.measurement, snr_db=None)),
-        families=quick,
-    )
+    noiseless = replace(SMALL, measurement=replace(SMALL.measurement, snr_db=None))
+    clean = compare(SKIN, PROTOCOL, noiseless, families=quick)
     assert clean.results[1].miou_summary.mean > comparison.results[1].miou_summary.mean - 0.01
     assert "no noise" in dict(header(clean))["SNR"]
 
@@ -222,9 +204,8 @@ def test_progress_is_told_all_work():
         told.append((what, len(items)))
         return items
 
-    compare(
-        SKIN, PROTOCOL, replace(SMALL, scenes=2, train_scenes=1), families=quick, progress=watch
-    )
+    few = replace(SMALL, scenes=2, train_scenes=1)
+    compare(SKIN, PROTOCOL, few, families=quick, progress=watch)
     assert told == [("simulating (train)", 1), ("simulating (test)", 2), ("reconstructing", 2)]
 
 

@@ -1,11 +1,12 @@
 """The experiment ``algorithms``: what it finds on a few scenes, that it goes on where it was cut,
 and its page's marks."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on
+from study_pages import coarse, fills_its_page, goes_on, workspace
 
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -20,13 +21,7 @@ from eitskin_studies.experiments.algorithms.candidates import (
 from eitskin_studies.experiments.algorithms.measure import TUNING, Field
 from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, shown_set, touch_set
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    Workspace,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome
 
 KEPT = (
     *("Gauss-Newton (Tikhonov)", "NOSER", "conjugate gradient", "GREIT-like"),
@@ -36,21 +31,19 @@ KEPT = (
 
 
 def few() -> tuple[Candidate, ...]:
-    """Those that the tables speak of, with two values each."""
     return tuple(
-        Candidate(
-            e.name,
-            e.short,
-            e.parameter,
-            tuple(sorted({e.values[0], e.fixed})),
-            e.fixed,
-            e.make,
-            e.claimed,
-            e.own,
-        )
-        for e in candidates()
-        if e.name in KEPT
+        replace(one, values=tuple(sorted({one.values[0], one.fixed})))
+        for one in candidates()
+        if one.name in KEPT
     )
+
+
+def small(folder: Path) -> ExperimentOutcome:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(algorithms, "candidates", few)
+        patch.setattr(measure, "SIMULATED_ELEMENTS", 4000)
+        patch.setattr(measure, "MODEL_ELEMENTS", 2000)
+        return algorithms.run(coarse(folder, 0.03, 4000, seed=2))
 
 
 @pytest.fixture(scope="module")
@@ -58,38 +51,26 @@ def folder(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("algorithms")
 
 
-def small(folder: Path, monkeypatch: pytest.MonkeyPatch, share: float = 0.03) -> Workspace:
-    monkeypatch.setattr(algorithms, "candidates", few)
-    monkeypatch.setattr(measure, "SIMULATED_ELEMENTS", 4000)
-    monkeypatch.setattr(measure, "MODEL_ELEMENTS", 2000)
-    return coarse(folder, share, 4000, seed=2)
-
-
 @pytest.fixture(scope="module")
 def outcome(folder) -> ExperimentOutcome:
-    with pytest.MonkeyPatch.context() as patch:
-        return algorithms.run(small(folder, patch))
+    return small(folder)
 
 
 def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome):
     """A fixed t of 0.1 puts them near the paper's 0.4 to 0.5, their own t does not; converged FISTA
     does not mind."""
     by_name = {one["name"]: one for one in outcome.data["methods"]}
+    kmac = {name: one["kmac"] for name, one in by_name.items()}
+
+    def mean(name: str, threshold: str) -> float:
+        return float(by_name[name][threshold]["miou"]["all"]["mean"])
+
     for name in ("Gauss-Newton (Tikhonov)", "NOSER", "conjugate gradient", "GREIT-like"):
-        one = by_name[name]
-        assert (
-            one["fixed"]["miou"]["all"]["mean"] < 0.57 < 0.62 < one["best"]["miou"]["all"]["mean"]
-        ), name
-    fista = [
-        by_name[f"plain FISTA {k}, non-negative"]["fixed"]["miou"]["all"]["mean"]
-        for k in (30, 300, 3000)
-    ]
+        assert mean(name, "fixed") < 0.57 < 0.62 < mean(name, "best"), name
+    fista = [mean(f"plain FISTA {k}, non-negative", "fixed") for k in (30, 300, 3000)]
     assert fista[0] < 0.6 and fista == sorted(fista) and fista[2] > 0.78
-    assert by_name["eitskin 60, touches as discs"]["best"]["miou"]["all"]["mean"] > 0.85
-    assert (
-        by_name["eitskin 60, image"]["kmac"]
-        < by_name["plain FISTA 3000, non-negative"]["kmac"] / 100
-    )
+    assert mean("eitskin 60, touches as discs", "best") > 0.85
+    assert kmac["eitskin 60, image"] < kmac["plain FISTA 3000, non-negative"] / 100
 
 
 def test_tables_agree_with_the_data(outcome):
@@ -106,8 +87,8 @@ def test_tables_agree_with_the_data(outcome):
     assert "seed 100002" in outcome.words["conditions"]
 
 
-def test_what_is_kept_is_not_computed_again(folder, outcome, monkeypatch):
-    goes_on(lambda: algorithms.run(small(folder, monkeypatch)), outcome)
+def test_what_is_kept_is_not_computed_again(folder, outcome):
+    goes_on(lambda: small(folder), outcome)
 
 
 def test_sets_are_apart_and_of_their_numbers():
@@ -127,13 +108,7 @@ def test_sets_are_apart_and_of_their_numbers():
 
 
 def test_tuning_and_test_scenes_have_seeds_of_their_own(tmp_path):
-    field = Field(
-        workspace_in(tmp_path, ExperimentSettings(seed=4), plain),
-        paper_skin(),
-        adjacent(16),
-        20,
-        60,
-    )
+    field = Field(workspace(tmp_path, seed=4), paper_skin(), adjacent(16), 20, 60)
     assert field.seed_and_count(TUNING) == (100_004, 20) and field.seed_and_count("test") == (4, 60)
 
 

@@ -4,16 +4,11 @@ from functools import partial
 from typing import Any
 
 import pytest
-from study_pages import fills_its_page, goes_on
+from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin_studies.experiments import belief
 from eitskin_studies.experiments.belief.tables import counts, coverage, curve
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.registry import load
 from eitskin_studies.worlds.simulate import WorldFactory
 from eitskin_studies.worlds.worlds import WORLDS
@@ -41,8 +36,7 @@ def test_every_set_is_seen_and_a_finished_run_fills_its_page(tmp_path):
     def run() -> ExperimentOutcome:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(belief, "WorldFactory", partial(WorldFactory, elements=2000))
-            settings = ExperimentSettings(share=0.01)
-            return belief.run(workspace_in(tmp_path / "run", settings, plain))
+            return belief.run(workspace(tmp_path / "run", 0.01))
 
     outcome = run()
     assert list(outcome.data["sets"]) == list(WORLDS)

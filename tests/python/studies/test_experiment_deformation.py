@@ -1,15 +1,14 @@
 """The study of stretched and bent skins: a fresh tare helps, and its page is filled."""
 
-from study_pages import fills_its_page
+from study_pages import fills_its_page, workspace
 
 from eitskin_studies.experiments import deformation
-from eitskin_studies.experiments.experiment import ExperimentSettings, plain, workspace_in
 
 
 def test_it_fills_its_page_and_a_stretch_costs_touches(tmp_path, monkeypatch):
     monkeypatch.setattr(deformation, "SIMULATED_ELEMENTS", 2000)
     monkeypatch.setattr(deformation, "UNTOUCHED", 5)
-    outcome = deformation.run(workspace_in(tmp_path, ExperimentSettings(share=0.04), plain))
+    outcome = deformation.run(workspace(tmp_path, 0.04))
     scores = {(one["name"], one["tare"]): one for one in outcome.data["scores"]}
     assert len(scores) == 14 and scores["flat", "flat"]["exact"] == 4
     assert scores["flat", "flat"]["exact"] > scores["stretched by 20 %", "flat"]["exact"]

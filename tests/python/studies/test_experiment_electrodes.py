@@ -47,12 +47,8 @@ def test_unique_rows_hold_each_voltage_once():
     scan = patterns.unique_rows(skip(16, 2))
     assert scan.n_rows == 104 and (scan.reciprocal_pairs().second == -1).all()
     thinned = patterns.unique_rows(adjacent(16), 4)
-    assert {tuple(row) for row in thinned.drive_measure[:, :2].tolist()} <= {
-        (0, 1),
-        (4, 5),
-        (8, 9),
-        (12, 13),
-    }
+    drives = {tuple(row) for row in thinned.drive_measure[:, :2].tolist()}
+    assert drives <= {(0, 1), (4, 5), (8, 9), (12, 13)}
 
 
 def test_another_regularisation_is_the_model_built_with_it():
@@ -74,7 +70,6 @@ def test_another_regularisation_is_the_model_built_with_it():
 
 
 def _few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run on few elements, electrodes, settings and cases."""
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
     monkeypatch.setattr(measuring, "PAIR_MM", (24.0, 36.0))
     for module in (electrodes, tables):
@@ -100,15 +95,15 @@ def test_a_run_and_one_that_goes_on(monkeypatch, tmp_path):
     found = {name: len(table.rows) for name, table in by_name.items()}
     assert found == {"noise": 4, "time": 4, "ranks": 6, "scans": 4}
     cases = {
-        (c["case"]["electrodes"], c["case"]["pattern"], c["case"]["equal"]): c
-        for c in first.data["cases"]
+        (of["electrodes"], of["pattern"], of["equal"]): one
+        for one in first.data["cases"]
+        for of in [one["case"]]
     }
     # a wider pair picks up more of the same current's voltage; more electrodes, nearer to each
     # other, less
-    assert (
-        cases[16, "skip 2", "noise"]["rms_v0_mv"] > 3 * cases[16, "adjacent", "noise"]["rms_v0_mv"]
-    )
-    assert cases[32, "adjacent", "noise"]["rms_v0_mv"] < cases[16, "adjacent", "noise"]["rms_v0_mv"]
+    kinds = ((16, "skip 2"), (16, "adjacent"), (32, "adjacent"))
+    wide, near, nearer = (cases[n, kind, "noise"]["rms_v0_mv"] for n, kind in kinds)
+    assert wide > 3 * near > 3 * nearer
     sixteen = cases[16, "adjacent", "noise"]
     assert first.data["noise_v"] == pytest.approx(1e-6 * sixteen["rms_v0_mv"], rel=0.05)
     assert np.mean(sixteen["scores"]["random"]["image"]) > 0.7
@@ -135,11 +130,10 @@ def test_scenes_are_solved_once_for_every_pattern(monkeypatch, tmp_path):
 
 def test_the_least_distance_that_is_told_apart():
     def exact(*shares: float) -> dict[str, Any]:
-        pairs = zip(measuring.PAIR_MM, shares, strict=True)
-        return {
-            f"pair {mm:g}": {"exact": [1] * int(10 * share) + [0] * int(10 - 10 * share)}
-            for mm, share in pairs
+        counts = {
+            mm: round(10 * share) for mm, share in zip(measuring.PAIR_MM, shares, strict=True)
         }
+        return {f"pair {mm:g}": {"exact": [1] * k + [0] * (10 - k)} for mm, k in counts.items()}
 
     assert measuring.resolved_mm(exact(0, 1, 0.5, 0.9, 1, 1)) == 27
     assert measuring.resolved_mm(exact(1, 1, 1, 1, 1, 0.8)) == float("inf")

@@ -1,9 +1,8 @@
 """The study of the fast path: it fills its page."""
 
-from study_pages import fills_its_page
+from study_pages import fills_its_page, workspace
 
 from eitskin_studies.experiments import fast_path
-from eitskin_studies.experiments.experiment import ExperimentSettings, plain, workspace_in
 from eitskin_studies.experiments.fast_path import adaptive, beyond
 
 
@@ -17,7 +16,7 @@ def test_it_fills_its_page(tmp_path, monkeypatch):
     monkeypatch.setattr(adaptive, "ELEMENTS", 3500)
     scenes = [scene for scene in adaptive.scenes() if scene.name == "swipe at 600 mm/s"]
     monkeypatch.setattr(adaptive, "scenes", lambda: scenes)
-    outcome = fast_path.run(workspace_in(tmp_path, ExperimentSettings(share=0.001), plain))
+    outcome = fast_path.run(workspace(tmp_path, 0.001))
     found = {one["name"]: one for one in outcome.data["rows"]}
     assert tuple(found) == (chosen[0], chosen[1], chosen[2])
     for one in found.values():

@@ -35,24 +35,14 @@ def test_a_run_that_goes_on_computes_nothing_again(done):
 
 def test_every_table_has_its_place_on_the_page(done, tmp_path):
     outcome = done[1]
-    assert [table.name for table in outcome.tables] == [
-        "slopes",
-        "anywhere",
-        "by-load",
-        "over-snr",
-        "detection",
-        "sheet-slopes",
-        "smallest",
-        "reach",
-    ]
+    names = "slopes anywhere by-load over-snr detection sheet-slopes smallest reach"
+    assert [table.name for table in outcome.tables] == names.split()
     assert set(outcome.pictures) == {"curves.png", "skin.png", "detection.png"}
     fills_its_page(outcome, "force", tmp_path)
     assert "Infinity" not in to_json(outcome) and "NaN" not in to_json(outcome)
 
 
-def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(
-    done,
-):
+def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(done):
     slopes = {name: one["a_gram"] for name, one in json.loads(to_json(done[1]))["slopes"].items()}
     assert slopes[PEAK][0] < 0.3 * slopes[PEAK][-1]
     assert slopes[PEAK][0] < slopes[PEAK][1] < slopes[PEAK][2] < slopes[PEAK][3]
@@ -80,18 +70,14 @@ def test_less_noise_shows_less_load(done):
         assert share < upper <= 1 and one.quiet == 80
 
 
-def test_under_the_sheet_the_peak_rises_outwards_and_means_see_less(
-    done,
-):
+def test_under_the_sheet_the_peak_rises_outwards_and_means_see_less(done):
     slopes, smallest, reach = done[1].tables[5:]
     rising = {row[0]: row[-2] for row in slopes.rows}
     assert rising[PEAK] == "yes" and len(smallest.rows) == 6
-    least = {
-        (one["contact"], one["snr_db"], one["mean_of"]): detection.Detection.from_dict(
-            {name: value for name, value in one.items() if name not in ("contact", "mean_of")}
-        )
-        for one in done[1].data["sheet"]["least"]
-    }
+    least = {}
+    for one in done[1].data["sheet"]["least"]:
+        of, own = one["contact"], {k: v for k, v in one.items() if k not in ("contact", "mean_of")}
+        least[of, one["snr_db"], one["mean_of"]] = detection.Detection.from_dict(own)
     for contact in ("sheet", "tip"):
         single, second = (least[contact, 50.0, n].threshold(0)[0] for n in (1, sheet.SECOND))
         assert second < 0.6 * single
@@ -110,10 +96,9 @@ def test_the_sheet_presses_with_what_the_papers_gel_stands():
 
 
 def test_the_law_is_what_the_page_says():
-    assert NOMINAL.radius_mm(50) == pytest.approx(4.8, abs=0.05)
-    assert NOMINAL.radius_mm(200) == pytest.approx(7.6, abs=0.05)
-    assert NOMINAL.contrast(50) == pytest.approx(1.9, abs=0.05)
-    assert NOMINAL.contrast(200) == pytest.approx(4.2, abs=0.05)
+    for grams, radius_mm, contrast in ((50, 4.8, 1.9), (200, 7.6, 4.2)):
+        assert NOMINAL.radius_mm(grams) == pytest.approx(radius_mm, abs=0.05)
+        assert NOMINAL.contrast(grams) == pytest.approx(contrast, abs=0.05)
     assert drawn_laws(3, 5)[:2] == drawn_laws(3, 2) != drawn_laws(4, 2)
     spread = np.std(np.log([law.sensitivity_per_gram for law in drawn_laws(1, 400)]))
     assert spread == pytest.approx(0.2, rel=0.1)
@@ -130,9 +115,8 @@ def test_the_least_load_lies_between_two():
     assert detection.least_load(loads, np.array([0.0, 0.8, 1.0])) == pytest.approx(8.0)
     assert detection.least_load(loads, np.array([0.95, 1.0, 1.0])) == 1.0
     assert detection.least_load(loads, np.array([0.95, 1.0, 0.5])) == float("inf")
-    assert (
-        detection.least_load(loads, np.array([0.95, 0.5, 1.0])) > 4.0
-    )  # once seen is not always seen
+    # once seen is not always seen
+    assert detection.least_load(loads, np.array([0.95, 0.5, 1.0])) > 4.0
 
 
 def test_false_alarms_have_the_exact_bound():

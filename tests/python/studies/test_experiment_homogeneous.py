@@ -5,20 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page, goes_on
+from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin.errors import FileError, FrameError
 from eitskin.frames.homogeneous import homogeneous as predicted
 from eitskin.skin.protocol import Protocol, adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import homogeneous
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    Workspace,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.homogeneous.cases import IDEAL, INSTRUMENT
 from eitskin_studies.experiments.homogeneous.measured import FILE, load_tank
 from eitskin_studies.experiments.homogeneous.uniformity import (
@@ -32,9 +26,10 @@ ROWS = PROTOCOL.drive_measure.astype(np.int64)
 EVEN_V = predicted(paper_skin(), 16).voltages(ROWS, 1e-3)
 
 
-def small(folder: Path, patch: pytest.MonkeyPatch, data: Path | None = None) -> Workspace:
-    patch.setattr(homogeneous, "SIMULATED_ELEMENTS", 2500)
-    return workspace_in(folder, ExperimentSettings(seed=3, share=0.1, data=data), plain)
+def small(folder: Path) -> ExperimentOutcome:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(homogeneous, "SIMULATED_ELEMENTS", 2500)
+        return homogeneous.run(workspace(folder, 0.1, seed=3))
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +39,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def outcome(folder) -> ExperimentOutcome:
-    with pytest.MonkeyPatch.context() as patch:
-        return homogeneous.run(small(folder, patch))
+    return small(folder)
 
 
 def spread(outcome: ExperimentOutcome, name: str, measure: str = "spread") -> float:
@@ -59,9 +53,8 @@ def test_an_even_disk_is_a_u_for_each_drive():
     assert folded == pytest.approx(np.tile(folded[0], (16, 1)), rel=1e-9)
     size = np.abs(folded[0])
     assert (np.diff(size[:7]) < 0).all() and size == pytest.approx(size[::-1], rel=1e-9)
-    assert all(
-        value < 1e-6 for value in vars(uniformity(EVEN_V, PROTOCOL, fold_for(PROTOCOL))).values()
-    )
+    even = uniformity(EVEN_V, PROTOCOL, fold_for(PROTOCOL))
+    assert all(value < 1e-6 for value in vars(even).values())
 
 
 def test_the_fold_does_not_mind_order_and_polarity():
@@ -73,11 +66,8 @@ def test_the_fold_does_not_mind_order_and_polarity():
     other = table(16, turned[order])
     uneven = EVEN_V * generator.uniform(0.9, 1.1, 208)
     assert (fold_for(other).of((sign * uneven)[order]) == fold_for(PROTOCOL).of(uneven)).all()
-    one, same = (
-        uniformity((sign * uneven)[order], other, fold_for(other)),
-        uniformity(uneven, PROTOCOL, fold_for(PROTOCOL)),
-    )
-    assert vars(one) == pytest.approx(vars(same))
+    one = uniformity((sign * uneven)[order], other, fold_for(other))
+    assert vars(one) == pytest.approx(vars(uniformity(uneven, PROTOCOL, fold_for(PROTOCOL))))
 
 
 def test_measures_see_what_they_are_for():
@@ -88,8 +78,7 @@ def test_measures_see_what_they_are_for():
     # one of 16 larger by 16 %: a standard deviation of 16 sqrt(15) / 16 of a mean that is larger by
     # 1 %
     assert found.worst == pytest.approx(16 * np.sqrt(15) / 16 / 1.01)
-    assert found.spread == pytest.approx(found.worst / 13)
-    assert found.reciprocity > 0
+    assert found.spread == pytest.approx(found.worst / 13) and found.reciprocity > 0
     shown = deviations_percent(fold.of(one))
     assert np.unravel_index(np.argmax(shown), shown.shape) == (5, 6)
     assert shown[5, 6] == pytest.approx(100 * (1.16 / 1.01 - 1))
@@ -148,8 +137,8 @@ def test_the_doctor_names_what_is_broken(outcome):
     assert found[INSTRUMENT] == [[], []] and found[IDEAL] == [[]]
 
 
-def test_what_is_kept_is_not_computed_again(folder, outcome, monkeypatch):
-    goes_on(lambda: homogeneous.run(small(folder, monkeypatch)), outcome)
+def test_what_is_kept_is_not_computed_again(folder, outcome):
+    goes_on(lambda: small(folder), outcome)
 
 
 def test_without_a_tank_the_page_says_so(outcome):
@@ -172,9 +161,8 @@ def test_the_measured_tank(shared_data):
     assert tank is not None
     reference = tank.frames.reference_voltage_v.mean(axis=0)
     found = uniformity(reference, tank.frames.protocol, fold_for(tank.frames.protocol))
-    assert 3 < found.spread < 7 and found.reciprocity == pytest.approx(
-        5.3, abs=0.1
-    )  # as docs/guide/tank.md says
+    assert 3 < found.spread < 7
+    assert found.reciprocity == pytest.approx(5.3, abs=0.1)  # as docs/guide/tank.md says
 
 
 def test_pictures_and_page(outcome, tmp_path):

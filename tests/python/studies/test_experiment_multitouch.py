@@ -6,19 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on
+from study_pages import coarse, fills_its_page, goes_on, workspace
 
 from eitskin.errors import GeometryError
 from eitskin.scene.library_scenes import find_scene
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import multitouch
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.multitouch import measure
 from eitskin_studies.experiments.multitouch.ambiguity import (
     FEATURES,
@@ -45,17 +40,17 @@ from eitskin_studies.experiments.multitouch.variants import VARIANTS, SeenFrame
 OUTLINE = paper_skin().outline
 
 
-def _run(folder: Path, patch: pytest.MonkeyPatch) -> ExperimentOutcome:
+def _run(folder: Path) -> ExperimentOutcome:
     """All of it, on few scenes, a coarse mesh, and one cell of the ceiling."""
-    patch.setattr(measure, "CEILING_CELLS", ((WIDE, 6, 80.0),))
-    return multitouch.run(coarse(folder, 0.01))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measure, "CEILING_CELLS", ((WIDE, 6, 80.0),))
+        return multitouch.run(coarse(folder, 0.01))
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("multitouch")
-    with pytest.MonkeyPatch.context() as patch:
-        return folder, _run(folder, patch)
+    return folder, _run(folder)
 
 
 def test_outcome_has_every_cell(done):
@@ -78,8 +73,8 @@ def test_more_touches_are_harder(done):
     assert np.mean([exact[k] for k in (2, 3)]) > np.mean([exact[k] for k in (11, 12)]) + 0.3
 
 
-def test_it_goes_on_and_fills_its_page(done, tmp_path, monkeypatch):
-    goes_on(lambda: _run(done[0], monkeypatch), done[1])
+def test_it_goes_on_and_fills_its_page(done, tmp_path):
+    goes_on(lambda: _run(done[0]), done[1])
     assert "| touches | default, 40 dB |" in fills_its_page(done[1], "multitouch", tmp_path)
 
 
@@ -97,17 +92,15 @@ def test_ring_is_that_of_the_library():
 def test_random_places_keep_their_distance(geometry, least_mm):
     for scene in draw(Cell(geometry, 12, 3), OUTLINE, 5, 3).scenes:
         centres = scene.centres_mm()
-        apart = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))[
-            np.triu_indices(12, 1)
-        ]
+        apart = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))
+        apart = apart[np.triu_indices(12, 1)]
         assert apart.min() >= least_mm
 
 
 def test_mixed_scenes_depend_on_seed_and_number_only():
     cell = mixed_cells()[1]
-    many, few, other = (
-        draw(cell, OUTLINE, seed, count) for seed, count in ((1, 26), (1, 5), (2, 5))
-    )
+    draws = ((1, 26), (1, 5), (2, 5))
+    many, few, other = (draw(cell, OUTLINE, seed, count) for seed, count in draws)
     assert many.scenes[:5] == few.scenes and many.scenes[0] != other.scenes[0]
     assert [len(scene.touches) for scene in many.scenes] == [k % 12 + 1 for k in range(26)]
     assert draw(mixed_cells()[0], OUTLINE, 1, 1).scenes[0].touches != many.scenes[0].touches
@@ -126,8 +119,8 @@ def test_what_does_not_fit_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr(measure, "counting_cells", lambda: (Cell(WIDE, 40, 1),))
     monkeypatch.setattr(measure, "single_cell", lambda: Cell(WIDE, 41, 1))
     monkeypatch.setattr(measure, "uneven_cells", tuple)
-    workspace = workspace_in(tmp_path, ExperimentSettings(), plain)
-    counted = measure.count_all(TouchData(workspace), workspace)
+    shop = workspace(tmp_path)
+    counted = measure.count_all(TouchData(shop), shop)
     assert set(counted.unfit) == {(WIDE, 40), (WIDE, 41)} and not counted.scores
     twelve = measure.CountedScenes({}, {(WIDE, k): "full" for k in range(2, 13)})
     assert all("do not fit" in row[1] for row in exact_table(twelve, WIDE, "x").rows)
@@ -160,9 +153,8 @@ def test_area_under_roc():
 
 def _seen(places: list[tuple[float, float]], explained: list[float]) -> SeenFrame:
     x, y = ([place[axis] for place in places] for axis in (0, 1))
-    return SeenFrame(
-        x, y, [9.0] * len(x), [2.0, 1.0][: len(x)], explained, False, 0.04, 100.0, 1, 1
-    )
+    strength = [2.0, 1.0][: len(x)]
+    return SeenFrame(x, y, [9.0] * len(x), strength, explained, False, 0.04, 100.0, 1, 1)
 
 
 def test_features_of_a_frame():
@@ -194,9 +186,8 @@ def test_rule_learns_what_matters():
     assert 0.93 < shown.exact_not_said.mean < 0.99 and shown.exact_said.mean < 0.6
     exact = np.array([one.exact for one in test])
     assert reliability(rule.chances(test), exact).error < 0.05
-    nothing = ScoredFrame(
-        60.0, 1, 0, False, False, False, math.inf, (0.0, 2.0, 1.0, 9.0, 10.0, 3.0)
-    )
+    none = (0.0, 2.0, 1.0, 9.0, 10.0, 3.0)
+    nothing = ScoredFrame(60.0, 1, 0, False, False, False, math.inf, none)
     assert not rule.says([nothing])[0]
 
 
@@ -210,15 +201,11 @@ def test_reliability_of_known_chances():
 def test_nonlinear_fit_knows_its_slope():
     skin = paper_skin()
     fits = Truthful(skin, adjacent(skin.electrodes.count))
-    at, contrasts = (
-        np.array([20.0, 30.0, 9.0, -40.0, 5.0, 8.0]),
-        [1.2, 1.4],
-    )  # weak: an element's answer is linear
+    # weak: an element's answer is linear
+    at, contrasts = np.array([20.0, 30.0, 9.0, -40.0, 5.0, 8.0]), [1.2, 1.4]
     slope = fits._answer(at, contrasts)[1]
     for k in range(len(at)):
-        step = np.zeros(len(at))
-        step[k] = STEP_MM
-        seen = (fits._answer(at + step, contrasts)[0] - fits._answer(at - step, contrasts)[0]) / (
-            2 * STEP_MM
-        )
+        step = STEP_MM * np.eye(len(at))[k]
+        high, low = (fits._answer(at + side * step, contrasts)[0] for side in (1, -1))
+        seen = (high - low) / (2 * STEP_MM)
         assert np.linalg.norm(slope[:, k] - seen) < 0.02 * np.linalg.norm(seen)

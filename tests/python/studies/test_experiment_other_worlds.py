@@ -7,17 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page, goes_on
+from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.scene.touch_shape import named_shape
 from eitskin_studies.experiments import other_worlds
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.other_worlds.ellipses import ellipses_of
 from eitskin_studies.experiments.other_worlds.tables import HEADLINES
 from eitskin_studies.experiments.registry import load
@@ -28,7 +23,7 @@ from eitskin_studies.worlds.worlds import WORLDS
 def _run(folder: Path) -> ExperimentOutcome:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(other_worlds, "WorldFactory", partial(WorldFactory, elements=2000))
-        return other_worlds.run(workspace_in(folder, ExperimentSettings(share=0.01), plain))
+        return other_worlds.run(workspace(folder, 0.01))
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +61,8 @@ def test_an_ellipse_is_off_by_its_angle_and_aspect_from_the_true_one():
     found.long_x_mm, found.long_y_mm = long_mm * np.cos(radians), long_mm * np.sin(radians)
     disc = SimpleNamespace(x_mm=5.0, y_mm=-8.0, radius_mm=9.0, long_x_mm=0.0, long_y_mm=None)
     frame = np.zeros((2, 1))
-    of = WorldScenes(
-        "made", one, (TouchScene("a", (true,)),) * 2, frame[:, None], frame, frame[:, 0]
-    )
+    scenes = (TouchScene("a", (true,)),) * 2
+    of = WorldScenes("made", one, scenes, frame[:, None], frame, frame[:, 0])
     answers = iter([[found], [disc]])
     seen = ellipses_of(lambda *_: next(answers), of)
     assert seen["matched"] == 2 and len(seen["said"]) == 1

@@ -7,18 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on
+from study_pages import coarse, fills_its_page, goes_on, workspace
 
 from eitskin.fem.grid import grid_for
 from eitskin.model.build import linearise
 from eitskin.skin.protocol import adjacent
 from eitskin_studies.experiments import shapes
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.scored import share_text
 from eitskin_studies.experiments.shapes import measuring
 from eitskin_studies.experiments.shapes.example_drawings import (
@@ -34,14 +29,12 @@ from eitskin_studies.experiments.shapes.variants import ShapeVariant, variants
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory) -> dict[str, ShapeVariant]:
-    """The skins by name."""
     return {one.name: one for one in variants(tmp_path_factory.mktemp("drawings"))}
 
 
 def _small(
     monkeypatch: pytest.MonkeyPatch, known: dict[str, ShapeVariant], folder: Path
 ) -> ExperimentOutcome:
-    """A run on two shapes with few elements and scenes."""
     monkeypatch.setattr(shapes, "variants", lambda _: [known["disk, 16"], known["hand, 16 placed"]])
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
     return shapes.run(coarse(folder, 0.03, 2000))
@@ -60,10 +53,7 @@ def test_a_run_and_one_that_goes_on(monkeypatch, known, tmp_path):
 
 def test_sets_depend_on_the_seed_only(known, tmp_path):
     def drawn(seed: int) -> Any:
-        maker = measuring.Maker(
-            workspace_in(tmp_path, ExperimentSettings(seed=seed, share=0.02), plain),
-            known["forearm, 16"],
-        )
+        maker = measuring.Maker(workspace(tmp_path, 0.02, seed=seed), known["forearm, 16"])
         return maker.test.scenes, maker.tuning.scenes
 
     assert drawn(1) == drawn(1)

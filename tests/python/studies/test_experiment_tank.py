@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page, goes_on
+from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin.cli.main import main
 from eitskin.errors import UsageError
@@ -15,13 +15,7 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.scoring import metrics
 from eitskin.skin.skin import load_skin
 from eitskin_studies.experiments import tank as study
-from eitskin_studies.experiments.experiment import (
-    ExperimentOutcome,
-    ExperimentSettings,
-    Workspace,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace, plain, workspace_in
 from eitskin_studies.experiments.tank.discs import VARIANTS
 from eitskin_studies.experiments.tank.imagers import (
     DISCS,
@@ -92,9 +86,8 @@ def test_places_of_both_signs_share_a_threshold():
     grid = grid_for(tank()[0].outline, 32)
     centres = grid.centres_mm()
     at = np.array([[60.0, 0.0], [-60.0, 0.0]])
-    image = np.exp(-((centres - at[0]) ** 2).sum(axis=1) / 200) - 0.4 * np.exp(
-        -((centres - at[1]) ** 2).sum(axis=1) / 200
-    )
+    near = np.exp(-((centres - at[:, None]) ** 2).sum(axis=2) / 200)
+    image = near[0] - 0.4 * near[1]
     up, down = places(image, grid.index, centres, 0.3)
     assert np.hypot(*(up[0] - at[0])) < 3 and np.hypot(*(down[0] - at[1])) < 3
     assert [len(part) for part in places(image, grid.index, centres, 0.5)] == [1, 0]
@@ -115,22 +108,19 @@ def test_signs_turn_about_half_and_nothing_else():
     before = [touch for scene in drawn.scenes for touch in scene.touches]
     after = [touch for scene in turned.scenes for touch in scene.touches]
     assert 0.3 < np.mean([touch.contrast < 1 for touch in after]) < 0.7
-    assert all(
-        replace(a, contrast=1.0) == replace(b, contrast=1.0)
-        for a, b in zip(before, after, strict=True)
-    )
+    alike = [[replace(one, contrast=1.0) for one in some] for some in (before, after)]
+    assert alike[0] == alike[1]
     assert with_signs(drawn).scenes == turned.scenes
 
 
 def test_simulated_noise_is_the_share_of_each_change(tmp_path):
-    workspace = workspace_in(tmp_path, ExperimentSettings(), plain)
+    shop = workspace(tmp_path)
     raster = metrics.raster_inside(tank()[0].outline, 5.0)
-    clean, noisy = (simulated(workspace, 1, 4, True, raster, share) for share in (0.0, 0.05))
+    clean, noisy = (simulated(shop, 1, 4, True, raster, share) for share in (0.0, 0.05))
     change = clean.frames_v - clean.quiet_v
     noise = noisy.frames_v - clean.frames_v
-    assert np.sqrt((noise**2).mean(axis=1) / (change**2).mean(axis=1)) == pytest.approx(
-        np.full(4, 0.05), rel=0.2
-    )
+    shares = np.sqrt((noise**2).mean(axis=1) / (change**2).mean(axis=1))
+    assert shares == pytest.approx(np.full(4, 0.05), rel=0.2)
     assert not (clean.conductive & clean.resistive).any()
     assert sum(map(len, clean.conductive_mm)) + sum(map(len, clean.resistive_mm)) >= 4
 
@@ -140,22 +130,18 @@ def test_levers_are_named_by_what_differs():
     assert words_of(Levers(regularisation=0.1, blur=1.0)) == "mu 0.1, blur of 1 pixels"
     assert len(set(one_by_one("difference"))) == len(one_by_one("difference"))
     assert Levers() in together("difference")
-    found = {
-        Levers(): {"tuned": 0.8, "macs": 9},
-        Levers(regularisation=0.1): {"tuned": 0.8001, "macs": 5},
-    }
-    assert chosen(found) == Levers(regularisation=0.1)
+    other = Levers(regularisation=0.1)
+    found = {Levers(): {"tuned": 0.8, "macs": 9}, other: {"tuned": 0.8001, "macs": 5}}
+    assert chosen(found) == other
 
 
 def with_few_values(patch: pytest.MonkeyPatch) -> None:
-    """One value a method, and few levers."""
-    few = {
-        "REGULARISATIONS": (0.01,),
-        "ITERATIONS": (60,),
-        "LAMBDAS": (0.03,),
-        "PAINTS": ((0.0, 0.0), (2.0, 0.0)),
-    }
-    for name, values in few.items():
+    for name, values in (
+        ("REGULARISATIONS", (0.01,)),
+        ("ITERATIONS", (60,)),
+        ("LAMBDAS", (0.03,)),
+        ("PAINTS", ((0.0, 0.0), (2.0, 0.0))),
+    ):
         patch.setattr(f"eitskin_studies.experiments.tank.levers.{name}", values)
     for name, tried in (("RATIOS", (1e-3,)), ("STRENGTHS", (1e-3,)), ("STEPS", (20,))):
         patch.setattr(f"eitskin_studies.compare.methods.{name}", tried)
@@ -165,13 +151,10 @@ def with_few_values(patch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def outcome(shared_data, tmp_path_factory) -> tuple[Workspace, ExperimentOutcome]:
-    """The whole study on few scenes and few levers."""
-    workspace = workspace_in(
-        tmp_path_factory.mktemp("tank"), ExperimentSettings(share=0.05, data=shared_data), plain
-    )
+    shop = workspace(tmp_path_factory.mktemp("tank"), 0.05, data=shared_data)
     with pytest.MonkeyPatch.context() as patch:
         with_few_values(patch)
-        return workspace, study.run(workspace)
+        return shop, study.run(shop)
 
 
 def test_every_method_every_kind_every_frame(outcome):
@@ -186,29 +169,22 @@ def test_every_method_every_kind_every_frame(outcome):
     assert set(tables) == {"touch_like", "kinds", "nine", "rods", "levers", "discs", "ceiling"}
 
 
-def test_discs_on_ratios_find_every_metal_object_and_reach_the_target(
-    outcome,
-):
-    discs = next(
-        one
-        for one in outcome[1].data["results"]
-        if (one["name"], one["kind"]) == (DISCS, "log-ratio")
-    )
+def test_discs_on_ratios_find_every_metal_object_and_reach_the_target(outcome):
+    of_kind = {(one["name"], one["kind"]): one for one in outcome[1].data["results"]}
+    discs = of_kind[DISCS, "log-ratio"]
     assert (discs["touch_like_places"]["found"], discs["touch_like_places"]["false"]) == (8, 0)
     assert np.mean(discs["touch_like"]) >= 0.85
 
 
-def test_atoms_show_large_objects_better_than_pixels(
-    outcome,
-):
+def test_atoms_show_large_objects_better_than_pixels(outcome):
     means = {str(one["levers"]): np.mean(one["touch_like"]) for one in outcome[1].data["levers"]}
     assert means[str(vars(Levers(atom=2.0)))] > means[str(vars(Levers()))] + 0.03
 
 
 def test_a_run_that_goes_on_computes_nothing_again(outcome, monkeypatch):
-    workspace, first = outcome
+    shop, first = outcome
     with_few_values(monkeypatch)
-    again = workspace_in(workspace.folder, workspace.settings, plain)
+    again = workspace_in(shop.folder, shop.settings, plain)
     goes_on(lambda: study.run(again), first, solves=True)
 
 

@@ -3,18 +3,13 @@ stopped."""
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page, goes_on
+from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import tracking
-from eitskin_studies.experiments.experiment import (
-    ExperimentSettings,
-    Workspace,
-    plain,
-    workspace_in,
-)
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tracking import measured, streams
 from eitskin_studies.experiments.tracking.counted import TrackCount, count_stream, total
 from eitskin_studies.experiments.tracking.streams import (
@@ -28,31 +23,28 @@ from eitskin_studies.experiments.tracking.streams import (
 
 
 @pytest.fixture
-def workspace(tmp_path, monkeypatch) -> Workspace:
+def small(tmp_path, monkeypatch) -> Workspace:
     """Coarse meshes, one SNR, one speed."""
     monkeypatch.setattr(measured, "ELEMENTS", 1500)
     monkeypatch.setattr(streams.TouchStream.scene, "__defaults__", (1500,))
     monkeypatch.setattr(tracking, "SNRS_DB", (40,))
     monkeypatch.setattr(tracking, "SPEEDS_MM_S", (0, 50))
-    return workspace_in(tmp_path / "out", ExperimentSettings(share=0.05), plain)
+    return workspace(tmp_path / "out", 0.05)
 
 
-def test_the_whole_and_again(workspace, tmp_path):
-    outcome = tracking.run(workspace)
+def test_the_whole_and_again(small, tmp_path):
+    outcome = tracking.run(small)
     assert {table.name for table in outcome.tables} == {"tracking", "parts", "choices", "passing"}
     assert len(outcome.tables[1].rows) == 8
     fills_its_page(outcome, "tracking", tmp_path)
-    goes_on(
-        lambda: tracking.run(workspace_in(workspace.folder, workspace.settings, plain)), outcome
-    )
+    goes_on(lambda: tracking.run(workspace(small.folder, 0.05)), outcome)
 
 
 def test_streams_are_those_of_their_seed_and_fingers_stay_apart():
     outline = paper_skin().outline
     drawn = random_streams(outline, 3, "test", 200, 6)
-    assert [one.facts() for one in drawn[:2]] == [
-        one.facts() for one in random_streams(outline, 3, "test", 200, 2)
-    ]
+    again = random_streams(outline, 3, "test", 200, 2)
+    assert [one.facts() for one in drawn[:2]] == [one.facts() for one in again]
     assert drawn[0].facts() != random_streams(outline, 4, "test", 200, 1)[0].facts()
     for one in drawn:
         for frame in range(FRAMES):
@@ -65,9 +57,8 @@ def test_streams_are_those_of_their_seed_and_fingers_stay_apart():
             both = finger.there[1:] & finger.there[:-1]
             step = np.hypot(np.diff(finger.x_mm), np.diff(finger.y_mm))[both]
             assert (step <= 200 / RATE_HZ + 1e-9).all() and np.median(step) > 0.9 * 200 / RATE_HZ
-            assert (
-                finger.contrast[finger.there].max() > 1.1 * finger.contrast[finger.there][0] > 1
-            )  # it lands lightly
+            there = finger.contrast[finger.there]
+            assert there.max() > 1.1 * there[0] > 1  # it lands lightly
 
 
 def test_fingers_that_pass_come_near():

@@ -3,10 +3,10 @@ leave."""
 
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import pytest
+from study_pages import PAGES, workspace
 
 from eitskin.cli.main import main
 from eitskin.errors import ConfigError, UsageError
@@ -16,12 +16,8 @@ from eitskin_studies.experiments.experiment import (
     ExperimentSettings,
     Table,
     Workspace,
-    plain,
-    workspace_in,
 )
 from eitskin_studies.experiments.write import to_json, write_all, write_page
-
-PAGES = Path(__file__).parents[3] / "docs" / "results"
 
 
 class Small:
@@ -39,9 +35,8 @@ class Small:
 
         values = workspace.kept({"part": "small"}, make)
         table = Table("small", ("what", "value"), (("mean", f"{values['mean']:g}"),))
-        return ExperimentOutcome(
-            (table,), values, {"small.png": lambda path: path.write_bytes(b"png")}, {"said": "so"}
-        )
+        pictures = {"small.png": lambda path: path.write_bytes(b"png")}
+        return ExperimentOutcome((table,), values, pictures, {"said": "so"})
 
 
 @pytest.fixture
@@ -66,21 +61,14 @@ def test_the_command_lists_runs_and_goes_on(small, tmp_path, capsys):
     assert main(["study", "list"]) == 0
     assert "small        one number" in capsys.readouterr().out
     page = tmp_path / "small.md"
-    page.write_text(
-        "".join(
-            f"<!-- {mark} -->\nold\n<!-- end {mark} -->\n" for mark in ("command", "small", "said")
-        )
-    )
+    marks = (f"<!-- {m} -->\nold\n<!-- end {m} -->\n" for m in ("command", "small", "said"))
+    page.write_text("".join(marks))
+    out = str(tmp_path / "out")
     for _ in range(2):
-        assert (
-            main(
-                ["study", "small", "-o", str(tmp_path / "out"), "--seed", "3", "--page", str(page)]
-            )
-            == 0
-        )
+        assert main(["study", "small", "-o", out, "--seed", "3", "--page", str(page)]) == 0
         assert "mean    0.5" in capsys.readouterr().out
     assert small.computed == 1
-    assert main(["study", "small", "-o", str(tmp_path / "out"), "--seed", "4", "--json"]) == 0
+    assert main(["study", "small", "-o", out, "--seed", "4", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"mean": 0.5, "none": None}
     assert small.computed == 2
     text = page.read_text(encoding="utf-8")
@@ -111,7 +99,7 @@ def test_what_cannot_be_is_refused_on_one_line(arguments, text, tmp_path, capsys
 
 
 def test_a_page_without_its_marks_stays_as_it_is(tmp_path):
-    outcome = Small().run(workspace_in(tmp_path / "out", ExperimentSettings(), plain))
+    outcome = Small().run(workspace(tmp_path / "out"))
     write_all(outcome, tmp_path / "out", pictures=False)
     page = tmp_path / "small.md"
     page.write_text("<!-- small -->\nold\n<!-- end small -->\n")
@@ -123,13 +111,12 @@ def test_a_page_without_its_marks_stays_as_it_is(tmp_path):
 
 def test_a_torn_line_is_computed_again(tmp_path):
     one = Small()
-    one.run(workspace_in(tmp_path, ExperimentSettings(), plain))
+    one.run(workspace(tmp_path))
     kept = tmp_path / "results.jsonl"
     kept.write_bytes(kept.read_bytes()[:-9])
-    one.run(workspace_in(tmp_path, ExperimentSettings(), plain))
-    assert one.computed == 2
-    one.run(workspace_in(tmp_path, ExperimentSettings(), plain))
-    assert one.computed == 2
+    for _ in range(2):
+        one.run(workspace(tmp_path))
+        assert one.computed == 2
 
 
 def test_sets_to_choose_on_are_not_those_that_are_reported():

@@ -30,19 +30,18 @@ def one_aspect(touch):
 
 
 def test_scenes_depend_on_family_seed_and_number_alone(factory):
-    few = factory.scenes("fingers_mild_errors", 1, 3)
-    more = factory.scenes("fingers_mild_errors", 2, 3)
+    few, more = (factory.scenes("fingers_mild_errors", count, 3) for count in (1, 2))
     other = factory.scenes("fingers_mild_errors", 1, 3, family="judging")
-    assert np.array_equal(few.frames_v[0], more.frames_v[0])
-    assert few.scenes[0] == more.scenes[0]
+    assert np.array_equal(few.frames_v[0], more.frames_v[0]) and few.scenes[0] == more.scenes[0]
     assert few.scenes[0].touches[0] != other.scenes[0].touches[0]
     assert not np.array_equal(few.quiet_v, other.quiet_v)
 
 
 def test_kept_frames_are_those_that_were_simulated(factory, tmp_path):
-    keeping = WorldFactory(factory.skin, factory.protocol, tmp_path, 1500)
-    first = keeping.scenes("ellipses", 1, 5)
-    again = WorldFactory(factory.skin, factory.protocol, tmp_path, 1500).scenes("ellipses", 1, 5)
+    first, again = (
+        WorldFactory(factory.skin, factory.protocol, tmp_path, 1500).scenes("ellipses", 1, 5)
+        for _ in range(2)
+    )
     assert len(list(tmp_path.iterdir())) == 1
     assert np.array_equal(first.frames_v, again.frames_v)
 
@@ -59,8 +58,8 @@ def test_drawn_touches_are_within_the_ranges_of_their_set(name):
             flat_reach_mm = one.radius_mm * math.sqrt(one_aspect(one))
             assert math.hypot(one.x_mm, one.y_mm) + flat_reach_mm <= 97 - 4 + 1e-9
     if kinds.pair_mm is not None:
-        a, b = touches
-        assert kinds.pair_mm[0] <= math.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) <= kinds.pair_mm[1]
+        apart = math.dist(*((one.x_mm, one.y_mm) for one in touches))
+        assert kinds.pair_mm[0] <= apart <= kinds.pair_mm[1]
 
 
 def test_each_error_changes_the_frames_that_it_should(factory):

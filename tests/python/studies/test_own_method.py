@@ -3,8 +3,6 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +12,7 @@ import pytest
 from eitskin.config import load_toml
 from eitskin.errors import UsageError
 from eitskin_studies.compare import methods
+from fresh_python import run_python
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLE = ROOT / "examples" / "python" / "own_method"
@@ -36,24 +35,16 @@ def install_by_hand(package: Path, site: Path) -> None:
     info.mkdir(parents=True)
     shutil.copy(package / "own_method.py", site)
     (info / "METADATA").write_text(f"Name: {table['name']}\nVersion: {table['version']}\n")
-    lines = [
-        line
-        for group, names in table["entry-points"].items()
-        for line in (f"[{group}]", *(f"{name} = {value}" for name, value in names.items()))
-    ]
+    lines = []
+    for group, names in table["entry-points"].items():
+        lines += [f"[{group}]", *(f"{name} = {value}" for name, value in names.items())]
     (info / "entry_points.txt").write_text("\n".join(lines))
 
 
-def test_the_example_is_installed_and_compared(tmp_path):
+def test_the_example_is_installed_and_compared(tmp_path, monkeypatch):
     install_by_hand(EXAMPLE, tmp_path)
-    paths = [str(tmp_path), os.environ.get("PYTHONPATH", "")]
-    done = subprocess.run(
-        [sys.executable, "-c", COMPARE],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    done = run_python(COMPARE)
     assert done.returncode == 0, done.stderr
     [(name, value, miou)] = json.loads(done.stdout)
     assert name == "truncated SVD" and value in (20, 40, 60, 80) and 0.6 < miou < 1

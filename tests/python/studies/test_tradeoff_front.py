@@ -2,6 +2,7 @@
 them."""
 
 import json
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -35,38 +36,27 @@ def test_instructions_are_estimated_from_points_of_the_same_storage_and_solver()
     packed = Configuration("i8", storage="i8")
     assert estimated_instructions(COLD, packed, (1000.0, 3000.0)) is None
     table = [*COLD, point("i8 too", 0.8, 900e3, storage="i8")]
-    estimate = estimated_instructions(table, packed, (1000.0, 3000.0))
-    found = estimate
-    assert found == {"kind": "estimated", "mean": 2000, "most": 6000, "instructions_per_mac": 2.0}
+    assert estimated_instructions(table, packed, (1000.0, 3000.0)) == {
+        "kind": "estimated", "mean": 2000, "most": 6000, "instructions_per_mac": 2.0,
+    }  # fmt: skip
 
 
 def test_the_recorded_results_are_of_the_built_in_set_and_reach_the_targets():
     front = recorded_front()
     names = {one.name for one in front.points}
     missing = {one.name for one in default_set()} - names
-    assert not missing, (
-        f"make the recorded results again (docs/results/tradeoff.md): {sorted(missing)} are not in"
-        " them"
-    )
-    assert all(
-        one.instructions is not None and one.instructions["kind"] == "counted"
-        for one in front.points
-    )
+    assert not missing, f"make the recorded results again (docs/results/tradeoff.md): {missing}"
+    kinds = {(one.instructions or {}).get("kind") for one in front.points}
+    assert kinds == {"counted"}
     assert choose(front.points, target("2.5Minstructions")).accuracy(HERE) >= 0.84
     assert choose(front.points, target("2.5Minstructions", worst=True)).accuracy(HERE) >= 0.84
     assert max(one.accuracy(HERE) or 0 for one in front.points) >= 0.87
-    by_name = {one.name: one for one in front.points}
-    for base in ("standard", "fine"):
-        for storage in ("f16", "i16", "i8"):
-            packed, plain = (
-                by_name[f"{base} {storage}"].accuracy(HERE),
-                by_name[base].accuracy(HERE),
-            )
-            assert packed == pytest.approx(plain, abs=0.005)
+    accuracy = {one.name: one.accuracy(HERE) for one in front.points}
+    for base, storage in product(("standard", "fine"), ("f16", "i16", "i8")):
+        assert accuracy[f"{base} {storage}"] == pytest.approx(accuracy[base], abs=0.005)
+    cold = [one for one in front.points if not one.configuration.warm_start]
     for budget in ("2ms", "5ms", "10ms", "50ms"):
-        assert choose(
-            [one for one in front.points if not one.configuration.warm_start], target(budget)
-        ).fits_f767
+        assert choose(cold, target(budget)).fits_f767
 
 
 def test_what_ships_is_short_and_chooses_the_same():

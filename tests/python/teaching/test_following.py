@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from all_engines import AllEngines
 from eitskin.core.results import Reconstruction
 from eitskin.model.model import Model
 from eitskin.scene.library_scenes import find_scene
@@ -39,16 +40,11 @@ def drifting(seed: int = 4) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndar
     some = presses(STREAM, seed=2)
     pattern = np.random.default_rng(seed).normal(size=some.protocol.n_rows)
     creep = 3e-4 * np.arange(STREAM)[:, None] * pattern
-    return (
-        some.untouched[:1] + noise(TARE, 9),
-        some.untouched + creep,
-        some.pressed + creep,
-        some.place_mm,
-    )
+    quiet = some.untouched[:1] + noise(TARE, 9)
+    return quiet, some.untouched + creep, some.pressed + creep, some.place_mm
 
 
 def strength(result: Reconstruction) -> float:
-    """Of all touches."""
     return sum(one.strength_s_per_m_mm2 for one in result.touches)
 
 
@@ -67,11 +63,11 @@ def errors_mm(core: Reconstructor) -> np.ndarray:
 def test_drift_between_presses_does_no_harm(model):
     core = Reconstructor(model)
     assert core.options.reference_frames == 512  # taught models ask for it
-    stays, follows = [], []
-    for frames, late in ((0, stays), (2, follows)):
+    late = {}
+    for frames in (0, 2):
         core.with_options(reference_frames=frames)
-        late += errors_mm(core)[-30:].tolist()
-    assert np.median(follows) < 5 < 10 < np.median(stays)
+        late[frames] = np.median(errors_mm(core)[-30:])
+    assert late[2] < 5 < 10 < late[0]
 
 
 def test_every_engine_follows_alike(model):
@@ -80,13 +76,12 @@ def test_every_engine_follows_alike(model):
     quiet, untouched, pressed, _ = drifting()
     presses_in_turn = np.stack([untouched, pressed], axis=1).reshape(2 * STREAM, -1)[:12]
     frames = [*presses_in_turn, *np.linspace(1, 1.003, 6)[:, None] * pressed[5]]
-    cores = [Reconstructor(model, engine=name) for name in ("c64", "numpy", "c")]
-    for core in cores:
-        core.with_options(reference_frames=3)
-        core.tare(quiet[:1])
+    cores = AllEngines(model, reference_frames=3)
+    cores.tare(quiet[:1])
     held_back = 0
     for frame in frames:
-        wide, plain, narrow = (core.reconstruct(frame) for core in cores)
+        results = cores.reconstruct(frame)
+        wide, plain, narrow = (results[name] for name in ("c64", "numpy", "c"))
         assert wide.info.found == plain.info.found
         held_back += "stale reference: tare again" in plain.info.found and not plain.touches
         assert len(wide.touches) == len(plain.touches) == len(narrow.touches)

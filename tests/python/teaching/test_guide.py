@@ -59,9 +59,8 @@ def test_good_presses_are_taken_with_the_frame_before(tmp_path):
     finger = Finger().good(0).good(1).good(2).add(20)
     _, said = finger.guided(tmp_path / "p.npz", 3)
     presses = load_presses(tmp_path / "p.npz")
-    assert [event.step for event in said[:5]] == [
-        Step.REST, Step.PRESS, Step.HOLD, Step.LIFT, Step.REST
-    ]  # fmt: skip
+    steps = [Step.REST, Step.PRESS, Step.HOLD, Step.LIFT, Step.REST]
+    assert [event.step for event in said[:5]] == steps
     assert said[-1].step is Step.DONE
     assert np.array_equal(presses.place_mm, plan_of(3).place_mm)
     assert np.abs(presses.difference - 0.05 * finger.pattern[:3]).max() < 2e-3
@@ -165,33 +164,28 @@ def test_a_plan_that_is_none(text, said, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["sim", "emu"])
-def test_a_whole_session(kind, tmp_path, capsys):
+def test_a_whole_session(kind, tmp_path, capsys, monkeypatch):
     """Plan, practise 20 presses, fit, check, then touch with the taught model, as a person would;
     the board's images are this host's."""
-    skin, plan, scene, presses, physics, model, run = (
-        str(tmp_path / name)
-        for name in ("skin.toml", "plan.csv", "scene.toml", "presses.npz", "physics.eitm",
-                     "taught.eitm", "run.eits")
-    )  # fmt: skip
+    monkeypatch.chdir(tmp_path)
 
-    def done(*arguments: str) -> str:
+    def done(command: str) -> str:
         capsys.readouterr()
-        assert main(list(arguments)) == 0
+        assert main(command.split()) == 0
         return capsys.readouterr().out
 
-    Path(skin).write_text(EIGHT_OPPOSITE_TOML)
-    done("model", "build", skin, "--samples", "0", "-o", physics)
-    done("teach", "plan", skin, "-n", "20", "-o", plan, "--practice", scene, "--picture",
-         str(tmp_path / "template.pdf"))  # fmt: skip
-    assert (tmp_path / "template.pdf").read_bytes()[:5] == b"%PDF-"
-    device = f"{kind}:{scene}"
-    said = done("teach", "record", "--plan", plan, "-o", presses, "--skin", skin,
-                "--device", device, "--model", physics)  # fmt: skip
+    Path("skin.toml").write_text(EIGHT_OPPOSITE_TOML)
+    done("model build skin.toml --samples 0 -o physics.eitm")
+    done("teach plan skin.toml -n 20 -o plan.csv --practice scene.toml --picture template.pdf")
+    assert Path("template.pdf").read_bytes()[:5] == b"%PDF-"
+    device = f"--device {kind}:scene.toml"
+    files = "--plan plan.csv -o presses.npz --skin skin.toml"
+    said = done(f"teach record {files} {device} --model physics.eitm")
     assert said.count("good; lift") == 20 and "all places are done" in said
-    assert np.allclose(load_presses(presses).place_mm, load_plan(plan).place_mm)
-    report = json.loads(done("teach", "fit", presses, "-o", model, "--json"))
+    assert np.allclose(load_presses("presses.npz").place_mm, load_plan("plan.csv").place_mm)
+    report = json.loads(done("teach fit presses.npz -o taught.eitm --json"))
     assert report["presses"] == 20 and report["error_mm"]["held_out_median"] < 3
-    assert ": fits (" in done("teach", "check", model, "--device", device)
-    done("record", "--device", device, "--model", model, "-o", run, "--frames", "30")
-    facts = json.loads(done("replay", run, "--model", model, "--check", "--json"))
+    assert ": fits (" in done(f"teach check taught.eitm {device}")
+    done(f"record {device} --model taught.eitm -o run.eits --frames 30")
+    facts = json.loads(done("replay run.eits --model taught.eitm --check --json"))
     assert facts["same_bits"] and facts["images"] == facts["touches"] == 30

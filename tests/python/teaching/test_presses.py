@@ -12,9 +12,8 @@ from eitskin.teaching.presses import Presses, joined, load_presses, save_presses
 def some(count: int = 3) -> Presses:
     draw, protocol = np.random.default_rng(1), opposite(8)
     rows = (count, protocol.n_rows)
-    return Presses(
-        protocol, draw.normal(size=rows), draw.normal(size=rows), draw.normal(size=(count, 2))
-    )
+    untouched, pressed, place = (draw.normal(size=size) for size in (rows, rows, (count, 2)))
+    return Presses(protocol, untouched, pressed, place)
 
 
 def test_a_file_gives_back_its_presses(tmp_path):
@@ -27,12 +26,8 @@ def test_a_file_gives_back_its_presses(tmp_path):
 
 
 def test_what_cannot_be_presses_is_refused(tmp_path):
-    arrays = {
-        "untouched": some().untouched,
-        "pressed": some().pressed,
-        "place_mm": some().place_mm,
-        "drive_measure": opposite(8).drive_measure,
-    }
+    made = some()
+    arrays = {name: getattr(made, name) for name in ("untouched", "pressed", "place_mm")}
     for change, words in (
         ({"place_mm": np.zeros((2, 2))}, "shape"),
         ({"place_mm": np.full((3, 2), np.inf)}, "give it in mm"),
@@ -41,8 +36,7 @@ def test_what_cannot_be_presses_is_refused(tmp_path):
         ({"version": 9}, "upgrade"),
     ):
         path = tmp_path / "bad.npz"
-        kept = {name: one for name, one in {**arrays, **change}.items() if one is not None}
-        np.savez(path, **kept)
+        np.savez(path, drive_measure=opposite(8).drive_measure, **{**arrays, **change})
         with pytest.raises(FrameError, match=words):
             load_presses(path)
     (tmp_path / "none.npz").write_bytes(b"PK no zip")

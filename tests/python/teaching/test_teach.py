@@ -3,26 +3,19 @@
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from all_engines import AllEngines
+from eitskin.arrays import FloatArray
 from eitskin.cli.teach_fit import described_skin
 from eitskin.errors import ConfigError, FrameError, UsageError
 from eitskin.model.eitm import decode_model, encode_model
-from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.kernel import Placement, placement_text
-from eitskin.teaching.left_out import (
-    CHI2_90,
-    ellipse_factor,
-    leave_one_out,
-    without_own,
-)
+from eitskin.teaching.left_out import CHI2_90, ellipse_factor, leave_one_out, without_own
 from eitskin.teaching.make import taught_model
 from eitskin.teaching.presses import aged, shifted
 from eitskin.teaching.teach import Taught, best_share, near_sums, size_law, solve_presses, teach
 from simulated_presses import RADIUS_MM, SKIN, TRUE, presses
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
@@ -83,33 +76,32 @@ def test_the_file_brings_its_own_options_and_every_engine_agrees(taught):
     away = np.linalg.norm(some.place_mm[:, None] - some.place_mm, axis=2)
     both = np.argwhere(np.triu(away > RADIUS_MM))[:6]
     model = replace(model, place_factor=4.0)
-    found: dict[str, list[FloatArray]] = {"c": [], "c64": [], "numpy": []}
-    images: dict[str, FloatArray] = {}
-    variances: dict[str, list[list[float | None]]] = {"c": [], "c64": [], "numpy": []}
+    cores = AllEngines(model)
+    found: dict[str, list[FloatArray]] = {name: [] for name in cores}
+    variances: dict[str, list[list[float | None]]] = {name: [] for name in cores}
     exact = 0
-    for engine, places in found.items():
-        core = Reconstructor(model, engine=engine)
+    for core in cores.values():
         assert not core.options.project_reference and core.options.touch_seek
         assert core.options.touch_fit == 0
-        for i, j in both:
-            core.forget()
-            core.tare(some.untouched[i])
-            made = core.reconstruct(some.pressed[i] + some.difference[j])
-            places.append(np.array([(one.x_mm, one.y_mm) for one in made.touches]))
+    for i, j in both:
+        cores.forget()
+        cores.tare(some.untouched[i])
+        made = cores.reconstruct(some.pressed[i] + some.difference[j])
+        for engine, result in made.items():
+            found[engine].append(np.array([(one.x_mm, one.y_mm) for one in result.touches]))
             variances[engine] += [
-                [t.x_variance_mm2, t.xy_covariance_mm2, t.y_variance_mm2] for t in made.touches
+                [t.x_variance_mm2, t.xy_covariance_mm2, t.y_variance_mm2] for t in result.touches
             ]
-            images[engine] = made.image
+    images = {engine: result.image for engine, result in made.items()}
     size = images["numpy"].max()
     assert images["c64"] == pytest.approx(images["numpy"], abs=1e-9 * size)
-    for c32, c64, numpy in zip(*found.values(), strict=True):
+    for c32, c64, numpy in zip(*(found[name] for name in ("c", "c64", "numpy")), strict=True):
         assert c64 == pytest.approx(numpy, abs=1e-6) and c32 == pytest.approx(numpy, abs=0.02)
     largest = np.max(variances["numpy"])
     assert np.min(np.array(variances["c"])[:, [0, 2]]) > 0
+    known = np.array(variances["numpy"])
     for engine, tolerance in (("c64", 1e-6), ("c", 1e-2)):
-        assert variances[engine] == pytest.approx(
-            np.array(variances["numpy"]), abs=tolerance * largest
-        )
+        assert variances[engine] == pytest.approx(known, abs=tolerance * largest)
     for (i, j), seen in zip(both, found["c"], strict=True):
         apart = np.linalg.norm(seen[:, None] - some.place_mm[[i, j]], axis=2)
         exact += len(seen) == 2 and apart.min(axis=0).max() < 0.1 * 2 * RADIUS_MM
@@ -118,29 +110,27 @@ def test_the_file_brings_its_own_options_and_every_engine_agrees(taught):
 
 def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught):
     judged = presses(25, seed=5)
-    out = np.arange(judged.protocol.n_rows) < 9
-    errors = []
+    out, median = np.arange(judged.protocol.n_rows) < 9, []
     whole = taught_model(
         taught.learned, judged.protocol, taught.model.grid, judged.untouched, 0.2, rank=14
     )
     for precision in (whole.precision, None):
-        model = replace(whole, precision=precision)
-        cores = [Reconstructor(model, engine=one) for one in ("c", "c64", "numpy")]
-        for core in cores:
-            core.mask_rows(out)
+        cores, errors = AllEngines(replace(whole, precision=precision)), []
+        cores.mask_rows(out)
         for i in range(25):
-            found = []
-            for core in cores[:1] if i else cores:
-                core.forget()
-                core.tare(judged.untouched[i])
-                found.append(core.reconstruct(judged.pressed[i]))
+            if i == 1:
+                del cores["c64"], cores["numpy"]
+            cores.forget()
+            cores.tare(judged.untouched[i])
+            found = cores.reconstruct(judged.pressed[i])
             if not i:
-                assert found[1].image == pytest.approx(
-                    found[2].image, abs=1e-8 * found[2].image.max()
-                )
-            at = [(one.x_mm, one.y_mm) for one in found[0].touches[:1]] or [(2 * RADIUS_MM, 0.0)]
+                image = found["numpy"].image
+                assert found["c64"].image == pytest.approx(image, abs=1e-8 * image.max())
+            touches = found["c"].touches[:1]
+            at = [(one.x_mm, one.y_mm) for one in touches] or [(2 * RADIUS_MM, 0.0)]
             errors.append(float(np.linalg.norm(at[0] - judged.place_mm[i])))
-    assert np.median(errors[:25]) < np.median(errors[25:])
+        median.append(np.median(errors))
+    assert median[0] < median[1]
 
 
 @pytest.mark.parametrize(

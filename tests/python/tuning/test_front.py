@@ -2,6 +2,7 @@
 
 import pytest
 
+from eitskin.device.settings import SolverSettings
 from eitskin.errors import ConfigError, FileError, UsageError
 from eitskin.tuning.front import Budget, choose, load_front, read_budget
 from made_points import COLD, HERE, point, target
@@ -66,13 +67,8 @@ def test_a_longer_scan_is_chosen_only_where_there_is_time():
 def test_boards_get_only_what_they_can_be_told():
     half = point("half", 0.89, 300e3, touch_sweeps=2)
     assert choose([*COLD, half], target("10ms")).name == "c"
-    assert (
-        not point("limited", 0.9, 1e5, mac_limit=5).fits_f767
-        or "mac_limit"
-        in __import__(
-            "eitskin.device.settings", fromlist=["SolverSettings"]
-        ).SolverSettings.__dataclass_fields__
-    )
+    limited = point("limited", 0.9, 1e5, mac_limit=5)
+    assert not limited.fits_f767 or "mac_limit" in SolverSettings.__dataclass_fields__
     assert not point("large", 0.9, 1e5, ram_bytes=300_000).fits_f767
 
 

@@ -22,16 +22,12 @@ LONG = "a recording of the second morning, electrode 5 loose, $x_1$, by the wind
 NOTE = "the first 36 of 1200 frames; " * 4
 
 
-def skins() -> dict[str, Skin]:
-    long = polygon([(0, 0), (400, 0), (400, 40), (0, 40)])
-    return {
-        "disk": Skin("disk", disk(194.0), Electrodes(16)),
-        "long": Skin("long", long, Electrodes(16, 4.0)),
-        "hand": load_skin(HAND)[0],
-    }
-
-
-SKINS = skins()
+BAND = polygon([(0, 0), (400, 0), (400, 40), (0, 40)])
+SKINS = {
+    "disk": Skin("disk", disk(194.0), Electrodes(16)),
+    "long": Skin("long", BAND, Electrodes(16, 4.0)),
+    "hand": load_skin(HAND)[0],
+}
 
 
 def panels(skin: Skin, count: int) -> list[Panel]:
@@ -82,10 +78,9 @@ def assert_whole(figure: Any) -> None:
 @pytest.mark.parametrize("name", SKINS)
 @pytest.mark.parametrize("count", (1, 2, 12))
 def test_every_text_is_whole(name, count):
-    skin = SKINS[name]
-    figure = panels_figure(
-        skin, grid_for(skin.outline), panels(skin, count), title=LONG, note=NOTE, legend=True
-    )
+    skin, given = SKINS[name], panels(SKINS[name], count)
+    grid = grid_for(skin.outline)
+    figure = panels_figure(skin, grid, given, title=LONG, note=NOTE, legend=True)
     assert_whole(figure)
     width, height = figure.get_size_inches()
     assert width < 16 and height < 16
@@ -100,13 +95,8 @@ def test_every_text_is_whole(name, count):
 def test_one_frame_at_large_is_whole(name):
     skin = SKINS[name]
     panel = panels(skin, 1)[0]
-    assert panel.values is not None
-    assert_whole(
-        frame_figure(
-            skin, grid_for(skin.outline), panel.values, truth=panel.truth, found=panel.found,
-            title=LONG,
-        )
-    )  # fmt: skip
+    seen = {"truth": panel.truth, "found": panel.found, "title": LONG}
+    assert_whole(frame_figure(skin, grid_for(skin.outline), panel.values, **seen))
 
 
 def test_words_that_are_too_long_are_cut():

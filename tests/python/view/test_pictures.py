@@ -32,9 +32,8 @@ def test_a_frame_is_drawn_and_repeats_byte_for_byte(tmp_path):
     files = [tmp_path / "a.png", tmp_path / "b.png"]
     for file in files:
         truth, found = [Mark(30, 20, 9, 0.05)], [Mark(31, 20)]
-        draw_frame(
-            file, SKIN, GRID, blob(GRID, 30, 20), truth=truth, found=found, title="one touch"
-        )
+        drawn = {"truth": truth, "found": found, "title": "one touch"}
+        draw_frame(file, SKIN, GRID, blob(GRID, 30, 20), **drawn)
     assert files[0].read_bytes() == files[1].read_bytes()
     assert files[0].read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     height, width, _ = read(files[0]).shape
@@ -61,11 +60,8 @@ def test_red_is_where_the_change_is(tmp_path):
 
 
 def test_electrodes_are_numbered_from_0_outside_the_rim():
-    skin = Skin(
-        "ell",
-        polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)]),
-        Electrodes(count=12),
-    )
+    ell = polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)])
+    skin = Skin("ell", ell, Electrodes(count=12))
     axes = pictures.load_matplotlib().figure.Figure().add_subplot()
     pictures.draw_panel(axes, skin, grid_for(skin.outline), Panel("ell"))
     texts = {text.get_text(): text.get_position() for text in axes.texts}
@@ -76,18 +72,17 @@ def test_electrodes_are_numbered_from_0_outside_the_rim():
 
 
 def test_frame_without_truth_has_two_panels_and_units(tmp_path):
-    draw_frame(tmp_path / "two.png", SKIN, GRID, np.zeros(GRID.n_pixels), unit="mS/m")
-    draw_frame(
-        tmp_path / "three.png", SKIN, GRID, np.zeros(GRID.n_pixels), truth=[Mark(0, 0, 9, 1.0)]
-    )
+    flat = np.zeros(GRID.n_pixels)
+    draw_frame(tmp_path / "two.png", SKIN, GRID, flat, unit="mS/m")
+    draw_frame(tmp_path / "three.png", SKIN, GRID, flat, truth=[Mark(0, 0, 9, 1.0)])
     assert read(tmp_path / "three.png").shape[1] > 1.3 * read(tmp_path / "two.png").shape[1]
 
 
 def test_many_panels(tmp_path):
-    panels = [
-        Panel(str(k), blob(GRID, 10 * k, 0), (Mark(10 * k, 0, 9),), (Mark(10 * k, 1, 8),))
-        for k in range(5)
-    ]
+    panels = []
+    for x in range(0, 50, 10):
+        marks = (Mark(x, 0, 9),), (Mark(x, 1, 8),)
+        panels.append(Panel(str(x), blob(GRID, x, 0), *marks))
     draw_panels(tmp_path / "many.png", SKIN, GRID, panels, 3, title="five", note="a note")
     height, width, _ = read(tmp_path / "many.png").shape
     assert 0.7 < height / width < 1.1  # two rows of three, a bar, a note

@@ -19,10 +19,8 @@ SOLVED = Solved(
 def seen(number: int) -> ComparedFrame:
     values = np.zeros(812, dtype=np.float32)
     values[number % 812] = 1.0
-    return ComparedFrame(
-        LiveFrame(number, 1000 * number, 0, image=SolvedImage(SOLVED, values)),
-        true=(TrueTouch(0.0, 0.0, 9.0, 5.0),),
-    )
+    frame = LiveFrame(number, 1000 * number, 0, image=SolvedImage(SOLVED, values))
+    return ComparedFrame(frame, true=(TrueTouch(0.0, 0.0, 9.0, 5.0),))
 
 
 def album(count: int) -> Album:

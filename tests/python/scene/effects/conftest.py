@@ -1,9 +1,11 @@
 """A session that effects are made in, without a compiler: its own mesh, exact frame and streams."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from effect_types import FloatArray, MakeSession
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, build_mesh
 from eitskin.scene.effect import EffectSession
@@ -14,7 +16,6 @@ from eitskin.skin.skin import paper_skin
 
 @pytest.fixture(scope="session")
 def small_mesh() -> Mesh:
-    """A coarse mesh of the paper's skin, about 1,500 elements."""
     return build_mesh(paper_skin(), max_size_mm=9.0, electrode_size_mm=1.0)
 
 
@@ -24,7 +25,7 @@ def v0(small_mesh) -> FloatArray:
 
 
 @pytest.fixture
-def make_session(small_mesh, v0) -> MakeSession:
+def make_session(small_mesh, v0) -> Callable[..., EffectSession]:
     """Sessions on the paper's skin; ``drawn`` records the streams that were asked for."""
 
     def make(

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
@@ -51,16 +51,12 @@ def _bar(cells: int = 8) -> tuple[Mesh, Skin]:
     triangles = np.concatenate(
         [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
     )
-    ends = [np.column_stack([number[:-1, k], number[1:, k]]) for k in (0, -1)]
-    below = [
-        np.column_stack([number[0, k : k + 1], number[0, k + 1 : k + 2]])
-        for k in (nx // 4, nx * 11 // 16)
-    ]
-    mesh = Mesh(np.column_stack([x.ravel(), y.ravel()]), triangles, (*below, *ends))
+    bottom, ends = (nx // 4, nx * 11 // 16), (number[:, 0], number[:, -1])
+    below = [number[0, k : k + 2][None] for k in bottom]
+    rims = (*below, *(np.column_stack([end[:-1], end[1:]]) for end in ends))
+    mesh = Mesh(np.column_stack([x.ravel(), y.ravel()]), triangles, rims)
     outline = polygon([(0, 0), (80, 0), (80, 20), (0, 20)])
-    return mesh, Skin(
-        "bar", outline, Electrodes(4, 5.0), conductivity_s_per_m=0.05, thickness_mm=5.0
-    )
+    return mesh, Skin("bar", outline, Electrodes(4, 5.0), 0.05, 5.0)
 
 
 @pytest.mark.parametrize("hertz", [100.0, 5e3, 50e3, 1e6])
@@ -76,18 +72,13 @@ def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(make_session, 
     contacts = np.array([9e5, 9e5, resistance, resistance])
     solver = FactoriseComplex(forward, _only_ends(step), Work())
     nothing = Change(np.zeros(0, np.int64), np.zeros(0))
-    v: Any = (
-        forward.patterns.voltages(
-            solver.electrodes(np.full(mesh.n_elements, 0.05), nothing, contacts)
-        )
-        * 1e-3
-    )
+    electrodes = solver.electrodes(np.full(mesh.n_elements, 0.05), nothing, contacts)
+    v: Any = forward.patterns.voltages(electrodes) * 1e-3
     omega, area_m2 = 2 * pi * hertz, 20e-3 * 5e-3
     admittivity = 0.05 + 1j * omega * 8.8541878128e-12 * 2e4
     interface = resistance / (1 + 1j * omega * resistance * 0.02)
-    assert v[0] == pytest.approx(
-        1e-3 * (80e-3 / (admittivity * area_m2) + 2 * interface / area_m2), rel=1e-9
-    )
+    whole = 80e-3 / (admittivity * area_m2) + 2 * interface / area_m2
+    assert v[0] == pytest.approx(1e-3 * whole, rel=1e-9)
     assert v[1] == pytest.approx(1e-3 * 35e-3 / (admittivity * area_m2), rel=1e-6)
     np.testing.assert_allclose(step.readout(v), v.real, rtol=0)
     magnitude = phase.make(phase.Parameters(hertz, readout="magnitude"), make_session()).readout
@@ -108,16 +99,11 @@ def test_the_interface_is_a_resistance_parallel_to_a_capacitance():
     assert corner[1] == pytest.approx(0.01 / (1 + 1j))
     fast = phase.interface(z, 1e9, 0.1)
     np.testing.assert_allclose(fast[1:3], 1 / (2j * pi * 1e9 * 0.1), rtol=1e-6)
-    assert (
-        fast[0] == 0 and fast[3] == 1e6
-    )  # a shunt stays one, and what does not touch has no double layer
-    assert (
-        contact_impedance.Parameters.__dataclass_fields__["mean_ohm_m2"].metadata["high"]
-        < phase.NO_CONTACT_OHM_M2
-    )
-    assert (
-        min(OPEN_OHM_M2, OPEN_BRIDGED_OHM_M2) >= phase.NO_CONTACT_OHM_M2
-    )  # detached electrodes are solved with these
+    # a shunt stays one, and what does not touch has no double layer
+    assert fast[0] == 0 and fast[3] == 1e6
+    most = contact_impedance.Parameters.__dataclass_fields__["mean_ohm_m2"].metadata["high"]
+    # detached electrodes are solved with these
+    assert most < phase.NO_CONTACT_OHM_M2 <= min(OPEN_OHM_M2, OPEN_BRIDGED_OHM_M2)
     y = phase.admittivity(np.array([0.01]), 50e3, 80.0)
     assert y[0].imag == pytest.approx(2.2253e-4, rel=1e-3)
 

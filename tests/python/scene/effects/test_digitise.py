@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError
 from eitskin.scene.effects import adc, jitter, noise, saturation
 
@@ -31,19 +31,14 @@ def test_snr_is_the_ratio_of_rms_to_deviation(make_session, v0, snr_db):
 
 
 def test_noise_in_volts_and_its_default(make_session, v0):
-    session = make_session()
+    session, rms_v = make_session(), np.sqrt(np.mean(v0**2))
     assert noise.deviation_v(noise.Parameters(noise_v=3e-4), session) == 3e-4
-    assert noise.deviation_v(noise.Parameters(), session) == pytest.approx(
-        np.sqrt(np.mean(v0**2)) / 1000
-    )
-    with pytest.raises(ConfigError, match="either snr_db or noise_v"):
-        noise.Parameters(snr_db=60.0, noise_v=1e-3)
+    assert noise.deviation_v(noise.Parameters(), session) == pytest.approx(rms_v / 1000)
 
 
 @pytest.mark.parametrize("bits", [6, 12, 16])
 def test_quantisation_error_has_the_variance_of_a_uniform_step(make_session, bits):
-    session = make_session()
-    step = adc.make(adc.Parameters(bits=bits, range_v=2.0), session)
+    step = adc.make(adc.Parameters(bits=bits, range_v=2.0), make_session())
     lsb = 4.0 / 2**bits
     v = np.random.default_rng(5).uniform(-1.9, 1.9, 200_000)
     error = step.apply(v, 0.0, 0) - v
@@ -64,25 +59,31 @@ def test_codes_are_whole_and_end_where_twos_complement_does(make_session):
 
 
 def test_headroom_counts_from_the_largest_untouched_voltage(make_session, v0):
-    session = make_session()
-    assert adc.range_v(adc.Parameters(headroom=2.0), session) == pytest.approx(2 * np.abs(v0).max())
-    assert saturation.limit_v(saturation.Parameters(headroom=0.5), session) == pytest.approx(
-        np.abs(v0).max() / 2
-    )
-    for both in (
-        lambda: adc.Parameters(range_v=1.0, headroom=1.0),
-        lambda: saturation.Parameters(1.0, 1.0),
-    ):
-        with pytest.raises(ConfigError, match="give either"):
-            both()
+    session, most_v = make_session(), np.abs(v0).max()
+    assert adc.range_v(adc.Parameters(headroom=2.0), session) == pytest.approx(2 * most_v)
+    limit_v = saturation.limit_v(saturation.Parameters(headroom=0.5), session)
+    assert limit_v == pytest.approx(most_v / 2)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "given"),
+    [
+        (adc.Parameters, {"range_v": 1.0, "headroom": 1.0}),
+        (saturation.Parameters, {"limit_v": 1.0, "headroom": 1.0}),
+        (noise.Parameters, {"snr_db": 60.0, "noise_v": 1e-3}),
+    ],
+    ids=["adc", "saturation", "noise"],
+)
+def test_one_of_two_is_to_be_given(parameters, given):
+    with pytest.raises(ConfigError, match="give either"):
+        parameters(**given)
 
 
 def test_saturation_clips_exactly(make_session):
     step = saturation.make(saturation.Parameters(limit_v=0.7), make_session())
     v = np.array([-5.0, -0.7000001, -0.7, -0.3, 0.0, 0.69, 0.7, 0.70001, 1e9])
-    np.testing.assert_array_equal(
-        step.apply(v, 0.0, 0), [-0.7, -0.7, -0.7, -0.3, 0.0, 0.69, 0.7, 0.7, 0.7]
-    )
+    expected = [-0.7, -0.7, -0.7, -0.3, 0.0, 0.69, 0.7, 0.7, 0.7]
+    np.testing.assert_array_equal(step.apply(v, 0.0, 0), expected)
 
 
 def _demodulated(s: float, samples: int, trials: int) -> FloatArray:

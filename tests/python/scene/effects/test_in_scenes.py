@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import FloatArray
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.scene.compiler import Compiled, MeshCache, compile_scene
@@ -22,9 +22,8 @@ BENCH = MeshCache()  # keeps the meshes
 
 def _compiled(effects: dict[str, Any], protocol: Protocol | None = None, **more: Any) -> Compiled:
     given = {"quiet_frames": 1, "frames": 1, "elements": ELEMENTS, "seed": 3, **more}
-    return compile_scene(
-        Scene("test", protocol=protocol or adjacent(16), effects=effects, **given), mesh_cache=BENCH
-    )
+    scene = Scene("test", protocol=protocol or adjacent(16), effects=effects, **given)
+    return compile_scene(scene, mesh_cache=BENCH)
 
 
 def _last(effects: dict[str, Any], protocol: Protocol | None = None, **more: Any) -> FloatArray:
@@ -45,9 +44,8 @@ def test_a_bridge_is_a_resistor_parallel_to_the_skin(ohm, contact):
     whole = _last(contact, rows)
     skin_ohm = whole[0] / rows.current_a
     bridged = _last({**contact, "bridged": {"electrodes": [3, 4], "resistance_ohm": ohm}}, rows)
-    np.testing.assert_allclose(
-        bridged, whole * ohm / (ohm + skin_ohm), rtol=1e-9, atol=1e-12 * np.abs(whole).max()
-    )
+    expected, least = whole * ohm / (ohm + skin_ohm), 1e-12 * np.abs(whole).max()
+    np.testing.assert_allclose(bridged, expected, rtol=1e-9, atol=least)
 
 
 def test_bridged_without_resistance_electrodes_are_at_one_potential():
@@ -55,16 +53,9 @@ def test_bridged_without_resistance_electrodes_are_at_one_potential():
     them."""
     rows = table(
         16,
-        [
-            [0, 8, 2, 3],
-            [0, 8, 3, 9],
-            [0, 8, 2, 9],
-            [0, 8, 2, 6],
-            [0, 8, 9, 6],
-            [2, 8, 5, 6],
-            [3, 8, 5, 6],
-        ],
-    )
+        [[0, 8, 2, 3], [0, 8, 3, 9], [0, 8, 2, 9], [0, 8, 2, 6], [0, 8, 9, 6], [2, 8, 5, 6],
+         [3, 8, 5, 6]],
+    )  # fmt: skip
     v = _last({"bridged": {"electrodes": [2, 3, 9], "resistance_ohm": 0.0}}, rows)
     assert np.abs(v[:3]).max() < 1e-12
     assert v[3] == pytest.approx(v[4], rel=1e-9)
@@ -98,16 +89,12 @@ def test_a_wobbling_electrode_is_lost_for_a_while():
 def test_phase_leaves_detached_electrodes_detached():
     """The double layer would else shunt what does not touch."""
     off = {"detached": {"electrodes": [5]}, "contact_impedance": {"mean_ohm_m2": 0.01}}
-    slow = {
-        "phase": {"frequency_hz": 1e-3, "relative_permittivity": 1.0, "capacitance_f_per_m2": 1e-3}
-    }
+    even = {"relative_permittivity": 1.0}
+    slow = {"phase": {"frequency_hz": 1e-3, "capacitance_f_per_m2": 1e-3, **even}}
     np.testing.assert_allclose(_last({**off, **slow}), _last(off), rtol=1e-6, atol=1e-9)
-    fast = {
-        "phase": {"frequency_hz": 50e3, "relative_permittivity": 1.0, "capacitance_f_per_m2": 10.0}
-    }
-    np.testing.assert_allclose(
-        _last({**off, **fast}), _last({"detached": {"electrodes": [5]}}), rtol=1e-4, atol=1e-6
-    )
+    fast = {"phase": {"frequency_hz": 50e3, "capacitance_f_per_m2": 10.0, **even}}
+    bare = _last({"detached": {"electrodes": [5]}})
+    np.testing.assert_allclose(_last({**off, **fast}), bare, rtol=1e-4, atol=1e-6)
 
 
 def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor():
@@ -133,10 +120,8 @@ def test_source_impedance_divides_the_current(hertz, with_phase):
     truth = simulate_frames(_compiled(more, rows)).true_v[0]
     load = np.repeat(truth[[0, 2]] / rows.current_a, 2) + 240.0
     share = 1 / (1 + load * (1 / 30e3 + 2j * pi * hertz * 200e-12))
-    expected = (truth * share).real
-    np.testing.assert_allclose(
-        _last({**more, "source_impedance": source}, rows), expected, rtol=1e-9
-    )
+    divided = _last({**more, "source_impedance": source}, rows)
+    np.testing.assert_allclose(divided, (truth * share).real, rtol=1e-9)
     assert 0.3 < abs(share).min() < abs(share).max() < 0.9
 
 

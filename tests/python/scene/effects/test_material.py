@@ -21,11 +21,9 @@ def test_gel_dries_exponentially_from_the_first_frame(make_session):
     sigma = np.array([0.01, 0.02])
     assert np.array_equal(step.apply(sigma, session.times_s()[0], 0), sigma)
     for frame in (10, 50, 99):
-        hours = frame * 0.1
-        water = 0.4 + 0.6 * exp(-hours / 2)
-        np.testing.assert_allclose(
-            step.apply(sigma, session.times_s()[frame], frame), sigma * water**1.7, rtol=1e-12
-        )
+        water = 0.4 + 0.6 * exp(-frame * 0.1 / 2)
+        dried = step.apply(sigma, session.times_s()[frame], frame)
+        np.testing.assert_allclose(dried, sigma * water**1.7, rtol=1e-12)
     assert gel_drying.drying_factor(1e9, parameters) == pytest.approx(0.4**1.7)
     # the law itself: what is left to lose falls by the same part in every hour
     free = [gel_drying.drying_factor(3600 * h, parameters) ** (1 / 1.7) - 0.4 for h in range(5)]
@@ -34,23 +32,20 @@ def test_gel_dries_exponentially_from_the_first_frame(make_session):
 
 def test_temperature_is_linear_with_its_coefficient(make_session):
     session = make_session(n_frames=121, quiet_frames=0, rate_hz=1.0)
-    step = temperature.make(
-        temperature.Parameters(offset_k=1.0, drift_k_per_min=2.0, coefficient_per_k=0.02), session
-    )
+    parameters = temperature.Parameters(offset_k=1.0, drift_k_per_min=2.0, coefficient_per_k=0.02)
+    step = temperature.make(parameters, session)
     sigma = np.array([0.01])
     factors = [float(step.apply(sigma, t, 0)[0] / 0.01) for t in (0.0, 60.0, 120.0)]
     np.testing.assert_allclose(factors, [1.02, 1.06, 1.10], rtol=1e-12)
     assert step.varies
-    assert not temperature.make(
-        temperature.Parameters(offset_k=3.0, drift_k_per_min=0.0), session
-    ).varies
+    steady = temperature.Parameters(offset_k=3.0, drift_k_per_min=0.0)
+    assert not temperature.make(steady, session).varies
 
 
 def test_a_temperature_that_would_empty_the_sheet_is_refused(make_session):
+    falling = temperature.Parameters(drift_k_per_min=-100.0)
     with pytest.raises(ConfigError, match="drift_k_per_min: over the session"):
-        temperature.make(
-            temperature.Parameters(drift_k_per_min=-100.0), make_session(n_frames=2000, rate_hz=1.0)
-        )
+        temperature.make(falling, make_session(n_frames=2000, rate_hz=1.0))
 
 
 @pytest.mark.parametrize("spread", [0.05, 0.5, 2.0])
@@ -58,24 +53,21 @@ def test_the_backgrounds_mean_over_the_area_is_kept(make_session, small_mesh, sp
     step = background.make(background.Parameters(spread, 25.0), make_session())
     sigma = step.apply(np.full(small_mesh.n_elements, 0.01), 0.0, 0)
     assert np.average(sigma, weights=small_mesh.areas_mm2) == pytest.approx(0.01, rel=1e-12)
-    assert sigma.min() > 0
-    assert not step.varies
+    assert sigma.min() > 0 and not step.varies
 
 
 def test_the_background_has_its_spread_and_its_length():
     """Over 300 draws: the deviation, and the correlation exp(-d^2 / 2 l^2) of the field under
     it."""
     places = np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 20.0], [200.0, 0.0]])
-    fields = np.array(
-        [background.random_field(places, 20.0, np.random.default_rng(k)) for k in range(3000)]
-    )
+    draws = (np.random.default_rng(k) for k in range(3000))
+    fields = np.array([background.random_field(places, 20.0, draw) for draw in draws])
     correlation = np.corrcoef(fields.T)[0]
     np.testing.assert_allclose(correlation, [1, exp(-0.125), exp(-0.5), 0], atol=0.06)
     assert fields.std() == pytest.approx(1, rel=0.03)
     grid = np.stack(np.meshgrid(np.arange(100.0), np.arange(100.0)), axis=-1).reshape(-1, 2)
-    made = background.pattern(
-        grid, np.ones(len(grid)), background.Parameters(0.3, 2.0), np.random.default_rng(1)
-    )
+    parameters, draw = background.Parameters(0.3, 2.0), np.random.default_rng(1)
+    made = background.pattern(grid, np.ones(len(grid)), parameters, draw)
     assert made.std() == pytest.approx(0.3, rel=0.1)
 
 
@@ -86,9 +78,8 @@ def test_another_mesh_samples_the_same_background(make_session, small_mesh):
     parameters = background.Parameters(0.3, 40.0)
     a = background.make(parameters, session).apply(np.ones(small_mesh.n_elements), 0.0, 0)
     b = background.make(parameters, other).apply(np.ones(finer.n_elements), 0.0, 0)
-    near = np.argmin(
-        np.linalg.norm(finer.centroids_mm()[:, None] - small_mesh.centroids_mm(), axis=2), axis=1
-    )
+    apart = np.linalg.norm(finer.centroids_mm()[:, None] - small_mesh.centroids_mm(), axis=2)
+    near = np.argmin(apart, axis=1)
     assert np.corrcoef(a[near], b)[0, 1] > 0.99
 
 
@@ -98,9 +89,8 @@ def test_misplacement_moves_electrodes_along_the_rim(make_session):
     before, after = session.skin, step.apply(session.skin)
     moved = np.linalg.norm(after.electrode_centres_mm() - before.electrode_centres_mm(), axis=1)
     assert 1.5 < moved.max() <= 3.0 and moved.min() > 0
-    np.testing.assert_allclose(
-        np.linalg.norm(after.electrode_centres_mm(), axis=1), 97.0, rtol=1e-12
-    )
+    away = np.linalg.norm(after.electrode_centres_mm(), axis=1)
+    np.testing.assert_allclose(away, 97.0, rtol=1e-12)
     assert after.outline == before.outline and after.electrodes.width_mm == 4.0
     # one electrode alone, by so much, and the others not at all
     one = misplacement.shifted(before, np.eye(16)[5] * 2.5)
@@ -108,9 +98,8 @@ def test_misplacement_moves_electrodes_along_the_rim(make_session):
     assert np.flatnonzero(moved > 1e-9).tolist() == [5]
     assert moved[5] == pytest.approx(2 * 97 * np.sin(2.5 / 97 / 2))
     still = misplacement.make(misplacement.Parameters(0.0), session).apply(before)
-    np.testing.assert_allclose(
-        still.electrode_centres_mm(), before.electrode_centres_mm(), atol=1e-12
-    )
+    moved = still.electrode_centres_mm() - before.electrode_centres_mm()
+    np.testing.assert_allclose(moved, 0, atol=1e-9)
 
 
 def test_misplacement_keeps_given_places_and_refuses_overlap(make_session):

@@ -1,0 +1,27 @@
+"""The reconstructors of one model by each engine, as one."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from eitskin.model.model import Model
+from eitskin.solve.reconstructor import ENGINES, Reconstructor
+
+
+class AllEngines(dict[str, Reconstructor]):
+    """What is asked of it is asked of each: ``all_engines.tare(quiet)`` has every reference as
+    learned, by engine."""
+
+    def __init__(
+        self,
+        model: Model,
+        blob: bytes | None = None,
+        engines: Iterable[str] = ENGINES,
+        **options: object,
+    ) -> None:
+        super().__init__({name: Reconstructor(model, engine=name, blob=blob) for name in engines})
+        self.with_options(**options)
+
+    def __getattr__(self, name: str) -> Callable[..., dict[str, Any]]:
+        return lambda *given, **named: {
+            engine: getattr(one, name)(*given, **named) for engine, one in self.items()
+        }
