@@ -134,6 +134,7 @@ def electrode_table(rows: NDArray[Any], base: int, where: str) -> IntArray:
         table.ndim != 2
         or table.shape[1] != 4
         or table.dtype.kind not in "fiu"
+        or not np.isfinite(table).all()
         or (table != np.round(table)).any()
     ):
         raise FrameError(

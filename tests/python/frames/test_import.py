@@ -14,7 +14,7 @@ from eitskin.frames.frames import Frames, load_frames, save_frames
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.importer import import_frames
 from eitskin.frames.orders import ORDERS, electrode_map, match_rows, relabel, source_table, swap_map
-from eitskin.frames.source import SourceOptions
+from eitskin.frames.source import SourceOptions, electrode_table
 from eitskin.frames.truth import TruthOptions
 from eitskin.skin.protocol import adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
@@ -326,6 +326,13 @@ def test_bad_options_say_what_to_do(tmp_path, of_source, options, protocol, said
     with pytest.raises(EitskinError, match=said) as caught:
         taken(path, protocol, source=of_source, **options)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("cell", [np.inf, np.nan, 0.5])
+def test_electrodes_are_whole_numbers(cell):
+    table = np.array([[0.0, 1, 2, cell]])
+    with pytest.raises(FrameError, match="whole numbers"):
+        electrode_table(table, 0, "there")
 
 
 def test_foreign_and_square_sources(tmp_path):
