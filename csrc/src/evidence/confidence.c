@@ -20,6 +20,7 @@
 #include "diagnostics/diagnostics.h"
 #include "evidence/constants.h"
 #include "frame/constants.h"
+#include "frame/reference.h"
 
 static int is_known(const eits_real *place_mm2, const eits_real *apart_mm)
 {
@@ -34,7 +35,8 @@ static eits_real variance_of_all(const eits_context *ctx)
     const eits_real pixel = (eits_real)ctx->model->pixel_mm;
     if (ctx->model->uncertainty.places == NULL || b->far)
         return pixel * pixel * eits_fma(EITS_PLACE_DISTANCE, b->distance, EITS_PLACE_MIN);
-    return eits_fma(EITS_PLACE_GEOMETRY, b->place_mm2, pixel * pixel * EITS_PLACE_MIN);
+    return eits_fma(eits_corrects_places(ctx) ? EITS_PLACE_CORRECTED : EITS_PLACE_GEOMETRY,
+                    b->place_mm2, pixel * pixel * EITS_PLACE_MIN);
 }
 
 void eits_rate_touches(const eits_context *ctx, eits_fit *f)

@@ -151,6 +151,9 @@
  * electrodes lie elsewhere */
 #define EITS_PLACE_GEOMETRY R(0.7)
 
+/* the same where places are corrected by it. as PLACE_GEOMETRY */
+#define EITS_PLACE_CORRECTED R(0.1)
+
 /* of both variances, for each unit of the reference's distance from the model's, where the model
  * tells no more or the instrument is unlike it [pixels^2]. larger: ellipses cover more on skins
  * unlike their model */

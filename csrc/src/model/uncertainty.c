@@ -65,6 +65,29 @@ eits_status eits_read_places(eits_model *model, const eits_section *section)
     return EITS_OK;
 }
 
+/* Section MOVE: as many numbers for either axis and each term as GEOM has for a fold. */
+eits_status eits_read_moves(eits_model *model, const eits_section *section)
+{
+    const float *values = (const float *)(const void *)section->data;
+    const uint32_t term_size = 8u * model->uncertainty.place_rows;
+    uint32_t degree = 0, terms = 1;
+    if (values == NULL)
+        return EITS_OK;
+    if (term_size == 0)
+        return EITS_E_MODEL_VALUE;
+    while (terms < section->size / term_size && degree < EITS_MAX_MOVE_DEGREE)
+        terms += ++degree + 1u;
+    if (section->size != terms * term_size)
+        return EITS_E_MODEL_SECTION;
+    for (uint32_t i = 0; i < section->size / 4u; ++i) {
+        if (!eits_between(values[i], -1e6f, 1e6f))
+            return EITS_E_MODEL_VALUE;
+    }
+    model->uncertainty.moves = values;
+    model->uncertainty.move_terms = terms;
+    return EITS_OK;
+}
+
 eits_status eits_read_uncertainty(eits_model *model, const eits_section *section)
 {
     const size_t numbers = (size_t)model->rank * (model->rank + 1u) / 2u;

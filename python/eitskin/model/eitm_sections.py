@@ -24,7 +24,7 @@ from eitskin.model.model import (
     Golden,
     Model,
 )
-from eitskin.model.model_errors import decode_model_errors
+from eitskin.model.model_errors import ModelErrors, decode_model_errors
 from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
@@ -42,6 +42,7 @@ MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
 MAX_ITERATIONS = 100_000
 MIN_RADIUS_MM, HUGE = 1e-6, 1e30
 MAX_PLACE_ROWS, MAX_PLACE_MM = 32, 1e6
+MOVE_TERMS = (1, 3, 6, 10, 15)  # of polynomials in two coordinates up to the fourth degree
 NEARER = "choose units nearer to volts and siemens per metre"
 MIN_LIPSCHITZ, MAX_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
 
@@ -92,6 +93,8 @@ def encode_sections(model: Model) -> Sections:
         if model.model_errors.places is not None:
             # fold by fold
             sections["GEOM"] = model.model_errors.places.T.astype("<f4").tobytes()
+        if model.model_errors.moves is not None:
+            sections["MOVE"] = model.model_errors.moves.astype("<f4").tobytes()
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
@@ -327,6 +330,19 @@ def _read_places(sections: Sections, d: _Dims, where: str) -> npt.NDArray[np.flo
     return np.ascontiguousarray(values.T)
 
 
+def _read_moves(sections: Sections, where: str, rows: int) -> npt.NDArray[np.float32] | None:
+    """Of a model whose section GEOM has so many rows."""
+    if "MOVE" not in sections:
+        return None
+    terms, left = divmod(len(sections["MOVE"]), 8 * rows or 1)
+    if left or not rows or terms not in MOVE_TERMS:
+        _refuse(where, "section 'MOVE' of a size that section 'GEOM' does not ask for")
+    values = _floats(sections, "MOVE", (2, terms, rows), where)
+    if np.abs(values).max() > MAX_PLACE_MM:
+        _refuse(where, "a number in section 'MOVE' that is out of range")
+    return values
+
+
 def _read_order(sections: Sections, table: npt.NDArray[np.uint8], where: str) -> tuple[int, ...]:
     """The order of drives; () as they stand."""
     if "ORDR" not in sections:
@@ -400,12 +416,14 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
         ),
         precision=_read_precision(sections, d, where),
         place_factor=_read_place_factor(sections, where),
-        model_errors=(
-            decode_model_errors(sections["UNCE"], d.rank, where, _read_places(sections, d, where))
-            if "UNCE" in sections
-            else None
-        ),
+        model_errors=(_read_model_errors(sections, d, where) if "UNCE" in sections else None),
     )
+
+
+def _read_model_errors(sections: Sections, d: _Dims, where: str) -> ModelErrors:
+    places = _read_places(sections, d, where)
+    moves = _read_moves(sections, where, 0 if places is None else len(places))
+    return decode_model_errors(sections["UNCE"], d.rank, where, places, moves)
 
 
 def _short(value: float) -> float:

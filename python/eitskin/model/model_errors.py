@@ -1,5 +1,5 @@
-"""What a real skin's data may differ by from the model's: the sections UNCE and GEOM of a .eitm
-file."""
+"""What a real skin's data may differ by from the model's: the sections UNCE, GEOM and MOVE of a
+.eitm file."""
 
 import struct
 from dataclasses import dataclass
@@ -26,8 +26,9 @@ class ModelErrors:
     what the skin's own drift adds, in the datum's unit squared; both float32, symmetric and
     positive semidefinite. ``rms_error`` and ``rms_shape_error``: sqrt(mean |e|^2) of random skins
     and of shaped touches, all rows. ``row_gains``: each row is to be scaled to the model by the
-    tare. ``places`` M (q, k), mm: |M y|^2 is what the variance of a place grows by on a skin whose
-    tare differs from the model by y = log(v0 / v_ref) over the folds; None: not known.
+    tare. ``places`` M (q, k), mm: |M y|^2 says how unlike the model, in what moves touches, a skin
+    is whose tare has y = log(v0 / v_ref) over the folds; ``moves`` U (2, t, q): along x and y a
+    touch is found off by a polynomial with coefficients U M y. None: not known.
     """
 
     error: Float32s
@@ -36,6 +37,7 @@ class ModelErrors:
     rms_shape_error: float
     row_gains: bool = True
     places: Float32s | None = None
+    moves: Float32s | None = None
 
     def encode(self) -> bytes:
         """The section's bytes."""
@@ -49,9 +51,14 @@ class ModelErrors:
 
 
 def decode_model_errors(
-    content: bytes, rank: int, where: str, places: Float32s | None = None
+    content: bytes,
+    rank: int,
+    where: str,
+    places: Float32s | None = None,
+    moves: Float32s | None = None,
 ) -> ModelErrors:
-    """The section's numbers, of a model of ``rank``; ``places`` are the section GEOM's.
+    """The section's numbers, of a model of ``rank``; ``places`` and ``moves`` are those of the
+    sections GEOM and MOVE.
 
     Raises:
         ModelError: it has another length than the rank asks for, a number is out of range, or a
@@ -85,6 +92,7 @@ def decode_model_errors(
         float(str(np.float32(rms_shape_error))),
         bool(flags & ROW_GAINS),
         places,
+        moves,
     )
 
 

@@ -58,19 +58,21 @@ def draw_model_errors(
             for _ in range(count):
                 processes.append(_Process(request))
                 idle.put(processes[-1])
-            drift, places = (pool.submit(ask, name) for name in ("drift", "places"))
+            drift, tared = (pool.submit(ask, name) for name in ("drift", "places"))
             drawn: Iterable[FloatArray] = pool.map(
                 lambda number: ask("sample", number), range(samples)
             )
             rows = np.array(list(drawn if progress is None else progress(drawn, samples)))
             rms_error, rms_shape_error = np.sqrt(np.mean(rows[:, -2:] ** 2, axis=0))
+            places, moves = tared.result()
             return ModelErrors(
                 error=ask("error", rows),
                 drift=drift.result(),
                 rms_error=float(np.float32(rms_error)),
                 rms_shape_error=float(np.float32(rms_shape_error)),
                 row_gains=request.uncertainty.row_gains,
-                places=places.result(),
+                places=places,
+                moves=moves,
             )
         finally:
             pool.shutdown(wait=False, cancel_futures=True)

@@ -1,4 +1,4 @@
-"""What the tare tells of places: section GEOM of a .eitm file.
+"""What the tare tells of places: sections GEOM and MOVE of a .eitm file.
 
 Where electrodes lie elsewhere and the outline is another, the untouched skin's voltages differ from
 the model's in one way, where the sheet is uneven in another; and both move touches. With causes c
@@ -12,8 +12,9 @@ than c, by r = V^-1 cov(c^) in the mean square, so that
 
     mean over p, axis of |b c|^2 / 2  =  sum_j b_j^2 c^_j^2 / r_j  =  |M y|^2
 
-is what the variance of a place grows by on this skin. M has the ROWS directions of y that tell
-most.
+tells how unlike the modelled skin this one is, in mm^2. M has the ROWS directions of y that tell
+most. A place p is corrected by b(p) c^, for the y that z = M y leaves of it: b(p) as a polynomial of
+DEGREE.
 """
 
 from dataclasses import dataclass
@@ -44,6 +45,8 @@ except ModuleNotFoundError as error:
 
 
 ROWS = 16  # more tells nothing more, 8 too little: on the tuning family of the worlds, seeds 21, 22
+DEGREE = 4  # of 3, 4 and 5 the least that takes back what can be, on the tuning family, seed 21
+TINY = 1e-12  # mm
 FIELDS = 80  # smooth fields of the sheet: what 20 leave looks like shifted electrodes
 MOVING = 12  # of them move touches; the others by less
 ROUGH = 0.01  # rms of what the linearisation leaves of y
@@ -55,8 +58,9 @@ EDGE_STEP = 0.1  # of the touch's radius, for the slopes of its answer
 LEAST_SHARE = 0.05  # r is taken as at least this
 
 
-def tare_places(skins: RandomSkins) -> Float32s:
-    """M (ROWS, k) in mm, for y over the folds."""
+def tare_places(skins: RandomSkins) -> tuple[Float32s, Float32s]:
+    """M (ROWS, k) in mm, for y over the folds; and U (2, t, ROWS): along x and y a touch is found
+    off by the polynomial of coefficients U M y."""
     causes = _Causes(skins)
     variance, logs, moves = causes.all()
     covariance = (logs.T * variance) @ logs + ROUGH**2 * np.eye(logs.shape[1])
@@ -70,9 +74,19 @@ def tare_places(skins: RandomSkins) -> Float32s:
     half = (np.sqrt(weight)[:, None] * found) @ root
     told, directions = np.linalg.eigh(half.T @ half)
     most = np.argsort(-told)[:ROWS]
-    rows = np.sqrt(np.maximum(told[most], 0))[:, None] * (directions[:, most].T @ inverse)
+    size = np.sqrt(np.maximum(told[most], 0))
+    rows = size[:, None] * (directions[:, most].T @ inverse)
     greatest = np.take_along_axis(rows, np.abs(rows).argmax(axis=1)[:, None], axis=1)
-    return np.asarray(rows * np.where(greatest < 0, -1.0, 1.0), dtype=np.float32)
+    sign = np.where(greatest[:, 0] < 0, -1.0, 1.0)
+    # c^ of the y that z leaves: root' directions z / size
+    causes_of = found @ root @ directions[:, most] * (sign / np.maximum(size, TINY))
+    terms = causes.terms()
+    polynomials = np.linalg.lstsq(terms, moves.transpose(1, 2, 0).reshape(len(terms), -1), None)[0]
+    shifts = polynomials.reshape(terms.shape[1], 2, -1) @ causes_of
+    return (
+        np.asarray(rows * sign[:, None], dtype=np.float32),
+        np.asarray(shifts.transpose(1, 0, 2), dtype=np.float32),
+    )
 
 
 @dataclass(eq=False)
@@ -136,6 +150,16 @@ class _Causes:
         )
         logs, moves = (np.array(part) for part in zip(*made, strict=True))
         return variances, logs, moves
+
+    def terms(self) -> FloatArray:
+        """1, x, y, x^2, x y, y^2 ... at ``places``, from the grid's middle over half its longer
+        side, (p, t)."""
+        grid = self.skins.request.grid
+        half = np.array([grid.nx, grid.ny]) * grid.pixel_mm / 2
+        x, y = (self.places - grid.origin_mm - half).T / half.max()
+        return np.column_stack(
+            [x ** (n - j) * y**j for n in range(DEGREE + 1) for j in range(n + 1)]
+        )
 
     def _of_mesh(
         self, shift_mm: FloatArray, outwards_mm: FloatArray, h: float
