@@ -10,7 +10,7 @@ from eitskin_reference.constants_table import (
     MIN_CONFIDENCE,
     MIN_FREEDOM,
     PAIR_ODDS,
-    PLACE_CORRECTED,
+    PLACE_APART,
     PLACE_DISTANCE,
     PLACE_FACTOR,
     PLACE_GEOMETRY,
@@ -18,7 +18,7 @@ from eitskin_reference.constants_table import (
 )
 from eitskin_reference.disc_fit import Fit
 from eitskin_reference.evidence import Tested
-from eitskin_reference.places import TarePlaces
+from eitskin_reference.places import Corrected
 from eitskin_reference.problem import orthonormal
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,18 +26,17 @@ PLACE_PARAMETERS = 4  # of a disc: strength, place, radius
 
 
 def rated(
-    tested: Tested, distance: float, tared: TarePlaces | None, pixel_mm: float
+    tested: Tested, distance: float, tared: Corrected | None, pixel_mm: float
 ) -> tuple[FloatArray, FloatArray]:
     """For each disc the probability that it is a touch (k,), and the covariance of its place as
     wide as places err: xx, xy, yy (k, 3), mm^2; ``distance`` of the reference from the model's,
-    ``tared`` what that tells of places, None where it does not."""
-    x, y = np.clip(tested.apart_mm, -MAX_MOVE * pixel_mm, MAX_MOVE * pixel_mm).T
+    ``tared`` how places are corrected by that, None where they are not."""
+    x, y = PLACE_APART * np.clip(tested.apart_mm, -MAX_MOVE * pixel_mm, MAX_MOVE * pixel_mm).T
     least = pixel_mm**2 * PLACE_MIN
     if tared is None:
         least += pixel_mm**2 * PLACE_DISTANCE * distance
     else:
-        part = PLACE_GEOMETRY if tared.shift_mm is None else PLACE_CORRECTED
-        least += part * tared.moved_mm2
+        least += PLACE_GEOMETRY * tared.left_mm2
     place = PLACE_FACTOR * tested.place_mm2 + np.column_stack([x * x + least, x * y, y * y + least])
     return tested.rise / (tested.rise + CONFIDENCE_HALF), place
 

@@ -27,7 +27,7 @@ from eitskin_reference.constants_table import (
     RATIO_DEFINED,
 )
 from eitskin_reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
-from eitskin_reference.places import TarePlaces, tare_places
+from eitskin_reference.places import Corrected, corrected
 from eitskin_reference.problem import (
     FloatArray,
     greatest,
@@ -60,7 +60,7 @@ class FrameStage:
         self._drift_v0: FloatArray | None = None
         self._gain, self._row_gain = 1.0, np.ones(model.protocol.n_rows)
         self._distance, self._far = 0.0, False
-        self._places: TarePlaces | None = None
+        self._corrected: Corrected | None = None
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._unusable = self._bad
@@ -121,7 +121,8 @@ class FrameStage:
         in_force = errors.row_gains and self.options.row_gains and not_relative
         if in_force:
             self._row_gain = gains
-        self._places = tare_places(self.model.grid, errors, logs, in_force and not far)
+        known = corrected(self.model.grid, errors, logs) if in_force and not far else None
+        self._corrected = known
 
     @property
     def _noise_floor_v(self) -> float:

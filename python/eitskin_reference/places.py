@@ -13,18 +13,16 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class TarePlaces:
-    """``moved_mm2``: how unlike the model, in what moves touches, the skin is; ``shift_mm`` (2, t):
-    the polynomials that take places back to where touches lie, None where they stay."""
+class Corrected:
+    """``left_mm2``: what the variance of a place grows by; ``shift_mm`` (2, t): the polynomials
+    that take places back to where touches lie."""
 
     grid: Grid
-    moved_mm2: float
-    shift_mm: FloatArray | None = None
+    left_mm2: float
+    shift_mm: FloatArray
 
     def on_skin(self, x_mm: float, y_mm: float) -> tuple[float, float]:
         """Where a touch lies that the modelled skin has there."""
-        if self.shift_mm is None:
-            return x_mm, y_mm
         pixel, terms = self.grid.pixel_mm, self.shift_mm.shape[1]
         half = np.array([self.grid.nx, self.grid.ny]) * pixel / 2
         x, y = (np.array([x_mm, y_mm]) - self.grid.origin_mm - half) / half.max()
@@ -34,13 +32,12 @@ class TarePlaces:
         return x_mm + float(dx), y_mm + float(dy)
 
 
-def tare_places(
-    grid: Grid, errors: ModelErrors, log_gains: FloatArray, corrects: bool
-) -> TarePlaces | None:
-    """Of a reference whose folds have ``log_gains`` (k,), NaN for one without; ``corrects``: row
-    gains are in force. None: the model does not tell."""
+def corrected(grid: Grid, errors: ModelErrors, log_gains: FloatArray) -> Corrected | None:
+    """Of a reference whose folds have ``log_gains`` (k,), NaN for one without. None: the model does
+    not tell."""
     if errors.places is None:
         return None
-    told = errors.places.astype(np.float64) @ np.nan_to_num(log_gains)
-    shift = errors.moves @ told if corrects and errors.moves is not None else None
-    return TarePlaces(grid, float(told @ told), shift)
+    known = np.nan_to_num(log_gains)
+    left = errors.places.left.astype(np.float64) @ known
+    shift = errors.places.moves @ (errors.places.seen.astype(np.float64) @ known)
+    return Corrected(grid, float(left @ left), shift)

@@ -11,6 +11,7 @@
 #include <string.h>
 
 enum { RANK = 4, ERRORS = 16 + 4 * RANK * (RANK + 1), ROWS = 2, TERM = 8 * ROWS, DEGREES = 5 };
+enum { HEAD = 16, FOLDS = HEAD + 4 * ROWS * SMALL_FOLDED };
 static const uint32_t TERMS[DEGREES] = {1, 3, 6, 10, 15};
 static const small_spec SPEC = {.rank = RANK, .side = 5, .shape = SMALL_WHITENED, .fields = 1};
 
@@ -24,7 +25,7 @@ static small_model with(small_model *model, const char *old, const char *tag, co
     return made;
 }
 
-/* With UNCE, and with M two rows: fold k's numbers are .2 and -.1 k. */
+/* With UNCE, and with N two rows: fold k's numbers are .2 and -.1 k. */
 static small_model with_places(int geom)
 {
     static uint8_t errors[ERRORS], places[4 * ROWS * SMALL_FOLDED];
@@ -38,46 +39,76 @@ static small_model with_places(int geom)
     return geom ? with(&made, "META", "GEOM", places, sizeof places) : made;
 }
 
-/* U: number i is i - 7.5. */
-static small_model with_moves(int geom, uint32_t size)
+/* Fold k's numbers of M are .2 and -.1 k; number i of U is i - 7.5. */
+static small_model with_moves(int geom, uint32_t rows, uint32_t terms, uint32_t size)
 {
-    static uint8_t moves[TERM * 16];
-    for (uint32_t i = 0; i < sizeof moves / 4; ++i)
-        small_put_f32(moves + 4 * i, (float)i - 7.5f);
+    static uint8_t moves[HEAD + ROWS * 4 * SMALL_FOLDED + 17 * TERM];
+    small_put_u32(moves, rows);
+    small_put_u32(moves + 4, terms);
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        small_put_f32(moves + HEAD + 8 * k, 0.2f);
+        small_put_f32(moves + HEAD + 8 * k + 4, -0.1f * (float)k);
+    }
+    for (uint32_t i = 0; i < 17 * TERM / 4; ++i)
+        small_put_f32(moves + FOLDS + 4 * i, (float)i - 7.5f);
     small_model made = with_places(geom);
     return with(&made, "FLDS", "MOVE", moves, size);
 }
 
+static small_model with_terms(uint32_t terms)
+{
+    return with_moves(1, ROWS, terms, FOLDS + terms * TERM);
+}
+
+static eits_status opens(small_model made, eits_model *model)
+{
+    const eits_status status = eits_model_open(model, made.blob, made.size);
+    small_model_free(&made);
+    return status;
+}
+
 TEST(as_many_numbers_as_a_polynomial_has_are_read_in_place)
 {
-    for (uint32_t size = 0; size <= 16 * TERM; size += 4) {
-        small_model made = with_moves(1, size);
+    for (uint32_t terms = 0, known = 0; terms <= 16; ++terms) {
+        const int is_whole = known < DEGREES && terms == TERMS[known];
+        known += (uint32_t)is_whole;
+        small_model made = with_terms(terms);
         eits_model model;
-        uint32_t terms = 0;
-        for (uint32_t n = 0; n < DEGREES; ++n)
-            terms = size == TERMS[n] * TERM ? TERMS[n] : terms;
         CHECK_EQUAL(eits_model_open(&model, made.blob, made.size),
-                    terms ? EITS_OK : EITS_E_MODEL_SECTION);
-        CHECK(terms == 0 ||
-              (model.uncertainty.move_terms == terms && model.uncertainty.moves[3] == -4.5f));
+                    is_whole ? EITS_OK : EITS_E_MODEL_SECTION);
+        CHECK(!is_whole ||
+              (model.uncertainty.move_terms == terms && model.uncertainty.move_rows == ROWS &&
+               model.uncertainty.moved[2] == 0.2f && model.uncertainty.moves[3] == -4.5f));
         small_model_free(&made);
     }
 }
 
-TEST(moves_without_places_or_out_of_range_are_refused)
+TEST(moves_of_another_size_without_places_or_out_of_range_are_refused)
 {
     const float odd[] = {2e6f, -2e6f, (float)NAN};
+    const struct {
+        uint32_t rows, terms, size;
+    } of_size[] = {{ROWS, 3, 0},
+                   {ROWS, 3, HEAD - 4},
+                   {ROWS, 3, HEAD},
+                   {ROWS, 3, FOLDS + 3 * TERM - 4},
+                   {ROWS, 3, FOLDS + 3 * TERM + 4},
+                   {0, 3, HEAD},
+                   {ROWS + 1, 3, FOLDS + 3 * TERM},
+                   {EITS_MAX_PLACE_ROWS + 1, 3, FOLDS + 3 * TERM},
+                   {0x80000000u, 3, FOLDS + 3 * TERM}};
     eits_model model;
-    small_model without = with_moves(0, TERM);
-    CHECK_EQUAL(eits_model_open(&model, without.blob, without.size), EITS_E_MODEL_VALUE);
-    small_model_free(&without);
+    for (size_t k = 0; k < sizeof of_size / sizeof of_size[0]; ++k)
+        CHECK_EQUAL(
+            opens(with_moves(1, of_size[k].rows, of_size[k].terms, of_size[k].size), &model),
+            EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(opens(with_moves(0, ROWS, 1, FOLDS + TERM), &model), EITS_E_MODEL_VALUE);
     for (int k = 0; k < 3; ++k) {
-        small_model made = with_moves(1, 3 * TERM);
+        small_model made = with_terms(3);
         uint32_t size;
-        small_put_f32(small_model_section(&made, "MOVE", &size) + 3 * TERM - 4, odd[k]);
+        small_put_f32(small_model_section(&made, "MOVE", &size) + FOLDS + 3 * TERM - 4, odd[k]);
         small_model_seal(&made);
-        CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_E_MODEL_VALUE);
-        small_model_free(&made);
+        CHECK_EQUAL(opens(made, &model), EITS_E_MODEL_VALUE);
     }
 }
 
@@ -128,7 +159,7 @@ static void take_reference(small_context *c, double part, double z[ROWS])
 TEST(touches_go_to_where_they_lie_and_back)
 {
     for (uint32_t n = 0; n < DEGREES; ++n) {
-        small_model made = with_moves(1, TERMS[n] * TERM);
+        small_model made = with_terms(TERMS[n]);
         small_context c;
         small_context_open(&c, &made, 0);
         double z[ROWS], shift[2];
@@ -152,7 +183,7 @@ TEST(touches_go_to_where_they_lie_and_back)
 
 TEST(a_shift_is_at_most_some_pixels_and_none_without_row_gains)
 {
-    small_model made = with_moves(1, 15 * TERM);
+    small_model made = with_terms(15);
     small_context c;
     small_context_open(&c, &made, 0);
     double z[ROWS];

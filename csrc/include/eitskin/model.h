@@ -178,15 +178,17 @@ typedef struct eits_uncertainty {
     uint32_t row_gains; /* 1: errors are of data multiplied by row gains from the reference */
     float errors_rms;   /* |d_true - d_model| / |d_model|, rms: skins that differ */
     float shapes_rms;   /* the same: touches that are no discs */
-    /* M, n_folded x place_rows, fold by fold, mm: |M'y|^2 is what the variance of a place grows by
+    /* N, n_folded x place_rows, fold by fold, mm: |N'y|^2 is what the variance of a place grows by
      * on a skin whose reference differs from the model by y = log(v0 / v_ref) (section GEOM); NULL:
      * not known */
     const float *places;
     uint32_t place_rows; /* at most EITS_MAX_PLACE_ROWS */
-    /* U, 2 x move_terms x place_rows, first along x, then y: a touch is found off by the polynomial
-     * with coefficients U M'y, terms 1, x, y, x^2, x y, y^2 ... with x and y from the grid's middle
-     * over half its longer side, mm (section MOVE); NULL: not known */
-    const float *moves;
+    /* M, n_folded x move_rows, fold by fold, mm, and U, 2 x move_terms x move_rows, first along x,
+     * then y: such a skin has a touch found off by the polynomial with coefficients U M'y, terms 1,
+     * x, y, x^2, x y, y^2 ... with x and y from the grid's middle over half its longer side
+     * (section MOVE); NULL: not known */
+    const float *moved, *moves;
+    uint32_t move_rows;  /* at most EITS_MAX_PLACE_ROWS */
     uint32_t move_terms; /* 1, 3, 6, 10 or EITS_MAX_MOVE_TERMS; 0: none */
 } eits_uncertainty;
 

@@ -8,34 +8,37 @@
  *     sum_t T_t(x, y) sum_j U_tj z_j,    T_t = 1, x, y, x^2, x y, y^2, ...
  *
  * along either axis, x and y from the grid's middle over half its longer side. That is taken back;
- * |z|^2 says how far to trust what is left. The formulas stand in
- * python/eitskin/model/tare_places.py. */
+ * |N'y|^2 is the variance of what it leaves. python/eitskin/model/tare_places.py has the formulas.
+ */
 #include "frame/reference.h"
 
 #include "base/vec.h"
 #include "frame/constants.h"
 
-void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain, eits_real *sum)
+void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
+                       eits_place_sums *sums)
 {
-    const uint32_t rows = model->uncertainty.place_rows;
-    for (uint32_t j = 0; j < rows; ++j)
-        sum[j] =
-            eits_fma((eits_real)model->uncertainty.places[(size_t)rows * k + j], log_gain, sum[j]);
+    const eits_uncertainty *u = &model->uncertainty;
+    const size_t place = (size_t)u->place_rows * k, move = (size_t)u->move_rows * k;
+    for (uint32_t j = 0; j < u->place_rows; ++j)
+        sums->place[j] = eits_fma((eits_real)u->places[place + j], log_gain, sums->place[j]);
+    for (uint32_t j = 0; j < u->move_rows; ++j)
+        sums->move[j] = eits_fma((eits_real)u->moved[move + j], log_gain, sums->move[j]);
 }
 
-void eits_learn_places(eits_context *ctx, const eits_real *sum)
+void eits_learn_places(eits_context *ctx, const eits_place_sums *sums)
 {
     const eits_uncertainty *u = &ctx->model->uncertainty;
     eits_reference *b = &ctx->reference;
     b->place_mm2 = 0;
     for (uint32_t j = 0; j < u->place_rows; ++j)
-        b->place_mm2 = eits_fma(sum[j], sum[j], b->place_mm2);
+        b->place_mm2 = eits_fma(sums->place[j], sums->place[j], b->place_mm2);
     for (uint32_t axis = 0; axis < 2; ++axis) {
         for (uint32_t t = 0; t < u->move_terms; ++t) {
-            const float *row = u->moves + (size_t)u->place_rows * (axis * u->move_terms + t);
+            const float *row = u->moves + (size_t)u->move_rows * (axis * u->move_terms + t);
             eits_real shift = 0;
-            for (uint32_t j = 0; j < u->place_rows; ++j)
-                shift = eits_fma((eits_real)row[j], sum[j], shift);
+            for (uint32_t j = 0; j < u->move_rows; ++j)
+                shift = eits_fma((eits_real)row[j], sums->move[j], shift);
             b->shift_mm[axis][t] = shift; /* the gains' logarithms are -y: it takes back */
         }
     }

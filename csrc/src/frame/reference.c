@@ -72,7 +72,8 @@ static void measure_distance(eits_context *ctx)
 {
     const eits_model *model = ctx->model;
     eits_reference *b = &ctx->reference;
-    eits_real logs = 0, apart = 0, sum[EITS_MAX_PLACE_ROWS] = {0};
+    eits_real logs = 0, apart = 0;
+    eits_place_sums sums = {{0}, {0}};
     uint32_t count = 0, pairs = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
@@ -85,7 +86,7 @@ static void measure_distance(eits_context *ctx)
                         log_gain = eits_log(gain);
         logs = eits_fma(log_gain, log_gain, logs);
         ++count;
-        eits_add_log_gain(model, k, log_gain, sum);
+        eits_add_log_gain(model, k, log_gain, &sums);
         if (!first || !second)
             continue;
         const eits_real difference =
@@ -94,7 +95,7 @@ static void measure_distance(eits_context *ctx)
         ++pairs;
     }
     b->distance = count > 0 ? eits_sqrt(logs / (eits_real)count) : 0;
-    eits_learn_places(ctx, sum);
+    eits_learn_places(ctx, &sums);
     b->reciprocity = pairs > 0 ? eits_sqrt(apart / (eits_real)pairs) : 0;
 }
 

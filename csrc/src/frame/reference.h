@@ -39,11 +39,17 @@ void eits_take_second_frame(eits_context *ctx);
 
 /* ---- places.c ---- */
 
-/* Add to `sum`, -M'y (place_rows numbers), what fold k's logarithm of its gain makes of it. */
-void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain, eits_real *sum);
+/* -N'y and -M'y (model.h, eits_uncertainty). */
+typedef struct eits_place_sums {
+    eits_real place[EITS_MAX_PLACE_ROWS], move[EITS_MAX_PLACE_ROWS];
+} eits_place_sums;
 
-/* reference.place_mm2 and shift_mm from those sums. */
-void eits_learn_places(eits_context *ctx, const eits_real *sum);
+/* Add what fold k's logarithm of its gain makes of them. */
+void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
+                       eits_place_sums *sums);
+
+/* reference.place_mm2 and shift_mm from them. */
+void eits_learn_places(eits_context *ctx, const eits_place_sums *sums);
 
 /* Whether places are corrected by what the reference tells: with row gains, for which it holds. */
 int eits_corrects_places(const eits_context *ctx);

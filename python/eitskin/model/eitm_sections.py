@@ -24,7 +24,7 @@ from eitskin.model.model import (
     Golden,
     Model,
 )
-from eitskin.model.model_errors import ModelErrors, decode_model_errors
+from eitskin.model.model_errors import ModelErrors, decode_model_errors, decode_places
 from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
@@ -41,8 +41,6 @@ SCALED = ("i16", "i8")
 MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
 MAX_ITERATIONS = 100_000
 MIN_RADIUS_MM, HUGE = 1e-6, 1e30
-MAX_PLACE_ROWS, MAX_PLACE_MM = 32, 1e6
-MOVE_TERMS = (1, 3, 6, 10, 15)  # of polynomials in two coordinates up to the fourth degree
 NEARER = "choose units nearer to volts and siemens per metre"
 MIN_LIPSCHITZ, MAX_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
 
@@ -91,10 +89,7 @@ def encode_sections(model: Model) -> Sections:
     if model.model_errors is not None:
         sections["UNCE"] = model.model_errors.encode()
         if model.model_errors.places is not None:
-            # fold by fold
-            sections["GEOM"] = model.model_errors.places.T.astype("<f4").tobytes()
-        if model.model_errors.moves is not None:
-            sections["MOVE"] = model.model_errors.moves.astype("<f4").tobytes()
+            sections |= model.model_errors.places.encode()
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
@@ -318,31 +313,6 @@ def _read_place_factor(sections: Sections, where: str) -> float:
     return factor
 
 
-def _read_places(sections: Sections, d: _Dims, where: str) -> npt.NDArray[np.float32] | None:
-    if "GEOM" not in sections:
-        return None
-    rows, left = divmod(len(sections["GEOM"]), 4 * d.n_folded)
-    if left or not 1 <= rows <= MAX_PLACE_ROWS:
-        _refuse(where, "section 'GEOM' of a size that its rows do not ask for")
-    values = _floats(sections, "GEOM", (d.n_folded, rows), where)
-    if np.abs(values).max() > MAX_PLACE_MM:
-        _refuse(where, "a number in section 'GEOM' that is out of range")
-    return np.ascontiguousarray(values.T)
-
-
-def _read_moves(sections: Sections, where: str, rows: int) -> npt.NDArray[np.float32] | None:
-    """Of a model whose section GEOM has so many rows."""
-    if "MOVE" not in sections:
-        return None
-    terms, left = divmod(len(sections["MOVE"]), 8 * rows or 1)
-    if left or not rows or terms not in MOVE_TERMS:
-        _refuse(where, "section 'MOVE' of a size that section 'GEOM' does not ask for")
-    values = _floats(sections, "MOVE", (2, terms, rows), where)
-    if np.abs(values).max() > MAX_PLACE_MM:
-        _refuse(where, "a number in section 'MOVE' that is out of range")
-    return values
-
-
 def _read_order(sections: Sections, table: npt.NDArray[np.uint8], where: str) -> tuple[int, ...]:
     """The order of drives; () as they stand."""
     if "ORDR" not in sections:
@@ -421,9 +391,10 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
 
 
 def _read_model_errors(sections: Sections, d: _Dims, where: str) -> ModelErrors:
-    places = _read_places(sections, d, where)
-    moves = _read_moves(sections, where, 0 if places is None else len(places))
-    return decode_model_errors(sections["UNCE"], d.rank, where, places, moves)
+    """What GEOM alone says (format 1.9) is of use to no reader any more."""
+    both = "GEOM" in sections and "MOVE" in sections
+    places = decode_places(sections["GEOM"], sections["MOVE"], d.n_folded, where) if both else None
+    return decode_model_errors(sections["UNCE"], d.rank, where, places)
 
 
 def _short(value: float) -> float:

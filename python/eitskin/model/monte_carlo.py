@@ -64,15 +64,13 @@ def draw_model_errors(
             )
             rows = np.array(list(drawn if progress is None else progress(drawn, samples)))
             rms_error, rms_shape_error = np.sqrt(np.mean(rows[:, -2:] ** 2, axis=0))
-            places, moves = tared.result()
             return ModelErrors(
                 error=ask("error", rows),
                 drift=drift.result(),
                 rms_error=float(np.float32(rms_error)),
                 rms_shape_error=float(np.float32(rms_shape_error)),
                 row_gains=request.uncertainty.row_gains,
-                places=places,
-                moves=moves,
+                places=tared.result(),
             )
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
