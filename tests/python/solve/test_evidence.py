@@ -138,8 +138,9 @@ def test_a_long_touch_has_no_other_beyond_it(name, k):
 
 
 def test_the_tare_tells_how_far_a_skin_moves_places():
-    """What the correction of an uneven skin leaves is less than that of misplaced electrodes; by the distance of the reference from
-    the model, which is the same for both, ellipses would be as wide on either."""
+    """The correction leaves less on an uneven skin than where electrodes are misplaced; by the
+    distance of the reference from the model, which is the same for both, ellipses would be as wide
+    on either."""
     model = prebuilt()[0]
     assert model.model_errors is not None
     untold = encode_model(replace(model, model_errors=replace(model.model_errors, places=None)))
