@@ -10,6 +10,7 @@ from eitskin_reference.constants_table import (
     MIN_CONFIDENCE,
     MIN_FREEDOM,
     PAIR_ODDS,
+    PLACE_APART,
     PLACE_DISTANCE,
     PLACE_FACTOR,
     PLACE_GEOMETRY,
@@ -17,6 +18,7 @@ from eitskin_reference.constants_table import (
 )
 from eitskin_reference.disc_fit import Fit
 from eitskin_reference.evidence import Tested
+from eitskin_reference.places import Corrected
 from eitskin_reference.problem import orthonormal
 
 FloatArray = npt.NDArray[np.float64]
@@ -24,16 +26,17 @@ PLACE_PARAMETERS = 4  # of a disc: strength, place, radius
 
 
 def rated(
-    tested: Tested, distance: float, moved_mm2: float | None, pixel_mm: float
+    tested: Tested, distance: float, tared: Corrected | None, pixel_mm: float
 ) -> tuple[FloatArray, FloatArray]:
     """For each disc the probability that it is a touch (k,), and the covariance of its place as
     wide as places err: xx, xy, yy (k, 3), mm^2; ``distance`` of the reference from the model's,
-    ``moved_mm2`` what that tells of places, None where it does not."""
-    x, y = np.clip(tested.apart_mm, -MAX_MOVE * pixel_mm, MAX_MOVE * pixel_mm).T
+    ``tared`` how places are corrected by that, None where they are not."""
+    x, y = PLACE_APART * np.clip(tested.apart_mm, -MAX_MOVE * pixel_mm, MAX_MOVE * pixel_mm).T
     least = pixel_mm**2 * PLACE_MIN
-    least += pixel_mm**2 * PLACE_DISTANCE * distance if moved_mm2 is None else (
-        PLACE_GEOMETRY * moved_mm2
-    )  # fmt: skip
+    if tared is None:
+        least += pixel_mm**2 * PLACE_DISTANCE * distance
+    else:
+        least += PLACE_GEOMETRY * tared.left_mm2
     place = PLACE_FACTOR * tested.place_mm2 + np.column_stack([x * x + least, x * y, y * y + least])
     return tested.rise / (tested.rise + CONFIDENCE_HALF), place
 

@@ -258,8 +258,7 @@ class ReferenceEngine(FrameStage):
             partial(self._dipoles, basis) if tells and model.data_kind == "difference" else None
         )
         drift = see @ errors.drift @ see.T
-        moved = None if self._far else self._moved_mm2
-        return DataErrors(error, drift, dipoles, self._distance, moved, int(self._far))
+        return DataErrors(error, drift, dipoles, self._distance, self._corrected, int(self._far))
 
     def _solve(
         self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None

@@ -44,6 +44,7 @@ from eitskin_reference.constants_table import (
 from eitskin_reference.disc_fit import Disc, Fit
 from eitskin_reference.ellipse import long_axis, placed
 from eitskin_reference.pair import pair_lines, pair_scores
+from eitskin_reference.places import Corrected
 from eitskin_reference.split_merge import merged
 
 FloatArray = npt.NDArray[np.float64]
@@ -60,14 +61,14 @@ class DataErrors:
     """What a frame's data y (r,) may be wrong by: covariances ``error`` (r, r), of noise and of
     model errors, and ``drift`` (r, r), of a skin that drifts; ``dipoles`` gives what a disc adds to
     y as a dipole that turns (2, r), None where the model cannot tell. ``distance``: of the
-    reference from the model's, rms over folds of log(v0 / v_ref), ``moved_mm2`` what that tells of
-    places. ``kept``: so many discs stay, whatever the data say of them."""
+    reference from the model's, rms over folds of log(v0 / v_ref), ``places`` how they are
+    corrected by it. ``kept``: so many discs stay, whatever the data say of them."""
 
     error: FloatArray
     drift: FloatArray
     dipoles: Callable[[Disc], FloatArray] | None
     distance: float = 0.0
-    moved_mm2: float | None = None
+    places: Corrected | None = None
     kept: int = 0
 
 

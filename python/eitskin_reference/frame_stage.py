@@ -27,6 +27,7 @@ from eitskin_reference.constants_table import (
     RATIO_DEFINED,
 )
 from eitskin_reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
+from eitskin_reference.places import Corrected, corrected
 from eitskin_reference.problem import (
     FloatArray,
     greatest,
@@ -59,7 +60,7 @@ class FrameStage:
         self._drift_v0: FloatArray | None = None
         self._gain, self._row_gain = 1.0, np.ones(model.protocol.n_rows)
         self._distance, self._far = 0.0, False
-        self._moved_mm2: float | None = None
+        self._corrected: Corrected | None = None
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._unusable = self._bad
@@ -115,11 +116,13 @@ class FrameStage:
         assert self._drift_v0 is not None
         gains, logs, far = row_gains(self.model, usable, self._gain * self._drift_v0)
         self._distance = float(np.sqrt(np.nanmean(logs**2)))
-        if errors.places is not None:
-            self._moved_mm2 = float(np.sum((errors.places @ np.nan_to_num(logs)) ** 2))
-        self._far = far and self.model.data_kind != "normalised"
-        if errors.row_gains and self.options.row_gains and self.model.data_kind != "normalised":
+        not_relative = self.model.data_kind != "normalised"
+        self._far = far and not_relative
+        in_force = errors.row_gains and self.options.row_gains and not_relative
+        if in_force:
             self._row_gain = gains
+        known = corrected(self.model.grid, errors, logs) if in_force and not far else None
+        self._corrected = known
 
     @property
     def _noise_floor_v(self) -> float:

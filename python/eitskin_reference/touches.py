@@ -114,7 +114,7 @@ def find_touches(
         if errors is not None:
             tested = keep_likely(fit, errors)
         if tested is not None and errors is not None:
-            sure, places = rated(tested, errors.distance, errors.moved_mm2, model.grid.pixel_mm)
+            sure, places = rated(tested, errors.distance, errors.places, model.grid.pixel_mm)
             if errors.kept and len(sure) == 1 and sure[0] < CENTRE_SURE:
                 moved = centre(fit, frame.y)
                 if moved is not None:
@@ -133,11 +133,16 @@ def find_touches(
             for touch, (xx, xy, yy) in zip(found, places_by_fit(fit), strict=True)
         ]  # fmt: skip
     if tested is not None:
+        tared = errors.places if errors is not None else None
+        on_skin = [
+            (float(x), float(y)) if tared is None else tared.on_skin(float(x), float(y))
+            for x, y, _ in tested.reported_mm
+        ]
         found = [
             replace(
                 touch,
-                x_mm=float(at[0]),
-                y_mm=float(at[1]),
+                x_mm=where[0],
+                y_mm=where[1],
                 radius_mm=float(at[2]),
                 confidence=float(one),
                 x_variance_mm2=float(xx),
@@ -146,8 +151,8 @@ def find_touches(
                 long_x_mm=float(x) if x or y else None,
                 long_y_mm=float(y) if x or y else None,
             )
-            for touch, one, (xx, xy, yy), (x, y), at in zip(
-                found, sure, places, tested.long_mm, tested.reported_mm, strict=True
+            for touch, one, (xx, xy, yy), (x, y), at, where in zip(
+                found, sure, places, tested.long_mm, tested.reported_mm, on_skin, strict=True
             )
         ]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))

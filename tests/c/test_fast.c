@@ -691,6 +691,32 @@ TEST(test_a_touch_that_leaves_the_skin)
     bench_close(b);
 }
 
+/* Where the reference says that the skin has touches elsewhere: they are reported there, and what
+ * whole frames find there is the same touch. */
+TEST(test_places_that_the_reference_corrects)
+{
+    for (int there = 0; there < 2; ++there) {
+        bench *b = bench_open(EITS_SIGN_INCREASE);
+        eits_fast_touch touches[EITS_FAST_TOUCHES];
+        const double x = (double)b->skin.model.pixel_mm; /* a shift is at most that */
+        b->skin.model.uncertainty.move_terms = 1;
+        b->skin.ctx->reference.row_gains = 1;
+        b->skin.ctx->reference.shift_mm[0][0] = (eits_real)x;
+        b->skin.ctx->reference.shift_mm[1][0] = R(-1);
+        drives(b, 40);
+        put(b, 0, 12, -20, 1);
+        drives(b, 40);
+        CHECK_EQUAL(told(b, touches), 1);
+        CHECK_NEAR(touches[0].x_mm, 12 + x, 1);
+        CHECK_NEAR(touches[0].y_mm, -21, 1);
+        for (uint32_t k = 0; k < EITS_FAST_LOST_FRAMES; ++k)
+            confirm(b, (const double[][2]){{12 + x + (there ? 2 * x : -3 * x), -21}}, 1);
+        CHECK_EQUAL(b->fast->count > 0 && b->fast->known[0].id == 1, there);
+        CHECK(!there || b->fast->known[0].confirmed);
+        bench_close(b);
+    }
+}
+
 TEST(test_answers_and_their_slopes)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);

@@ -25,10 +25,12 @@ extern "C" {
 
 /* A file of another major version is rejected; of a later minor one, what is new is skipped. */
 #define EITS_MODEL_MAJOR          1
-#define EITS_MODEL_MINOR          9
+#define EITS_MODEL_MINOR          10
 #define EITS_MODEL_ALIGNMENT      16
 #define EITS_MAX_RANK             1024
 #define EITS_MAX_PLACE_ROWS       32
+#define EITS_MAX_MOVE_DEGREE      4
+#define EITS_MAX_MOVE_TERMS       15 /* of that degree and below */
 #define EITS_MAX_PIXELS           65535
 #define EITS_MAX_ROWS             65535
 #define EITS_MAX_MODEL_ITERATIONS 100000 /* of a model's own defaults; options may ask for more */
@@ -176,11 +178,18 @@ typedef struct eits_uncertainty {
     uint32_t row_gains; /* 1: errors are of data multiplied by row gains from the reference */
     float errors_rms;   /* |d_true - d_model| / |d_model|, rms: skins that differ */
     float shapes_rms;   /* the same: touches that are no discs */
-    /* M, n_folded x place_rows, fold by fold, mm: |M'y|^2 is what the variance of a place grows by
+    /* N, n_folded x place_rows, fold by fold, mm: |N'y|^2 is what the variance of a place grows by
      * on a skin whose reference differs from the model by y = log(v0 / v_ref) (section GEOM); NULL:
      * not known */
     const float *places;
     uint32_t place_rows; /* at most EITS_MAX_PLACE_ROWS */
+    /* M, n_folded x move_rows, fold by fold, mm, and U, 2 x move_terms x move_rows, first along x,
+     * then y: such a skin has a touch found off by the polynomial with coefficients U M'y, terms 1,
+     * x, y, x^2, x y, y^2 ... with x and y from the grid's middle over half its longer side
+     * (section MOVE); NULL: not known */
+    const float *moved, *moves;
+    uint32_t move_rows;  /* at most EITS_MAX_PLACE_ROWS */
+    uint32_t move_terms; /* 1, 3, 6, 10 or EITS_MAX_MOVE_TERMS; 0: none */
 } eits_uncertainty;
 
 /* An open model. All pointers go into the blob; a caller reads it and never writes it. */

@@ -45,6 +45,12 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
             f.count = 0;
     }
     const uint32_t finite = eits_report_touches(ctx, &f, found);
+    for (uint32_t k = 0; f.tested && k < finite; ++k) {
+        eits_real at[2] = {found[k].x_mm, found[k].y_mm};
+        eits_place_on_skin(ctx, at);
+        found[k].x_mm = at[0];
+        found[k].y_mm = at[1];
+    }
     ctx->info.touch_macs = f.macs;
     eits_check_crowd(ctx, found, finite);
     eits_check_count(ctx, &f);

@@ -36,6 +36,11 @@ static inline void eits_copy(eits_real *out, const eits_real *a, size_t count)
     memmove(out, a, count * sizeof *out); /* may be the same place */
 }
 
+static inline eits_real eits_clamp(eits_real v, eits_real low, eits_real high)
+{
+    return v < low ? low : (v > high ? high : v);
+}
+
 /* Finite by its exponent's bits, so that no compiler flag can take the test away. */
 static inline int eits_is_finite(eits_real value)
 {

@@ -44,6 +44,8 @@ typedef struct eits_reference {
     /* what the variance of a place grows by for what v0 tells of electrodes and outline, mm^2; 0
      * where the model does not say */
     eits_real place_mm2;
+    /* mm, along x and y: what takes places back to where touches lie, by terms (frame/places.c) */
+    eits_real shift_mm[2][EITS_MAX_MOVE_TERMS];
     uint32_t row_gains; /* 1: in force */
     uint32_t far;       /* 1: it is the instrument that is far from the model, not the skin */
     eits_real correlation;

@@ -6,9 +6,9 @@
  *
  * A disc is a touch with probability rise / (rise + HALF), a logistic function of the logarithm of
  * its rise. A place is off by what the data leave open (the covariance, as far as it was found
- * true), by what the test would move it, and by what the skin is unlike its model: what the
- * reference tells of electrodes and outline, or, where the model cannot say or it is the instrument
- * that is unlike it, the reference's distance from the model's.
+ * true), by some of what the test would move it, and by what the skin is unlike its model: what the
+ * correction by the reference leaves (frame/places.c), or, where there is none, the reference's
+ * distance from the model's.
  *
  * A taught model has no such test. There the fit's normal equations say how far a place is known,
  * with the strengths of all discs free and what is left of the data for their noise, and the model
@@ -20,6 +20,7 @@
 #include "diagnostics/diagnostics.h"
 #include "evidence/constants.h"
 #include "frame/constants.h"
+#include "frame/reference.h"
 
 static int is_known(const eits_real *place_mm2, const eits_real *apart_mm)
 {
@@ -32,7 +33,7 @@ static eits_real variance_of_all(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
     const eits_real pixel = (eits_real)ctx->model->pixel_mm;
-    if (ctx->model->uncertainty.places == NULL || b->far)
+    if (!eits_corrects_places(ctx))
         return pixel * pixel * eits_fma(EITS_PLACE_DISTANCE, b->distance, EITS_PLACE_MIN);
     return eits_fma(EITS_PLACE_GEOMETRY, b->place_mm2, pixel * pixel * EITS_PLACE_MIN);
 }
@@ -46,8 +47,8 @@ void eits_rate_touches(const eits_context *ctx, eits_fit *f)
         if (!f->tested || !is_known(place, f->apart_mm[k])) {
             eits_zero(place, 3);
         } else {
-            const eits_real x = eits_clamp(f->apart_mm[k][0], -reach, reach),
-                            y = eits_clamp(f->apart_mm[k][1], -reach, reach);
+            const eits_real x = EITS_PLACE_APART * eits_clamp(f->apart_mm[k][0], -reach, reach),
+                            y = EITS_PLACE_APART * eits_clamp(f->apart_mm[k][1], -reach, reach);
             place[0] = eits_fma(EITS_PLACE_FACTOR, place[0], eits_fma(x, x, least));
             place[1] = eits_fma(EITS_PLACE_FACTOR, place[1], x * y);
             place[2] = eits_fma(EITS_PLACE_FACTOR, place[2], eits_fma(y, y, least));

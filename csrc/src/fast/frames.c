@@ -2,6 +2,8 @@
  * what the solver finds then confirms, ends and begins touches. */
 #include "fast/fast.h"
 
+#include "frame/reference.h"
+
 /* Where touch k was, and how strong, when a drive was last measured; with no strength, as it is,
  * where it was not there. */
 static const eits_real *was(const fast_drive *d, uint32_t k, const eits_real *now,
@@ -118,13 +120,13 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
 
 /* The nearest of those found that no touch has taken, within EITS_FAST_CONFIRM_MM; `count` where
  * there is none. */
-static uint32_t nearest(const eits_real *place, const eits_touch *found, const uint8_t *taken,
+static uint32_t nearest(const eits_real *place, const eits_real (*found)[2], const uint8_t *taken,
                         uint32_t count)
 {
     uint32_t best = count;
     eits_real least = fast_square(EITS_FAST_CONFIRM_MM);
     for (uint32_t n = 0; n < count; ++n) {
-        const eits_real dx = found[n].x_mm - place[0], dy = found[n].y_mm - place[1];
+        const eits_real dx = found[n][0] - place[0], dy = found[n][1] - place[1];
         const eits_real square = dx * dx + dy * dy;
         if (!taken[n] && square < least) {
             least = square;
@@ -161,8 +163,10 @@ static int near_known(const eits_fast *fast, const eits_real *place)
     return 0;
 }
 
-/* Touches that two frames on end have found and no drive. */
-static void seed(eits_fast *fast, const eits_touch *found, const uint8_t *taken, uint32_t count)
+/* Touches that two frames on end have found and no drive; `at`: where the modelled skin has them.
+ */
+static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)[2],
+                 const uint8_t *taken, uint32_t count)
 {
     const uint32_t known = fast->seeds;
     eits_real before[EITS_FAST_MAX_TOUCHES][2];
@@ -170,7 +174,7 @@ static void seed(eits_fast *fast, const eits_touch *found, const uint8_t *taken,
     fast->seeds = 0;
     for (uint32_t n = 0; n < count; ++n) {
         const eits_real c = found[n].strength_s_per_m_mm2;
-        const eits_real state[FAST_SIZE] = {found[n].x_mm, found[n].y_mm, c, 0, 0};
+        const eits_real state[FAST_SIZE] = {at[n][0], at[n][1], c, 0, 0};
         if (taken[n])
             continue;
         /* Two frames on end: in a single one, a touch that landed while it was scanned may stand at
@@ -199,13 +203,19 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
      * 6 mm further after a solve of 10 ms. */
     if (fast == NULL || (found == NULL && count > 0) || count > EITS_MAX_TOUCHES)
         return EITS_E_ARGUMENT;
+    eits_real at[EITS_MAX_TOUCHES][2];
+    for (uint32_t n = 0; n < count; ++n) {
+        at[n][0] = found[n].x_mm;
+        at[n][1] = found[n].y_mm;
+        eits_place_in_model(fast->ctx, at[n]);
+    }
     mask_named(fast);
     for (uint32_t k = fast->count; k-- > 0;) {
         fast_known *known = &fast->known[k];
         if (!known->aligned) /* it came after that frame */
             continue;
         known->aligned = 0;
-        const uint32_t n = nearest(known->at, found, taken, count);
+        const uint32_t n = nearest(known->at, (const eits_real(*)[2])at, taken, count);
         if (n < count) {
             taken[n] = 1;
             known->confirmed = 1;
@@ -215,7 +225,7 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
         }
     }
     /* a frame with rows that are no touch's may show any */
-    seed(fast, found, taken, fast->wild == 0 ? count : 0);
+    seed(fast, found, (const eits_real(*)[2])at, taken, fast->wild == 0 ? count : 0);
     fast->wild = 0;
     return EITS_OK;
 }

@@ -2,6 +2,8 @@
  * them. The order of the questions is that of their cost, and of how often they are answered. */
 #include "fast/fast.h"
 
+#include "frame/reference.h"
+
 /* A row that no touch can have changed so: it is dead, turned over, or far above its reference. */
 static int is_wild(const eits_fast *fast, eits_real v, eits_real v0)
 {
@@ -257,11 +259,13 @@ eits_status eits_fast_touches(const eits_fast *fast, eits_fast_touch *touches, u
     for (uint32_t k = 0; k < fast->count && *count < room; ++k) {
         const fast_known *known = &fast->known[k];
         const eits_real *state = fast->state + FAST_SIZE * k;
+        eits_real at[2] = {state[FAST_X], state[FAST_Y]};
+        eits_place_on_skin(fast->ctx, at);
         if (known->on)
             touches[(*count)++] = (eits_fast_touch){.id = known->id,
                                                     .confirmed = known->confirmed,
-                                                    .x_mm = state[FAST_X],
-                                                    .y_mm = state[FAST_Y],
+                                                    .x_mm = at[0],
+                                                    .y_mm = at[1],
                                                     .vx_mm_per_s = state[FAST_VX],
                                                     .vy_mm_per_s = state[FAST_VY],
                                                     .strength_s_per_m_mm2 = state[FAST_C]};

@@ -66,23 +66,14 @@ static eits_real own_gain(const eits_context *ctx, uint32_t i, eits_real expecte
                : (ratio < 1 / EITS_MAX_ROW_GAIN ? 1 / EITS_MAX_ROW_GAIN : ratio);
 }
 
-/* What a fold's log gain adds to each of the sums, whose squares are place_mm2. */
-static void add_to_places(const eits_model *model, uint32_t k, eits_real log_gain, eits_real *sum)
-{
-    const uint32_t rows = model->uncertainty.place_rows;
-    for (uint32_t j = 0; j < rows; ++j)
-        sum[j] =
-            eits_fma((eits_real)model->uncertainty.places[(size_t)rows * k + j], log_gain, sum[j]);
-}
-
 /* How far the reference is from the model, and its rows from their reciprocals; and what the first
- * says of places: electrodes and outline that are elsewhere change it in other ways than a sheet
- * that is uneven (docs/reference/eitm-format.md). A fold without reference is taken as modelled. */
+ * says of places (places.c). A fold without reference is taken as modelled. */
 static void measure_distance(eits_context *ctx)
 {
     const eits_model *model = ctx->model;
     eits_reference *b = &ctx->reference;
-    eits_real logs = 0, apart = 0, sum[EITS_MAX_PLACE_ROWS] = {0};
+    eits_real logs = 0, apart = 0;
+    eits_place_sums sums = {{0}, {0}};
     uint32_t count = 0, pairs = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
@@ -95,7 +86,7 @@ static void measure_distance(eits_context *ctx)
                         log_gain = eits_log(gain);
         logs = eits_fma(log_gain, log_gain, logs);
         ++count;
-        add_to_places(model, k, log_gain, sum);
+        eits_add_log_gain(model, k, log_gain, &sums);
         if (!first || !second)
             continue;
         const eits_real difference =
@@ -104,9 +95,7 @@ static void measure_distance(eits_context *ctx)
         ++pairs;
     }
     b->distance = count > 0 ? eits_sqrt(logs / (eits_real)count) : 0;
-    b->place_mm2 = 0;
-    for (uint32_t j = 0; j < model->uncertainty.place_rows; ++j)
-        b->place_mm2 = eits_fma(sum[j], sum[j], b->place_mm2);
+    eits_learn_places(ctx, &sums);
     b->reciprocity = pairs > 0 ? eits_sqrt(apart / (eits_real)pairs) : 0;
 }
 

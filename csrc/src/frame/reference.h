@@ -37,6 +37,27 @@ void eits_take_reference_frame(eits_context *ctx, const eits_real *frame);
 void eits_keep_second_frame(eits_context *ctx, const eits_real *frame);
 void eits_take_second_frame(eits_context *ctx);
 
+/* ---- places.c ---- */
+
+/* -N'y and -M'y (model.h, eits_uncertainty). */
+typedef struct eits_place_sums {
+    eits_real place[EITS_MAX_PLACE_ROWS], move[EITS_MAX_PLACE_ROWS];
+} eits_place_sums;
+
+/* Add what fold k's logarithm of its gain makes of them. */
+void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
+                       eits_place_sums *sums);
+
+/* reference.place_mm2 and shift_mm from them. */
+void eits_learn_places(eits_context *ctx, const eits_place_sums *sums);
+
+/* Whether places are corrected by what the reference tells: with row gains, for which it holds. */
+int eits_corrects_places(const eits_context *ctx);
+
+/* From where the modelled skin has a touch to where it lies, mm; and back. */
+void eits_place_on_skin(const eits_context *ctx, eits_real at[2]);
+void eits_place_in_model(const eits_context *ctx, eits_real at[2]);
+
 /* ---- follow.c ---- */
 
 /* Whether frames follow one another here, and for long enough to be told from single ones: after a

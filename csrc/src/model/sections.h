@@ -51,6 +51,11 @@ eits_status eits_read_uncertainty(eits_model *model, const eits_section *found);
  * a model without UNCE). */
 eits_status eits_read_places(eits_model *model, const eits_section *found);
 
+/* Section MOVE, where there is one, into model->uncertainty; GEOM and model->n_folded are known.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are out of range, or
+ * a model without GEOM). */
+eits_status eits_read_moves(eits_model *model, const eits_section *found);
+
 /* Section PREC, where there is one, into model->precision; row_form is known.
  * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are not finite, a
  * variance below 0, or a model that says how it was whitened besides). */

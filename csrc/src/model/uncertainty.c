@@ -44,7 +44,17 @@ eits_status eits_read_place_factor(eits_model *model, const eits_section *sectio
     return eits_between(model->place_factor, 0, 1e30f) ? EITS_OK : EITS_E_MODEL_VALUE;
 }
 
-/* Section GEOM: so many numbers for each fold, small enough that sums of squares are numbers. */
+/* Small enough that sums of squares are numbers. */
+static int are_places(const float *values, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        if (!eits_between(values[i], -1e6f, 1e6f))
+            return 0;
+    }
+    return 1;
+}
+
+/* Section GEOM: so many numbers for each fold. */
 eits_status eits_read_places(eits_model *model, const eits_section *section)
 {
     const float *values = (const float *)(const void *)section->data;
@@ -54,14 +64,36 @@ eits_status eits_read_places(eits_model *model, const eits_section *section)
     if (section->size == 0 || section->size % row_size != 0 ||
         section->size / row_size > EITS_MAX_PLACE_ROWS)
         return EITS_E_MODEL_SECTION;
-    for (uint32_t i = 0; i < section->size / 4u; ++i) {
-        if (!eits_between(values[i], -1e6f, 1e6f))
-            return EITS_E_MODEL_VALUE;
-    }
-    if (model->uncertainty.errors == NULL)
+    if (!are_places(values, section->size / 4u) || model->uncertainty.errors == NULL)
         return EITS_E_MODEL_VALUE;
     model->uncertainty.places = values;
     model->uncertainty.place_rows = section->size / row_size;
+    return EITS_OK;
+}
+
+/* Section MOVE: rows and terms, so many numbers for each fold, and for either axis and each term.
+ */
+eits_status eits_read_moves(eits_model *model, const eits_section *section)
+{
+    uint32_t head[4];
+    if (section->data == NULL)
+        return EITS_OK;
+    if (section->size < sizeof head)
+        return EITS_E_MODEL_SECTION;
+    memcpy(head, section->data, sizeof head);
+    const uint32_t rows = head[0], terms = head[1];
+    const float *values = (const float *)(const void *)(section->data + sizeof head);
+    if (rows == 0 || rows > EITS_MAX_PLACE_ROWS ||
+        (terms != 1 && terms != 3 && terms != 6 && terms != 10 && terms != EITS_MAX_MOVE_TERMS) ||
+        section->size != sizeof head + 4u * rows * (model->n_folded + 2u * terms))
+        return EITS_E_MODEL_SECTION;
+    if (!are_places(values, rows * (model->n_folded + 2u * terms)) ||
+        model->uncertainty.places == NULL)
+        return EITS_E_MODEL_VALUE;
+    model->uncertainty.moved = values;
+    model->uncertainty.moves = values + (size_t)rows * model->n_folded;
+    model->uncertainty.move_rows = rows;
+    model->uncertainty.move_terms = terms;
     return EITS_OK;
 }
 

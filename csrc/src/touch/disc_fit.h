@@ -52,11 +52,6 @@ static inline eits_real *eits_atom(const eits_context *ctx, uint32_t k)
     return ctx->touch.atoms + EITS_STRIDE(ctx->model->rank) * k;
 }
 
-static inline eits_real eits_clamp(eits_real v, eits_real low, eits_real high)
-{
-    return v < low ? low : (v > high ? high : v);
-}
-
 /* disc_fit.c */
 
 /* No discs yet, of the frame's data. */

@@ -237,6 +237,7 @@ def with_model_errors(
         fold=model.fold,
         data_kind=model.data_kind,
         projection=model.projection.astype(np.float64),
+        grid=model.grid,
         uncertainty=uncertainty,
     )
     return replace(model, model_errors=draw_model_errors(request, jobs=jobs, progress=progress))

@@ -24,7 +24,7 @@ from eitskin.model.model import (
     Golden,
     Model,
 )
-from eitskin.model.model_errors import decode_model_errors
+from eitskin.model.model_errors import ModelErrors, decode_model_errors, decode_places
 from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
@@ -41,7 +41,6 @@ SCALED = ("i16", "i8")
 MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
 MAX_ITERATIONS = 100_000
 MIN_RADIUS_MM, HUGE = 1e-6, 1e30
-MAX_PLACE_ROWS, MAX_PLACE_MM = 32, 1e6
 NEARER = "choose units nearer to volts and siemens per metre"
 MIN_LIPSCHITZ, MAX_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
 
@@ -90,8 +89,7 @@ def encode_sections(model: Model) -> Sections:
     if model.model_errors is not None:
         sections["UNCE"] = model.model_errors.encode()
         if model.model_errors.places is not None:
-            # fold by fold
-            sections["GEOM"] = model.model_errors.places.T.astype("<f4").tobytes()
+            sections |= model.model_errors.places.encode()
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
@@ -315,18 +313,6 @@ def _read_place_factor(sections: Sections, where: str) -> float:
     return factor
 
 
-def _read_places(sections: Sections, d: _Dims, where: str) -> npt.NDArray[np.float32] | None:
-    if "GEOM" not in sections:
-        return None
-    rows, left = divmod(len(sections["GEOM"]), 4 * d.n_folded)
-    if left or not 1 <= rows <= MAX_PLACE_ROWS:
-        _refuse(where, "section 'GEOM' of a size that its rows do not ask for")
-    values = _floats(sections, "GEOM", (d.n_folded, rows), where)
-    if np.abs(values).max() > MAX_PLACE_MM:
-        _refuse(where, "a number in section 'GEOM' that is out of range")
-    return np.ascontiguousarray(values.T)
-
-
 def _read_order(sections: Sections, table: npt.NDArray[np.uint8], where: str) -> tuple[int, ...]:
     """The order of drives; () as they stand."""
     if "ORDR" not in sections:
@@ -400,12 +386,15 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
         ),
         precision=_read_precision(sections, d, where),
         place_factor=_read_place_factor(sections, where),
-        model_errors=(
-            decode_model_errors(sections["UNCE"], d.rank, where, _read_places(sections, d, where))
-            if "UNCE" in sections
-            else None
-        ),
+        model_errors=(_read_model_errors(sections, d, where) if "UNCE" in sections else None),
     )
+
+
+def _read_model_errors(sections: Sections, d: _Dims, where: str) -> ModelErrors:
+    """What GEOM alone says (format 1.9) is of use to no reader any more."""
+    both = "GEOM" in sections and "MOVE" in sections
+    places = decode_places(sections["GEOM"], sections["MOVE"], d.n_folded, where) if both else None
+    return decode_model_errors(sections["UNCE"], d.rank, where, places)
 
 
 def _short(value: float) -> float:

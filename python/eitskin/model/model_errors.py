@@ -1,5 +1,5 @@
-"""What a real skin's data may differ by from the model's: the sections UNCE and GEOM of a .eitm
-file."""
+"""What a real skin's data may differ by from the model's: the sections UNCE, GEOM and MOVE of a
+.eitm file."""
 
 import struct
 from dataclasses import dataclass
@@ -13,9 +13,32 @@ from eitskin.errors import ModelError
 Float32s = npt.NDArray[np.float32]
 
 HEAD = struct.Struct("<I3f")
+MOVE_HEAD = struct.Struct("<II8x")
+MAX_ROWS, MAX_MM = 32, 1e6
+MOVE_TERMS = (1, 3, 6, 10, 15)  # of polynomials in two coordinates up to the fourth degree
 ROW_GAINS = 1
 HUGE = 1e30
 NEGATIVE = 1e-5  # an eigenvalue below 0 by this part of the greatest is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class TarePlaces:
+    """What a tare tells of places, by y = log(v0 / v_ref) over the k folds: ``left`` N (p, k), mm,
+    |N y|^2 is what the variance of a place grows by; ``seen`` M (q, k) and ``moves`` U (2, t, q),
+    mm: along x and y a touch is found off by the polynomial with coefficients U M y."""
+
+    left: Float32s
+    seen: Float32s
+    moves: Float32s
+
+    def encode(self) -> dict[str, bytes]:
+        """The sections GEOM and MOVE, rows fold by fold."""
+        left, seen, moves = (
+            np.ascontiguousarray(part).astype("<f4").tobytes()
+            for part in (self.left.T, self.seen.T, self.moves)
+        )
+        head = MOVE_HEAD.pack(len(self.seen), self.moves.shape[1])
+        return {"GEOM": left, "MOVE": head + seen + moves}
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +49,7 @@ class ModelErrors:
     what the skin's own drift adds, in the datum's unit squared; both float32, symmetric and
     positive semidefinite. ``rms_error`` and ``rms_shape_error``: sqrt(mean |e|^2) of random skins
     and of shaped touches, all rows. ``row_gains``: each row is to be scaled to the model by the
-    tare. ``places`` M (q, k), mm: |M y|^2 is what the variance of a place grows by on a skin whose
-    tare differs from the model by y = log(v0 / v_ref) over the folds; None: not known.
+    tare. ``places``: what that tells of places; None: not known.
     """
 
     error: Float32s
@@ -35,7 +57,7 @@ class ModelErrors:
     rms_error: float
     rms_shape_error: float
     row_gains: bool = True
-    places: Float32s | None = None
+    places: TarePlaces | None = None
 
     def encode(self) -> bytes:
         """The section's bytes."""
@@ -49,9 +71,13 @@ class ModelErrors:
 
 
 def decode_model_errors(
-    content: bytes, rank: int, where: str, places: Float32s | None = None
+    content: bytes,
+    rank: int,
+    where: str,
+    places: TarePlaces | None = None,
 ) -> ModelErrors:
-    """The section's numbers, of a model of ``rank``; ``places`` are the section GEOM's.
+    """The section's numbers, of a model of ``rank``; ``places`` are those of the sections
+    GEOM and MOVE.
 
     Raises:
         ModelError: it has another length than the rank asks for, a number is out of range, or a
@@ -85,6 +111,44 @@ def decode_model_errors(
         float(str(np.float32(rms_shape_error))),
         bool(flags & ROW_GAINS),
         places,
+    )
+
+
+def decode_places(geom: bytes, move: bytes, folds: int, where: str) -> TarePlaces:
+    """The numbers of both sections, of a model of ``folds``.
+
+    Raises:
+        ModelError: one has another length than its counts ask for, or a number is out of range.
+    """
+    rows, rest = divmod(len(geom), 4 * folds)
+    if rest or not 1 <= rows <= MAX_ROWS:
+        raise ModelError(_other_size(where, "GEOM"))
+    count, terms = MOVE_HEAD.unpack_from(move) if len(move) >= MOVE_HEAD.size else (0, 0)
+    if (
+        not 1 <= count <= MAX_ROWS
+        or terms not in MOVE_TERMS
+        or len(move) != MOVE_HEAD.size + 4 * count * (folds + 2 * terms)
+    ):
+        raise ModelError(_other_size(where, "MOVE"))
+    left = np.frombuffer(geom, dtype="<f4").reshape(folds, rows)
+    numbers = np.frombuffer(move, dtype="<f4", offset=MOVE_HEAD.size)
+    for name, values in (("GEOM", left), ("MOVE", numbers)):
+        if not (np.abs(values) <= MAX_MM).all():
+            raise ModelError(
+                f"{where}: holds a number in section {name!r} that is out of range; build the model"
+                " again"
+            )
+    return TarePlaces(
+        np.ascontiguousarray(left.T),
+        np.ascontiguousarray(numbers[: folds * count].reshape(folds, count).T),
+        numbers[folds * count :].reshape(2, terms, count),
+    )
+
+
+def _other_size(where: str, name: str) -> str:
+    return (
+        f"{where}: holds section {name!r} of a size that its rows do not ask for; build the model"
+        " again"
     )
 
 

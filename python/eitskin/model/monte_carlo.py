@@ -58,7 +58,7 @@ def draw_model_errors(
             for _ in range(count):
                 processes.append(_Process(request))
                 idle.put(processes[-1])
-            drift, places = (pool.submit(ask, name) for name in ("drift", "places"))
+            drift, tared = (pool.submit(ask, name) for name in ("drift", "places"))
             drawn: Iterable[FloatArray] = pool.map(
                 lambda number: ask("sample", number), range(samples)
             )
@@ -70,7 +70,7 @@ def draw_model_errors(
                 rms_error=float(np.float32(rms_error)),
                 rms_shape_error=float(np.float32(rms_shape_error)),
                 row_gains=request.uncertainty.row_gains,
-                places=places.result(),
+                places=tared.result(),
             )
         finally:
             pool.shutdown(wait=False, cancel_futures=True)

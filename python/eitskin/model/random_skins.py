@@ -17,6 +17,7 @@ from eitskin.arrays import FloatArray
 from eitskin.core.constants_table import MAX_RATIO, MAX_ROW_GAIN, RATIO_DEFINED
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.deform import Deformation, Rim
+from eitskin.fem.grid import Grid
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.sensitivity import element_fields
 from eitskin.fem.shaped_touch import ShapedTouch, TouchCover
@@ -40,7 +41,7 @@ CELL = 0.15  # of a field's least length
 @dataclass(frozen=True, eq=False)
 class Request:
     """``skin`` under ``protocol`` on ``mesh``, and the model's data: their kind, ``fold``, and
-    ``projection`` P (r, k)."""
+    ``projection`` P (r, k); and its ``grid``."""
 
     skin: Skin
     protocol: Protocol
@@ -48,6 +49,7 @@ class Request:
     fold: Reciprocity
     data_kind: str
     projection: FloatArray
+    grid: Grid
     uncertainty: Uncertainty
 
 

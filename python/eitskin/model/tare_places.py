@@ -1,4 +1,4 @@
-"""What the tare tells of places: section GEOM of a .eitm file.
+"""What the tare tells of places: sections GEOM and MOVE of a .eitm file.
 
 Where electrodes lie elsewhere and the outline is another, the untouched skin's voltages differ from
 the model's in one way, where the sheet is uneven in another; and both move touches. With causes c
@@ -7,13 +7,16 @@ the sheet's smooth fields), linearised,
 
     y = log(gain v0 / v_ref) = L c + rest,    c^ = V L' (L V L' + ROUGH^2)^-1 y,
 
-and a touch at p is found off by b(p) c, for data with the row gains of that tare. c^ is smaller
-than c, by r = V^-1 cov(c^) in the mean square, so that
+and a touch at p is found off by b(p) c, for data with the row gains of that tare, which b(p) c^
+takes back, b a polynomial of DEGREE in p. What that leaves is in proportion to how far the causes
+are from 0 on this skin. c^ is smaller than c, by r = V^-1 cov(c^) in the mean square, so that
 
-    mean over p, axis of |b c|^2 / 2  =  sum_j b_j^2 c^_j^2 / r_j  =  |M y|^2
+    sum over causes of left c^^2 / (n r V) = |N y|^2
 
-is what the variance of a place grows by on this skin. M has the ROWS directions of y that tell
-most.
+is what the variance of a place grows by: n causes of a kind leave ``left`` when they are as great
+as V says. Of electrodes, which may all turn at once, that is what the regression leaves; the
+outline's harmonics are taken back whole, and the sheet's fields not at all. N and M, of which c^ is
+made, have the ROWS directions of y that tell most.
 """
 
 from dataclasses import dataclass
@@ -27,7 +30,7 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.sensitivity import element_fields
 from eitskin.fem.shaped_touch import ShapedTouch, TouchCover
-from eitskin.model.model_errors import Float32s
+from eitskin.model.model_errors import TarePlaces
 from eitskin.model.random_skins import (
     FIELD_LENGTHS,
     HARMONICS,
@@ -43,7 +46,8 @@ except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
 
 
-ROWS = 16  # more tells nothing more, 8 too little: on the tuning family of the worlds, seeds 21, 22
+ROWS = 16  # more tells nothing more, 8 too little: on the tuning family of the worlds, seed 21
+DEGREE = 4  # of 3, 4 and 5 the least that takes back what can be, on the tuning family, seed 21
 FIELDS = 80  # smooth fields of the sheet: what 20 leave looks like shifted electrodes
 MOVING = 12  # of them move touches; the others by less
 ROUGH = 0.01  # rms of what the linearisation leaves of y
@@ -55,24 +59,45 @@ EDGE_STEP = 0.1  # of the touch's radius, for the slopes of its answer
 LEAST_SHARE = 0.05  # r is taken as at least this
 
 
-def tare_places(skins: RandomSkins) -> Float32s:
-    """M (ROWS, k) in mm, for y over the folds."""
+def tare_places(skins: RandomSkins) -> TarePlaces:
+    """What the tare tells of places on ``skins``."""
     causes = _Causes(skins)
     variance, logs, moves = causes.all()
+    electrodes = slice(causes.electrodes)
     covariance = (logs.T * variance) @ logs + ROUGH**2 * np.eye(logs.shape[1])
     found = (variance[:, None] * logs) @ np.linalg.inv(covariance)
-    share = np.einsum("ck,ck->c", found, logs)
-    weight = (moves**2).mean(axis=(1, 2)) / np.maximum(share, LEAST_SHARE)
-    # the directions by what they tell of skins as drawn: of covariance^1/2 M'M covariance^1/2
+    share = np.maximum(np.einsum("ck,ck->c", found, logs), LEAST_SHARE)
+    fields = slice(causes.electrodes + causes.waves, None)
+    unseen = np.diag(variance[electrodes]) - found[electrodes] @ (logs.T * variance)[:, electrodes]
+    size = np.einsum("cpi,dpi->cd", moves, moves) / (2 * moves.shape[1])
+    left = np.zeros(len(variance))
+    left[electrodes] = np.sum(unseen * size[electrodes, electrodes]) / causes.electrodes
+    left[fields] = variance[fields] @ np.diag(size)[fields] / len(left[fields])
+    drawn = variance > 0  # what the uncertainty leaves out is not looked for
+    rows = np.sqrt(left / np.where(drawn, share * variance, 1.0))[:, None] * found
+    # the directions by what they tell of skins as drawn: of rows covariance^1/2
     values, vectors = np.linalg.eigh(covariance)
     root = (vectors * np.sqrt(values)) @ vectors.T
     inverse = (vectors / np.sqrt(values)) @ vectors.T
-    half = (np.sqrt(weight)[:, None] * found) @ root
-    told, directions = np.linalg.eigh(half.T @ half)
-    most = np.argsort(-told)[:ROWS]
-    rows = np.sqrt(np.maximum(told[most], 0))[:, None] * (directions[:, most].T @ inverse)
-    greatest = np.take_along_axis(rows, np.abs(rows).argmax(axis=1)[:, None], axis=1)
-    return np.asarray(rows * np.where(greatest < 0, -1.0, 1.0), dtype=np.float32)
+    told, of_left = _strongest(rows @ root)
+    terms = causes.terms()
+    polynomials = np.linalg.lstsq(terms, moves.transpose(1, 2, 0).reshape(len(terms), -1), None)[0]
+    shift = polynomials.reshape(terms.shape[1], 2, -1).transpose(1, 0, 2) @ found @ root
+    _, of_moves = _strongest((terms @ shift).reshape(-1, len(root)))
+    return TarePlaces(
+        np.asarray(told[:, None] * of_left @ inverse, dtype=np.float32),
+        np.asarray(of_moves @ inverse, dtype=np.float32),
+        np.asarray(shift @ of_moves.T, dtype=np.float32),
+    )
+
+
+def _strongest(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The ROWS greatest singular values of ``matrix`` (n, k), and its directions (ROWS, k), the
+    greatest number of each above 0."""
+    _, values, directions = np.linalg.svd(matrix, full_matrices=False)
+    most = directions[:ROWS]
+    greatest = np.take_along_axis(most, np.abs(most).argmax(axis=1)[:, None], axis=1)
+    return values[:ROWS], most * np.where(greatest < 0, -1.0, 1.0)
 
 
 @dataclass(eq=False)
@@ -80,9 +105,11 @@ class _Causes:
     """What each cause changes: y, and where touches are found."""
 
     skins: RandomSkins
+    waves: int = 2 * len(HARMONICS)
 
     def __post_init__(self) -> None:
         skins = self.skins
+        self.electrodes = skins.request.skin.electrodes.count
         asked, outline = skins.request.uncertainty, skins.request.skin.outline
         self.radius_mm = float(np.mean(asked.touch_radius)) * skins.radius_mm
         x0, y0, x1, y1 = outline.bounding_box_mm
@@ -115,7 +142,7 @@ class _Causes:
         2), mm."""
         skins = self.skins
         asked, radius = skins.request.uncertainty, skins.radius_mm
-        count, rim = skins.request.skin.electrodes.count, skins.deformation.rim
+        count, rim = self.electrodes, skins.deformation.rim
         waves, h = rim_waves(rim), STEP * radius
         still, round_ = np.zeros(count), np.zeros(len(rim.nodes))
         made = [self._of_mesh(h * shift, round_, h) for shift in np.eye(count)]
@@ -136,6 +163,16 @@ class _Causes:
         )
         logs, moves = (np.array(part) for part in zip(*made, strict=True))
         return variances, logs, moves
+
+    def terms(self) -> FloatArray:
+        """1, x, y, x^2, x y, y^2 ... at ``places``, from the grid's middle over half its longer
+        side, (p, t)."""
+        grid = self.skins.request.grid
+        half = np.array([grid.nx, grid.ny]) * grid.pixel_mm / 2
+        x, y = (self.places - grid.origin_mm - half).T / half.max()
+        return np.column_stack(
+            [x ** (n - j) * y**j for n in range(DEGREE + 1) for j in range(n + 1)]
+        )
 
     def _of_mesh(
         self, shift_mm: FloatArray, outwards_mm: FloatArray, h: float

@@ -10,12 +10,20 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import ModelError
 from eitskin.fem.cem import ForwardModel
+from eitskin.fem.grid import grid_for
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.model import monte_carlo
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import HEADER, decode_model, encode_model
+from eitskin.model.eitm_sections import decode_sections, encode_sections
 from eitskin.model.model import DATA_KINDS, Model
-from eitskin.model.model_errors import HEAD, ModelErrors, as_covariance, decode_model_errors
+from eitskin.model.model_errors import (
+    HEAD,
+    ModelErrors,
+    TarePlaces,
+    as_covariance,
+    decode_model_errors,
+)
 from eitskin.model.monte_carlo import draw_model_errors
 from eitskin.model.random_skins import RandomSkins, Request
 from eitskin.model.reduction import fold_rows
@@ -44,9 +52,8 @@ def request(data_kind: str = "difference", uncertainty: Uncertainty = FEW) -> Re
     protocol = adjacent(8)
     fold = protocol.reciprocal_pairs()
     projection = np.random.default_rng(1).normal(size=(5, len(fold.first)))
-    return Request(
-        SKIN, protocol, mesh_for_elements(SKIN, 600), fold, data_kind, projection, uncertainty
-    )
+    mesh, grid = mesh_for_elements(SKIN, 600), grid_for(SKIN.outline, 10)
+    return Request(SKIN, protocol, mesh, fold, data_kind, projection, grid, uncertainty)
 
 
 @cache
@@ -69,7 +76,8 @@ def test_any_number_of_processes_draws_the_same():
 
     again = draw_model_errors(request(), jobs=3, progress=progress)
     assert again.encode() == errors().encode()
-    assert again.places is not None and (again.places == errors().places).all()
+    assert again.places is not None and errors().places is not None
+    assert again.places.encode() == errors().places.encode()
     assert seen == [(k, 8) for k in range(1, 9)]
     other = RandomSkins(request(uncertainty=replace(FEW, seed=2))).sample(0)
     assert not np.array_equal(other, RandomSkins(request()).sample(0))
@@ -115,7 +123,10 @@ def test_a_thin_skin_takes_what_fits():
     fold = adjacent(8).reciprocal_pairs()
     mesh = mesh_for_elements(strip, 600)
     projection = np.eye(len(fold.first))[:3]
-    skins = RandomSkins(Request(strip, adjacent(8), mesh, fold, "difference", projection, FEW))
+    grid = grid_for(strip.outline, 10)
+    skins = RandomSkins(
+        Request(strip, adjacent(8), mesh, fold, "difference", projection, grid, FEW)
+    )
     assert np.isfinite([skins.sample(k) for k in range(4)]).all()
 
 
@@ -157,29 +168,46 @@ def test_it_is_read_as_written():
 
 def test_what_the_tare_tells_of_places_is_read_as_written():
     model = decode_model(tiny_blob(), "tiny")
-    bare, draw = replace(errors(), places=None), np.random.default_rng(3)
-    places = draw.normal(size=(3, len(model.fold.first))).astype(np.float32)
+    bare, draw, folds = (
+        replace(errors(), places=None),
+        np.random.default_rng(3),
+        len(model.fold.first),
+    )
+    shapes = ((3, folds), (2, folds), (2, 6, 2))
+    places = TarePlaces(*(draw.normal(size=shape).astype(np.float32) for shape in shapes))
     blob = encode_model(replace(model, model_errors=replace(bare, places=places)))
-    assert HEADER.unpack_from(blob)[1:3] == (1, 9)
+    assert HEADER.unpack_from(blob)[1:3] == (1, 10)
     read = decode_model(blob, "made").model_errors
-    assert read is not None and read.places is not None and (read.places == places).all()
-    for wrong, said in (
-        (places[:, :-1], "of a size that its rows do not ask for"),
-        (np.vstack([places] * 11), "of a size that its rows do not ask for"),
-        (places * 2e6, "a number in section 'GEOM' that is out of range"),
-        (np.full_like(places, np.nan), "GEOM"),
+    assert read is not None and read.places is not None
+    assert read.places.encode() == places.encode()
+    for change, said in (
+        ({"left": places.left[:, :-1]}, "section 'GEOM' of a size"),
+        ({"left": np.vstack([places.left] * 11)}, "section 'GEOM' of a size"),
+        ({"left": places.left * 2e6}, "a number in section 'GEOM' that is out of range"),
+        ({"left": np.full_like(places.left, np.nan)}, "GEOM"),
+        ({"seen": places.seen[:, 1:]}, "section 'MOVE' of a size"),
+        ({"seen": np.vstack([places.seen] * 17)}, "section 'MOVE' of a size"),
+        ({"moves": places.moves[:, :5]}, "section 'MOVE' of a size"),
+        ({"moves": places.moves * -2e6}, "a number in section 'MOVE' that is out of range"),
     ):
-        bad = encode_model(replace(model, model_errors=replace(bare, places=wrong)))
+        wrong = replace(bare, places=replace(places, **change))
         with pytest.raises(ModelError, match=said):
-            decode_model(bad, "made")
+            decode_model(encode_model(replace(model, model_errors=wrong)), "made")
+
+
+def test_a_file_of_format_1_9_corrects_no_places():
+    model, alone = decode_model(tiny_blob(), "tiny"), np.ones((2, 20), dtype=np.float32)
+    sections = encode_sections(replace(model, model_errors=replace(errors(), places=None)))
+    old = decode_sections(sections | {"GEOM": alone.tobytes()}, model.protocol.hash, "old")
+    assert old.model_errors is not None and old.model_errors.places is None
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_the_tare_tells_shifted_electrodes_from_an_uneven_sheet(data_kind):
-    """By the variance that each adds to a place, for references equally far from the model."""
+    """By the variance that each leaves of a place, for references equally far from the model."""
     asked = request(data_kind, replace(FEW, electrode_position_sd=0.02, background_log_sd=0.1))
     skins = RandomSkins(asked)
-    places, draw = tare_places(skins), np.random.default_rng(4)
+    places, draw = tare_places(skins).left, np.random.default_rng(4)
     assert places.dtype == np.float32 and places.shape == (16, len(skins.v_ref))
     apart = {}
     for shifted in (True, False):
@@ -210,8 +238,15 @@ def test_a_skin_thinner_than_the_step_tells_of_places():
         thickness_mm=5.0,
     )
     mesh = mesh_for_elements(skin, 600)
-    places = tare_places(RandomSkins(replace(request(), skin=skin, mesh=mesh)))
-    assert places.shape[0] == 16 and np.isfinite(places).all()
+    grid = grid_for(skin.outline, 10)
+    places = tare_places(RandomSkins(replace(request(), skin=skin, mesh=mesh, grid=grid)))
+    assert len(places.left) == 16
+    assert all(np.isfinite(part).all() for part in (places.left, places.seen, places.moves))
+
+
+def test_a_skin_that_is_as_described_has_nothing_to_correct():
+    places = tare_places(RandomSkins(request(uncertainty=CALM)))
+    assert np.abs(places.left).max() == np.abs(places.moves).max() == 0
 
 
 def test_the_core_takes_a_model_with_it():

@@ -1,0 +1,68 @@
+"""Touches on skins whose electrodes or outline lie elsewhere than modelled: the tare tells, and
+places are taken back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from eitskin.model.model import Model
+from eitskin.scoring.matching import match
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
+from small_models import prebuilt
+
+SCENES, SEED = 8, 5
+
+
+@pytest.fixture(scope="module")
+def factory() -> WorldFactory:
+    model = prebuilt()[0]
+    return WorldFactory(model.skin, model.protocol)
+
+
+def uncorrected(model: Model) -> Model:
+    assert model.model_errors is not None
+    return replace(model, model_errors=replace(model.model_errors, places=None))
+
+
+def found_mm(model: Model, engine: str, scenes: WorldScenes) -> list[np.ndarray]:
+    """The touches' places of each scene, (k, 2)."""
+    solver, places = Reconstructor(model, engine=engine), []
+    for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
+        solver.tare(quiet_v)
+        solver.forget()
+        touches = solver.reconstruct(frame_v).touches
+        places.append(np.array([(t.x_mm, t.y_mm) for t in touches]).reshape(-1, 2))
+    return places
+
+
+def errors_mm(scenes: WorldScenes, places: list[np.ndarray]) -> list[float]:
+    return [
+        distance
+        for scene, found in zip(scenes.scenes, places, strict=True)
+        for distance in match(scene.centres_mm(), found.tolist()).distances_mm
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "most_of_before"),
+    [("out_of_round_2_percent", 0.6), ("misplaced_3_mm", 0.9), ("discs_1_to_3", 1.05)],
+)
+def test_places_are_nearer_where_the_tare_tells_that_they_were_off(factory, name, most_of_before):
+    scenes = factory.scenes(name, SCENES, SEED)
+    model = prebuilt()[0]
+    after, before = (
+        np.median(errors_mm(scenes, found_mm(one, "c", scenes)))
+        for one in (model, uncorrected(model))
+    )
+    assert after < most_of_before * before
+
+
+def test_core_and_reference_correct_alike(factory):
+    scenes = factory.scenes("out_of_round_2_percent", 3, SEED)
+    c, numpy = (found_mm(prebuilt()[0], engine, scenes) for engine in ("c64", "numpy"))
+    off = found_mm(uncorrected(prebuilt()[0]), "c64", scenes)
+    assert max(np.abs(a - b).max() for a, b in zip(c, off, strict=True)) > 0.3
+    for one, other in zip(c, numpy, strict=True):
+        assert one == pytest.approx(other, abs=1e-3)
