@@ -38,6 +38,8 @@ from eitskin_reference.constants_table import (
     SPLIT_ODDS,
     SPLIT_RISE,
     SPLIT_RISE_OF_ODDS,
+    STILL_COLUMNS,
+    STILL_MIN,
     TOUCH_EVIDENCE,
     TRIAL_COLUMNS,
 )
@@ -92,17 +94,25 @@ class Tested:
 
 @dataclass(eq=False)
 class Budget:
-    """The columns that a frame's test has ``made``, of at most ``most`` (0: any number);
-    ``spent``: more were wanted."""
+    """The columns that a frame's test has ``made``, of at most ``most`` in what is being tried and
+    ``all`` at last (0: any number); ``spent``: more were wanted."""
 
     most: int
+    all: int
     made: int = 0
     spent: bool = False
 
     def allows(self, columns: int) -> bool:
         """Whether so many more may be made. Who linearises asks before, and leaves enough to
         linearise what is taken at last."""
-        may = self.most == 0 or self.made + columns <= self.most
+        return self._has(columns, self.most)
+
+    def allows_later(self, columns: int) -> bool:
+        """The same of what is tried at last."""
+        return self._has(columns, self.all)
+
+    def _has(self, columns: int, most: int) -> bool:
+        may = most == 0 or self.made + columns <= most
         self.spent |= not may
         return may
 
@@ -242,6 +252,7 @@ class Hypothesis:
         self.best_mm, self.pair = np.zeros((count, 2)), np.zeros(count)
         self.axis, self.line = np.zeros((count, 2)), np.zeros((count, 2))
         self.here = 0.0
+        self.places_made = False  # columns of strength, places and radii are at hand
 
     @property
     def evidence(self) -> float:
@@ -265,7 +276,9 @@ class Hypothesis:
     def linearise(self, answer: Answer) -> Likelihood:
         """F about ``answer``."""
         columns = np.vstack([self.columns(answer, k) for k in range(len(answer.discs))])
-        self.budget.made += len(columns)
+        known = PLACE * len(answer.discs) if self.places_made and answer.parameters > PLACE else 0
+        self.places_made = False
+        self.budget.made += len(columns) - known
         left, off = self.data - answer.parts().ravel() @ columns, answer.offsets().ravel()
         precision = np.tile(PRECISION[: answer.parameters], len(answer.discs))
         here = float(left @ left) + answer.prior()
@@ -562,7 +575,7 @@ class Hypothesis:
                 return True
             bad = FITS if self.fitted else FITS_AS_DISCS
             excess = self.excess(self.answer.misfit, len(self.answer.discs))
-            if not to_the_end and excess > bad and self.budget.allows(others):
+            if not to_the_end and excess > bad and self.budget.allows_later(others):
                 return False
             rest, about = self.drop_linearly(now, weakest)
             if len(rest.discs) < len(self.answer.discs):
@@ -580,7 +593,7 @@ class Hypothesis:
                 self.answer, now = self.refit(self.answer, now)
                 self.fitted, now = True, self.about(now)
                 weakest = self.look(now)
-            if not to_the_end and not self.fits() and self.budget.allows(others):
+            if not to_the_end and not self.fits() and self.budget.allows_later(others):
                 return False
             weak = self.rise[weakest] < self.needed()
             if weak and not self.budget.allows(2 * self.answer.columns):
@@ -605,6 +618,7 @@ class Hypothesis:
         clear = self.rise[weakest] > CLEAR_AS_DISCS * self.needed() and not self.near_pairs()
         self.clear = clear and excess < FITS_AS_DISCS
         self.answer = replace(self.answer, parameters=parameters)
+        self.places_made = parameters > PLACE
         rank = self.fit.model.rank
         shapes_matter = parameters > PLACE and self.answer.misfit > PAIR_MISFIT * rank
         if self.clear and shapes_matter and self.budget.allows(self.answer.columns):
@@ -617,11 +631,14 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
     that stay, None where there is no room to test so many."""
     if not fit.discs or not parameters_of(fit, errors, len(fit.discs)):
         return None
-    budget = Budget(fit.options.test_columns)
+    all_ = fit.options.test_columns
+    budget = Budget(min(all_, max(STILL_MIN, STILL_COLUMNS - fit.moves)), all_)
     best = Hypothesis(fit, errors, budget, drift=False)
     at_hand = best.is_clear()
     if not best.clear:
         whole = best.eliminate(at_hand, to_the_end=False)
+        if not whole:
+            budget.most = budget.all
         drifted = Hypothesis(fit, errors, budget, drift=True)
         if not best.fits() and budget.allows(drifted.answer.columns):
             drifted.eliminate(to_the_end=True)
@@ -629,7 +646,7 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
                 whole = best.eliminate(to_the_end=True)
             if not whole or drifted.evidence < best.evidence:
                 best = drifted
-    budget.most = min(budget.most or SPLIT_COLUMNS, SPLIT_COLUMNS)
+    budget.most = min(budget.all or SPLIT_COLUMNS, SPLIT_COLUMNS)
     while best.take_split():
         pass
     count = len(best.answer.discs)

@@ -17,6 +17,7 @@ from eitskin_reference.constants_table import (
     SPLIT_CROWD,
     SPLIT_DIRECTIONS,
     SPLIT_DISTANCE,
+    SPLIT_FALL,
     SPLIT_FIRST,
     SPLIT_FIRST_OF_CROWD,
     SPLIT_GAIN,
@@ -108,13 +109,13 @@ def _try_part(fit: Fit, k: int) -> bool:
         return False
     fit.discs[k] = best[1]
     fit.discs.append(best[2])
-    for _ in range(SPLIT_SWEEPS):
-        fit.settle([k], 1)
-        fit.settle([last], 1)
-    fit.move_all(1)
+    hopeful = _settle_two(fit, k, last, SPLIT_FALL * left)
+    if hopeful:
+        fit.move_all(1)
     now = fit.left()
     gained = (
-        now <= SPLIT_GAIN * left
+        hopeful
+        and now <= SPLIT_GAIN * left
         and left - now >= SPLIT_TOTAL * fit.whole + DIRECTIONS_OF_NOISE * fit.noise
     )
     if gained and edge_distance(fit.discs[k], fit.discs[last]) > SPLIT_DISTANCE:
@@ -122,6 +123,20 @@ def _try_part(fit: Fit, k: int) -> bool:
     fit.discs = before
     fit.discs[k] = replace(before[k], whole=True)
     return False
+
+
+def _settle_two(fit: Fit, k: int, last: int, limit: float) -> bool:
+    """The sweeps of two discs; false where they are given up: were each sweep that is left to gain
+    as much as this one, they would still leave more than ``limit``."""
+    before = 0.0
+    for sweep in range(SPLIT_SWEEPS):
+        fit.settle([k], 1)
+        fit.settle([last], 1)
+        left = fit.left()
+        if sweep > 0 and left - (SPLIT_SWEEPS - sweep) * (before - left) > limit:
+            return False
+        before = left
+    return True
 
 
 def _pairs_for(fit: Fit, k: int) -> list[tuple[float, Disc, Disc]]:

@@ -273,6 +273,59 @@ TEST(what_model_errors_could_have_made_goes)
     }
 }
 
+/* With the columns of discs at hand those of their shapes alone are made, to the same bits. */
+TEST(columns_of_discs_serve_for_their_shapes)
+{
+    static const eits_disc discs[] = {ONE, OTHER};
+    eits_real column[2 * EITS_SHAPE_PARAMETERS * STRIDE], left[STRIDE];
+    eits_likelihood now[2];
+    uint64_t cost[2];
+    for (uint32_t known = 0; known < 2; ++known) {
+        eits_context *ctx = set_up(&b, 1);
+        eits_real log_determinant;
+        uint64_t macs = 0;
+        eits_likelihood as_discs;
+        stage_discs(&b, discs, 2);
+        CHECK(eits_factor_covariance(ctx, &ctx->scratch, 0, &log_determinant, &macs));
+        eits_copy(ctx->evidence.data, ctx->frame.y, STRIDE);
+        eits_answer answer = answer_of(discs, 2, EITS_PLACE_PARAMETERS);
+        (void)eits_linearise(ctx, &ctx->scratch, &answer, &as_discs);
+        answer.parameters = EITS_SHAPE_PARAMETERS;
+        ctx->evidence.columns_made = 0;
+        ctx->evidence.places_made = known;
+        cost[known] = eits_linearise(ctx, &ctx->scratch, &answer, &now[known]);
+        CHECK_EQUAL(ctx->evidence.columns_made, known ? 8 : 16);
+        CHECK_EQUAL(ctx->evidence.places_made, 0);
+        if (known) {
+            CHECK(memcmp(column, ctx->evidence.column, sizeof column) == 0);
+            CHECK(memcmp(left, ctx->evidence.left, sizeof left) == 0);
+        }
+        memcpy(column, ctx->evidence.column, sizeof column);
+        memcpy(left, ctx->evidence.left, sizeof left);
+    }
+    CHECK(cost[1] < cost[0]);
+    CHECK(now[0].here == now[1].here && now[0].least == now[1].least);
+    CHECK(memcmp(now[0].step, now[1].step, 16 * sizeof now[0].step[0]) == 0);
+}
+
+/* What the fit has taken is taken from the test; some is left to it. */
+TEST(fit_and_test_share_what_may_be_made)
+{
+    static const uint32_t moves[] = {0, 10, EITS_STILL_COLUMNS - EITS_STILL_MIN, 1000, UINT32_MAX},
+                          left[] = {EITS_STILL_COLUMNS, EITS_STILL_COLUMNS - 10, EITS_STILL_MIN,
+                                    EITS_STILL_MIN, EITS_STILL_MIN};
+    for (uint32_t i = 0; i < sizeof moves / sizeof moves[0]; ++i) {
+        for (uint32_t most = 0; most < 300; most += 50) {
+            eits_context *ctx = set_up(&b, 1);
+            CHANGE_OPTIONS(ctx, o.test_columns = most);
+            eits_fit f = fit_of(ctx, NULL, 0);
+            f.moves = moves[i];
+            eits_test_touches(ctx, &ctx->scratch, &f);
+            CHECK_EQUAL(ctx->evidence.columns_most, most < left[i] ? most : left[i]);
+        }
+    }
+}
+
 TEST(halves_of_a_touch_become_one)
 {
     eits_context *ctx = set_up(&b, 1);

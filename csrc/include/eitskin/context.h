@@ -86,7 +86,7 @@ typedef struct eits_context eits_context;
 
 /* Bytes of the context itself, at the workspace's start; what is not arrays. Pointers and numbers
  * of whatever width; a little is left over. */
-#define EITS_CONTEXT_SIZE EITS_ALIGN16(712u + 63u * sizeof(void *) + 384u * sizeof(eits_real))
+#define EITS_CONTEXT_SIZE EITS_ALIGN16(732u + 63u * sizeof(void *) + 384u * sizeof(eits_real))
 
 /* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise
  * copies of S and of the working set (hosts), else 0. */

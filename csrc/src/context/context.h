@@ -186,6 +186,7 @@ typedef struct eits_evidence {
     uint32_t columns_made; /* since the test of this frame began */
     uint32_t columns_most; /* in what is being tried; 0: any number */
     uint32_t spent;        /* 1: more were wanted than options.test_columns allows */
+    uint32_t places_made;  /* 1: column has those of the next answer's discs without their shapes */
 } eits_evidence;
 
 /* A touch that is followed (touch/disc.h). */

@@ -49,10 +49,11 @@ uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count);
 /* How much of a parameter's column disc k has. */
 eits_real eits_shape_part(const eits_answer *answer, uint32_t k, uint32_t parameter);
 
-/* evidence.column of disc k of the answer, R'^-1 applied, each times the disc's change; and
- * evidence.left less what the disc answers. */
+/* evidence.column of disc k of the answer, R'^-1 applied, each times the disc's change, but for the
+ * first `known`, which are there: none, or EITS_PLACE_PARAMETERS of them; and evidence.left less
+ * what the disc answers. */
 uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
-                            const eits_answer *answer, uint32_t k);
+                            const eits_answer *answer, uint32_t k, uint32_t known);
 
 /* left (stride numbers) = what the answer's discs, with their shapes, leave of the data. Uses
  * scratch->row[2] and [3]; what a linearisation made stays. */
@@ -79,7 +80,11 @@ typedef struct eits_likelihood {
  * linearises asks before, and leaves enough to linearise what is taken at last. */
 int eits_may_make(eits_context *ctx, uint32_t columns);
 
-/* Linearise F about the answer: evidence.column, evidence.left and scratch->square. */
+/* The same of what is tried at last: within all that options.test_columns allows. */
+int eits_may_make_later(eits_context *ctx, uint32_t columns);
+
+/* Linearise F about the answer: evidence.column, evidence.left and scratch->square. Where
+ * evidence.places_made, the columns of its shapes alone are made. */
 uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
                         eits_likelihood *out);
 

@@ -7,7 +7,10 @@
  * leaves it a chance. At last what its shape says to be two rather than one is tried as two.
  *
  * A frame costs no more than options.test_columns allows: each step asks before (eits_may_make),
- * and where it may not, what stands is reported, and the count said to be uncertain. */
+ * and where it may not, what stands is reported, and the count said to be uncertain. A sheet that
+ * has drifted shows at the first look, and it takes all those columns to tell its touches from what
+ * the drift has made. Elsewhere more of them are mostly in vain: fit and test together then have
+ * EITS_STILL_COLUMNS, a move of a disc costing about what a column does. */
 #include "evidence/verdict.h"
 
 #include "base/vec.h"
@@ -34,6 +37,7 @@ static int is_clear(eits_context *ctx, const eits_scratch *scratch, eits_verdict
                       eits_excess(ctx, v->answer.misfit, v->answer.count) < EITS_FITS_AS_DISCS;
     v->answer.parameters = all;
     look->at_hand = all == EITS_PLACE_PARAMETERS;
+    ctx->evidence.places_made = !look->at_hand;
     if (clear && all > EITS_PLACE_PARAMETERS &&
         v->answer.misfit > EITS_PAIR_MISFIT * (eits_real)ctx->model->rank &&
         eits_may_make(ctx, eits_columns_of(&v->answer))) {
@@ -48,6 +52,7 @@ static int take_errors(eits_context *ctx, const eits_scratch *scratch, const eit
                        eits_verdict *v, int drift, uint64_t *macs)
 {
     v->drift = drift;
+    ctx->evidence.places_made = 0;
     if (!eits_factor_covariance(ctx, scratch, drift, &v->log_determinant, macs))
         return 0;
     eits_copy(ctx->evidence.data, f->data, EITS_STRIDE(ctx->model->rank));
@@ -132,6 +137,16 @@ static void split(eits_context *ctx, const eits_scratch *scratch, const eits_fit
         k = likeliest_pair(ctx, v);
 }
 
+/* What may be made for a sheet that has not drifted; 0: any number. */
+static uint32_t columns_without_drift(const eits_context *ctx, const eits_fit *f)
+{
+    const uint32_t all = ctx->options.test_columns,
+                   left = f->moves < EITS_STILL_COLUMNS - EITS_STILL_MIN
+                              ? EITS_STILL_COLUMNS - f->moves
+                              : EITS_STILL_MIN;
+    return all < left ? all : left;
+}
+
 /* Which discs stay, in v, which has them all; 0 where they cannot be tested. */
 static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_verdict *v)
 {
@@ -143,6 +158,8 @@ static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, ei
     if (is_clear(ctx, scratch, v, &now, macs))
         return 1;
     int whole = eits_eliminate(ctx, scratch, v, &now, 0, macs);
+    if (!whole)
+        ctx->evidence.columns_most = ctx->options.test_columns;
     if (eits_fits(ctx, v) || !eits_may_make(ctx, eits_columns_of(&drifted.answer)))
         return 1;
     const int drifts = take_errors(ctx, scratch, f, &drifted, 1, macs);
@@ -159,7 +176,7 @@ static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, ei
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     ctx->evidence.columns_made = ctx->evidence.spent = 0;
-    ctx->evidence.columns_most = ctx->options.test_columns;
+    ctx->evidence.columns_most = columns_without_drift(ctx, f);
     if (f->count == 0)
         return;
     eits_verdict v = {.changed = 0};

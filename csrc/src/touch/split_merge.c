@@ -209,6 +209,26 @@ static two best_two(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
     return best;
 }
 
+/* The two discs' own sweeps, the others being where they belong; 0 where they are given up.
+ *
+ * Sweeps gain less and less: where this one's gain in each that is left, and in the last over all,
+ * would still not do, two are hopeless. */
+static int settle_two(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k,
+                      uint32_t last, eits_real limit)
+{
+    eits_real before = 0;
+    for (int sweep = 0; sweep < EITS_SPLIT_SWEEPS; ++sweep) {
+        eits_fit_move(ctx, scratch, f, k, k, 1);
+        eits_fit_move(ctx, scratch, f, last, last, 1);
+        const eits_real left = eits_fit_left(ctx, f);
+        f->macs += ctx->model->rank;
+        if (sweep > 0 && left - (eits_real)(EITS_SPLIT_SWEEPS - sweep) * (before - left) > limit)
+            return 0;
+        before = left;
+    }
+    return 1;
+}
+
 /* Make disc k two; 1 if that is kept.
  *
  * A start that leaves far more than the one disc did is not worth fitting, among many discs less
@@ -228,17 +248,14 @@ static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
     f->disc[last] = begin.disc[1];
     ++f->count;
     eits_fit_restart(ctx, scratch, f);
-    /* These two first, since the others are where they belong; then all, once. */
-    for (int sweep = 0; sweep < EITS_SPLIT_SWEEPS; ++sweep) {
-        eits_fit_move(ctx, scratch, f, k, k, 1);
-        eits_fit_move(ctx, scratch, f, last, last, 1);
-    }
-    eits_fit_move_all(ctx, scratch, f, 1);
+    const int hopeful = settle_two(ctx, scratch, f, k, last, EITS_SPLIT_FALL * before.left);
+    if (hopeful)
+        eits_fit_move_all(ctx, scratch, f, 1);
     const eits_real left = eits_fit_left(ctx, f),
                     min =
                         eits_fma(EITS_SPLIT_TOTAL, f->total,
                                  EITS_DIRECTIONS_OF_NOISE * f->noise / (eits_real)ctx->model->rank);
-    if (left <= EITS_SPLIT_GAIN * before.left && before.left - left >= min &&
+    if (hopeful && left <= EITS_SPLIT_GAIN * before.left && before.left - left >= min &&
         edge_distance(&f->disc[k], &f->disc[last]) > EITS_SPLIT_DISTANCE)
         return 1;
     eits_fit_undo(ctx, scratch, f, &before);
