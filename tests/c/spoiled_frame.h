@@ -2,15 +2,9 @@
  * a frame. */
 #ifndef EITSKIN_TEST_SPOILED_FRAME_H
 #define EITSKIN_TEST_SPOILED_FRAME_H
+#include "steps.h"
 
-#include "check.h"
-#include "small_model.h"
-
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
-
-#include <math.h>
-#include <string.h>
 
 enum { UNTOUCHED = 16 };
 
@@ -52,12 +46,9 @@ static inline eits_context *set_up(bench *b, int noise_known)
         add_noise(b, b->untouched[k]);
     }
     if (noise_known) {
-        CHECK_EQUAL(eits_reference_begin(b->c.ctx, UNTOUCHED), EITS_OK);
-        for (int k = 0; k < UNTOUCHED; ++k)
-            CHECK_EQUAL(eits_reference_add(b->c.ctx, b->untouched[k], SMALL_ROWS), EITS_OK);
-        CHECK_EQUAL(eits_reference_finish(b->c.ctx), EITS_OK);
+        LEARN(b->c.ctx, UNTOUCHED, b->untouched);
     } else {
-        CHECK_EQUAL(eits_reference_set(b->c.ctx, b->frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_set(b->c.ctx, b->frame, SMALL_ROWS));
     }
     add_noise(b, b->frame);
     return b->c.ctx;
@@ -89,7 +80,7 @@ static inline void look_for(eits_context *ctx, uint32_t diagnostics)
 
 static inline void reconstruct(bench *b)
 {
-    CHECK_EQUAL(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
 }
 
 #endif

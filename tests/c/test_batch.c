@@ -1,16 +1,7 @@
 /* Many frames in one call: each as if it were alone, refused ones among them. */
-#include "check.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "eitskin/batch.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { SIDE = 8, N = SIDE * SIDE, FRAMES = 5, SHORT = 1, REFUSED = 3 };
 
@@ -37,7 +28,7 @@ static eits_context *set_up(bench *b)
     uint64_t state = 12;
     eits_real reference[SMALL_ROWS];
     small_reference(&b->c.model, 1, reference);
-    CHECK_EQUAL(eits_reference_set(b->c.ctx, reference, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(b->c.ctx, reference, SMALL_ROWS));
     for (int k = 0; k < FRAMES; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
             b->frames[k][i] =
@@ -54,9 +45,8 @@ static void each_as_if_alone(void)
     eits_touch touches[FRAMES][EITS_MAX_TOUCHES], found[EITS_MAX_TOUCHES];
     eits_result results[FRAMES];
     uint32_t touches_seen = 0;
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, FRAMES, images[0],
-                                       coefficients[0], touches[0], results),
-                EITS_OK);
+    CHECK_OK(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, FRAMES, images[0],
+                                    coefficients[0], touches[0], results));
     for (int k = 0; k < FRAMES; ++k) {
         eits_forget(other);
         const eits_status status =
@@ -65,7 +55,7 @@ static void each_as_if_alone(void)
         CHECK_EQUAL(status, k == REFUSED ? EITS_E_FRAME_CHANNELS : EITS_OK);
         uint32_t count = 0;
         if (status == EITS_OK)
-            CHECK_EQUAL(eits_find_touches(other, found, EITS_MAX_TOUCHES, &count), EITS_OK);
+            CHECK_OK(eits_find_touches(other, found, EITS_MAX_TOUCHES, &count));
         CHECK_EQUAL(results[k].count, count);
         for (uint32_t t = 0; t < count; ++t)
             CHECK(small_same_touch(&touches[k][t], &found[t]));
@@ -86,23 +76,18 @@ static void without_outputs(void)
 {
     eits_context *ctx = set_up(&b);
     eits_result results[FRAMES];
-    CHECK_EQUAL(
-        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, SHORT, NULL, NULL, NULL, results),
-        EITS_OK);
+    CHECK_OK(
+        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, SHORT, NULL, NULL, NULL, results));
     CHECK(results[0].status == EITS_OK && results[0].count == 0 &&
           results[0].info.touch_macs == 0 && results[0].info.macs > 0);
-    CHECK_EQUAL(
-        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS - 1, SHORT, NULL, NULL, NULL, results),
-        EITS_OK);
+    CHECK_OK(
+        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS - 1, SHORT, NULL, NULL, NULL, results));
     CHECK_EQUAL(results[0].status, EITS_E_FRAME_LENGTH);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 0, NULL, NULL, NULL, results),
-                EITS_OK);
-    CHECK_EQUAL(eits_reconstruct_batch(NULL, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, results),
-                EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, NULL, SMALL_ROWS, 1, NULL, NULL, NULL, results),
-                EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, NULL),
-                EITS_E_ARGUMENT);
+    CHECK_OK(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 0, NULL, NULL, NULL, results));
+    CHECK_REFUSED(
+        eits_reconstruct_batch(NULL, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, results));
+    CHECK_REFUSED(eits_reconstruct_batch(ctx, NULL, SMALL_ROWS, 1, NULL, NULL, NULL, results));
+    CHECK_REFUSED(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, NULL));
 }
 
 int main(void)

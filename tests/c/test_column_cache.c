@@ -1,15 +1,11 @@
 /* Columns held in the workspace: the right numbers wherever they stand, each unpacked once while it
  * is cached, products with the same bits as from S itself. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
 #include "context/column_cache.h"
 #include "context/products.h"
 #include "kernels/kernels.h"
 #include "solve/solve.h"
-
-#include <string.h>
 
 enum { SIDE = 20, N = SIDE * SIDE, RANK = 13, ROOM = 256 };
 

@@ -1,15 +1,6 @@
 /* The exact solvers where columns depend on each other and MACs run out, at whatever place: the
  * image is finite, and never worse than zero. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 static dense_bench b;
 
@@ -68,16 +59,16 @@ TEST(every_limit_beside_columns_that_depend)
             o.mac_limit = 0;
             o.solver = EITS_SOLVER_FISTA;
             o.warm_start = way >= 8;
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            CHECK_OK(eits_set_options(ctx, &o));
+            CHECK_OK(eits_solve(ctx, NULL));
             ctx->frame.y[limit % RANK] += R(0.4);
             double *y = dense_copy(ctx->frame.y, RANK);
             const double at_zero = 0.5 * dense_dot(y, y, RANK);
             free(y);
             o.mac_limit = limit;
             o.solver = EITS_SOLVER_ACTIVE_SET;
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            CHECK_OK(eits_set_options(ctx, &o));
+            CHECK_OK(eits_solve(ctx, NULL));
             CHECK(eits_get_info(ctx)->macs <= limit);
             CHECK(eits_get_info(ctx)->stop == EITS_STOP_MACS ||
                   eits_get_info(ctx)->stop == EITS_STOP_OPTIMUM ||
@@ -109,7 +100,7 @@ TEST(starts_that_cancel)
     }
     ctx->solver.warm = 1;
     double *y = dense_copy(ctx->frame.y, RANK);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
     check_result(&b, 0.5 * dense_dot(y, y, RANK));
     CHECK(eits_get_info(ctx)->gap_rel < R(1e-3));
@@ -182,7 +173,7 @@ TEST(sweeps_as_written_apart)
             }
             CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_COORDINATE, o.sign = EITS_SIGN_BOTH,
                            o.iterations = SWEEPS, o.lambda_rel = R(0.02));
-            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            CHECK_OK(eits_solve(ctx, NULL));
             CHECK_EQUAL(eits_get_info(ctx)->iterations, SWEEPS);
             dense_sweeps(&b.d, square, r, (double)eits_get_info(ctx)->lambda, SWEEPS, x);
             CHECK(dense_greatest_difference(x, eits_get_coefficients(ctx), N) < 3000 * EPS);
@@ -206,8 +197,8 @@ TEST(the_active_set_ends_soon)
         o.sign = (eits_sign)(way / 3 % 3);
         o.iterations = ROUNDS;
         o.lambda_rel = (eits_real)lambdas[way % 3];
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+        CHECK_OK(eits_set_options(ctx, &o));
+        CHECK_OK(eits_solve(ctx, NULL));
         CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
         CHECK(eits_get_info(ctx)->iterations < ROUNDS && eits_get_info(ctx)->nonzeros <= RANK_HERE);
         double *x = dense_copy(eits_get_coefficients(ctx), 81),
@@ -242,12 +233,11 @@ TEST(hidden_columns)
                    o.max_masked = SMALL_ROWS, o.detection_factor = o.gap_rel = 0);
     eits_real frame[SMALL_ROWS];
     small_reference(ctx->model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] *= (eits_real)(1 + 0.2 * small_random(&state));
-    CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].first, 1), EITS_OK);
-    CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].second, 1), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
+    vary(frame, frame, 0.2, &state);
+    CHECK_OK(eits_mask_row(ctx, ctx->model->fold[k].first, 1));
+    CHECK_OK(eits_mask_row(ctx, ctx->model->fold[k].second, 1));
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     CHECK(ctx->projection.count == 1 && eits_get_info(ctx)->lambda > 0);
     CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 0);
     CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);

@@ -1,17 +1,10 @@
 /* What is said of a frame that is imaged as it is - mismatch, a stale reference, crowds - and which
  * readings of reference frames are odd: from numbers set by hand, on both sides of each limit. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
-#include "eitskin/solve.h"
 #include "kernels/kernels.h"
 #include "touch/disc_fit.h"
-
-#include <math.h>
-#include <string.h>
 
 static dense_bench b;
 
@@ -23,7 +16,7 @@ static eits_context *set_up(dense_bench *b, eits_data_kind kind)
         b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind}, 0);
     eits_real reference[SMALL_ROWS];
     small_reference(ctx->model, 1, reference);
-    CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
     ctx->info.diagnostics = 0;
     return ctx;
 }
@@ -138,10 +131,10 @@ TEST(stale_references_on_both_sides_of_the_limit)
         {EITS_SIGN_INCREASE, 1, 9, 0, 0},     {EITS_SIGN_BOTH, 1, 9, 0.1, 0},
     };
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
-    for (size_t k = 0; k < sizeof CASES / sizeof *CASES; ++k) {
+    for (size_t k = 0; IN_TABLE(k, CASES); ++k) {
         eits_options o = *eits_get_options(ctx);
         o.sign = CASES[k].sign;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_OK(eits_set_options(ctx, &o));
         eits_zero(ctx->solver.gradient, N);
         ctx->solver.gradient[5] = (eits_real)CASES[k].up;
         ctx->solver.gradient[N - 1] = (eits_real)-CASES[k].down;
@@ -277,7 +270,7 @@ TEST(odd_readings_on_both_sides_of_the_limit)
         int odd;
     } CASES[] = {{4, 0.022, 1}, {4, 0.015, 0}, {5, 0.03, 1},
                  {5, 0.022, 0}, {6, 0.06, 1},  {6, 0.045, 0}};
-    for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
+    for (size_t n = 0; IN_TABLE(n, CASES); ++n) {
         memcpy(spoilt, newer, sizeof spoilt);
         spoilt[ctx->model->fold[CASES[n].fold].first] += (eits_real)CASES[n].off;
         CHECK_EQUAL(odd_folds(ctx, spoilt, older, marked), CASES[n].odd);
@@ -324,7 +317,7 @@ TEST(noise_of_any_size)
         eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
         double mean[SMALL_ROWS] = {0}, squares[SMALL_ROWS] = {0}, sum = 0;
         small_reference(ctx->model, 1, reference);
-        CHECK_EQUAL(eits_reference_begin(ctx, FRAMES), EITS_OK);
+        CHECK_OK(eits_reference_begin(ctx, FRAMES));
         for (int k = 0; k < FRAMES; ++k) {
             for (int i = 0; i < SMALL_ROWS; ++i) {
                 const double off = 0.01 * small_random(&state);
@@ -332,15 +325,15 @@ TEST(noise_of_any_size)
                 mean[i] += off / FRAMES;
                 squares[i] += off * off;
             }
-            CHECK_EQUAL(eits_reference_add(ctx, frame, SMALL_ROWS), EITS_OK);
+            CHECK_OK(eits_reference_add(ctx, frame, SMALL_ROWS));
         }
-        CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+        CHECK_OK(eits_reference_finish(ctx));
         for (int i = 0; i < SMALL_ROWS; ++i)
             sum += (squares[i] - FRAMES * mean[i] * mean[i]) / (FRAMES - 1) / SMALL_ROWS;
         CHECK_NEAR((double)ctx->reference.noise_v / sizes[n], sqrt(sum), 1e-4);
         CHECK_EQUAL(ctx->reference.outliers, 0);
         memset(frame, 0, sizeof frame); /* a dead front end is no reference frame */
-        CHECK_EQUAL(eits_reference_begin(ctx, FRAMES), EITS_OK);
+        CHECK_OK(eits_reference_begin(ctx, FRAMES));
         for (int k = 0; k < FRAMES; ++k) {
             for (int i = 0; i < SMALL_ROWS; ++i)
                 frame[i] = k < FRAMES / 2 ? reference[i] : 0;
@@ -353,7 +346,7 @@ TEST(noise_of_any_size)
     ctx->reference.lambda_noise = R(0.25);
     CHANGE_OPTIONS(ctx, o.lambda_rel = R(1e-3), o.lambda_noise_factor = R(0.5),
                    o.detection_factor = 0);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     CHECK(eits_get_info(ctx)->lambda == R(0.125) && eits_get_info(ctx)->lambda_noise == R(0.25));
 }
 

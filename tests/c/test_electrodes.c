@@ -88,7 +88,7 @@ TEST(noise_alone)
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
         CHECK(eits_get_info(ctx)->diagnostics == 0 && eits_get_info(ctx)->open_electrodes == 0);
         b.frame[7] = ctx->reference.v0[7]; /* one row that lives, and it is not the front end */
-        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
         CHECK_EQUAL(eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN,
                     open ? EITS_DIAGNOSTIC_ELECTRODE_OPEN : 0);
     }
@@ -105,7 +105,7 @@ TEST(what_a_dead_row_is)
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) *
                          (b.frame[i] < 0 ? R(-1) : R(1));
-        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_set(ctx, b.frame, SMALL_ROWS));
         look_for(ctx, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
         /* as though it had been learned */
         ctx->reference.noise_v = way == 2 || way == 3 ? R(0.006) : 0;
@@ -176,7 +176,7 @@ TEST(living_pairs_are_not_bridged)
         memcpy(b.frame, b.untouched[0], sizeof b.frame);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] *= row_crosses(ctx, i, e, f) && ++telling > 2 ? R(0.1) : R(1);
-        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_set(ctx, b.frame, SMALL_ROWS));
         for (uint32_t i = 0, more = 0; i < SMALL_ROWS; ++i) {
             const int another = !row_crosses(ctx, i, e, f) && more++ == 0;
             b.frame[i] *= row_crosses(ctx, i, e, f) || another ? 0 : R(1);
@@ -205,14 +205,14 @@ TEST(masked_and_forgotten)
         uint32_t masked;
         uint64_t macs;
         b.frame[9] = turned ? -good : good;
-        CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+        CHECK_OK(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &macs));
         CHECK_EQUAL(eits_get_info(ctx)->diagnostics, turned ? EITS_DIAGNOSTIC_OUTLIER : 0);
         CHECK_EQUAL(eits_get_info(ctx)->outliers, turned);
     }
     for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
         if (!row_uses(ctx, i, 3))
             continue;
-        CHECK_EQUAL(eits_mask_row(ctx, i, 1), EITS_OK);
+        CHECK_OK(eits_mask_row(ctx, i, 1));
         b.frame[i] = i % 2 ? 3 : 0;
     }
     reconstruct(&b);
@@ -227,7 +227,7 @@ TEST(small_rows)
     eits_context *ctx = set_up(&b, 0);
     const eits_fold fold = b.c.model.fold[4];
     b.frame[fold.first] = R(0.01), b.frame[fold.second] = (eits_real)fold.sign * R(0.01);
-    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, b.frame, SMALL_ROWS));
     for (int grown = 0; grown < 2; ++grown) {
         b.frame[fold.first] = grown ? R(0.42) : R(0.36),
         b.frame[fold.second] = (eits_real)fold.sign * b.frame[fold.first];

@@ -1,16 +1,6 @@
 /* Coordinate descent and active set: the optimum as a duality gap written apart from the core sees
  * it, whatever the columns are like; the same bits in every layout; whatever they start from. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 enum { SIDE = 9, N = SIDE * SIDE, RANK = 12, MANY = 200000 };
 
@@ -33,7 +23,7 @@ static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iteration
     CHANGE_OPTIONS(ctx, o.solver = solver, o.iterations = iterations, o.sign = sign,
                    o.lambda_abs = 0, o.lambda_rel = (eits_real)lambda, o.lambda_noise_factor = 0,
                    o.gap_rel = (eits_real)gap);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     return *eits_get_info(ctx);
 }
 
@@ -170,7 +160,7 @@ TEST(same_bits_in_every_layout)
                     &b[way],
                     (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
                     way % 2);
-                CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
+                CHECK_OK(eits_use_portable_kernels(ctx, way / 2));
                 (void)solve(ctx, SOLVERS[s], 30, EITS_SIGN_BOTH, 0.005, 0);
                 CHECK(memcmp(eits_get_coefficients(ctx), eits_get_coefficients(b[0].c.ctx),
                              N * sizeof(eits_real)) == 0);
@@ -263,18 +253,17 @@ TEST(beside_a_basis)
             eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
             uint64_t state = 63;
             small_reference(&b.c.model, 1, reference);
-            for (int i = 0; i < SMALL_ROWS; ++i)
-                frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
+            vary(frame, reference, 0.3, &state);
             for (int i = 0; i < lost[k]; ++i)
                 frame[b.c.model.fold[i].first] =
                     frame[b.c.model.fold[i].second > SMALL_ROWS ? b.c.model.fold[i].first
                                                                 : b.c.model.fold[i].second] =
                         R(NAN);
-            CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
+            CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
             CHANGE_OPTIONS(ctx, o.solver = SOLVERS[s], o.iterations = MANY,
                            o.max_masked = SMALL_ROWS, o.sign = EITS_SIGN_BOTH,
                            o.lambda_rel = R(0.01));
-            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
             CHECK_EQUAL(ctx->projection.count, lost[k] + 1);
             CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
             CHECK(eits_get_info(ctx)->nonzeros >= 1 &&
@@ -289,7 +278,7 @@ TEST(numbers_that_cannot_be)
     static const double wild[] = {NAN, INFINITY, BOTH_WIDTHS(1e25, 1e200),
                                   BOTH_WIDTHS(1e-25, 1e-200), 0};
     for (int s = 0; s < 2; ++s) {
-        for (size_t k = 0; k < sizeof wild / sizeof wild[0]; ++k) {
+        for (size_t k = 0; IN_TABLE(k, wild); ++k) {
             for (int whole = 0; whole < 2; ++whole) {
                 eits_context *ctx = set_up(&b, RANDOM, 0);
                 for (uint32_t i = 0; i < (whole ? RANK : 1u); ++i)

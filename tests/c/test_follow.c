@@ -1,19 +1,10 @@
 /* A reference that follows the untouched skin: when it moves and how far, what it never follows,
  * and what is known of a gain that could not be followed. */
-#include "check.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
 #include "eitskin/batch.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
 #include "frame/reference.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { RANK = 4, FRAMES = 32, APART = 2, PACKED = SMALL_FOLDED * (SMALL_FOLDED + 1) / 2 };
 
@@ -36,10 +27,10 @@ static eits_context *set_up_as(bench *b, uint32_t reference_frames, small_spec s
     o.project_reference = 0;
     o.reference_frames = reference_frames;
     o.diagnostics = EITS_DIAGNOSTIC_STALE_REFERENCE;
-    CHECK_EQUAL(eits_set_options(b->c.ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(b->c.ctx, &o));
     small_reference(&b->c.model, 1, b->quiet);
     eits_copy(b->frame, b->quiet, SMALL_ROWS);
-    CHECK_EQUAL(eits_reference_set(b->c.ctx, b->quiet, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(b->c.ctx, b->quiet, SMALL_ROWS));
     return b->c.ctx;
 }
 
@@ -79,7 +70,7 @@ static int pass(bench *b, int count, int untouched)
     uint64_t macs = 0;
     int moved = 0;
     for (int k = 0; k < count; ++k) {
-        CHECK_EQUAL(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_OK(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
         moved += eits_follow_end(b->c.ctx, &b->c.ctx->scratch, &touch, touches, touches, &macs);
     }
     CHECK((macs > 0 || moved == 0) && macs < 10000);
@@ -106,7 +97,7 @@ TEST(it_goes_a_part_of_the_way_after_as_large_a_part_of_its_time)
                  {FRAMES, APART - 1, 0, 0},
                  {FRAMES, APART, 1, 0.0625},
                  {FRAMES, 5, 2, 0.12109375}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         bench b;
         eits_context *ctx = set_up(&b, cases[k].frames);
         const eits_real gain = ctx->reference.gain;
@@ -134,7 +125,7 @@ TEST(a_touch_lets_go_what_came_before_and_as_much_behind_it)
     CHECK_EQUAL(pass(&b, 2 * APART - 1, 1), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     /* nobody looked for touches in one of them, or one was of no use */
-    CHECK_EQUAL(eits_reconstruct(b.c.ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(b.c.ctx, b.frame, SMALL_ROWS, NULL, NULL));
     CHECK_EQUAL(pass(&b, 2 * APART - 1, 1), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
@@ -213,7 +204,7 @@ TEST(under_a_touch_only_its_size_follows)
         double beside; /* and of pixel 1's, which no touch gives */
         double goes;   /* so far goes the reference, relative */
     } cases[] = {{0.01, 0, 0.01}, {0, 0.03, 0.01}, {-0.01, 0, -0.01}, {0.03, 0, 0}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         bench b;
         eits_context *ctx = set_up(&b, FRAMES);
         change_fold(&b, 0, 0.2);
@@ -255,7 +246,7 @@ TEST(where_touches_may_give_all_it_stays)
         for (int frame = 0; frame < 3; ++frame) {
             uint64_t macs = 0;
             change_all(&b, 0.001 * frame);
-            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
             CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, touches, 2 * RANK, 2 * RANK, &macs),
                         k == 1 && frame > 0);
         }
@@ -279,7 +270,7 @@ TEST(on_the_edge_of_pixels_rounding_decides_nothing)
         for (int frame = 0; frame < 2; ++frame) {
             uint64_t macs = 0;
             change_fold(&b, 0, 0.01 * frame);
-            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
             CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, &touch, 1, 1, &macs), frame);
         }
         goes[side] = (double)(ctx->reference.v0[9] / b.quiet[9]) - 1;
@@ -296,7 +287,7 @@ TEST(the_size_of_differences_follows_on_any_outline)
         small_spec spec;
         int moves;
     } cases[] = {{{.round = 1}, 1}, {{.kind = EITS_DATA_LOG_RATIO}, 0}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         bench b;
         (void)set_up_as(&b, 2, cases[k].spec);
         CHECK_EQUAL(pass(&b, 1, 0), 0);
@@ -314,15 +305,13 @@ TEST(the_size_follows_under_the_same_touches_alone)
         eits_context *ctx = set_up(&b, 2);
         eits_touch touches[EITS_MAX_TOUCHES];
         uint32_t count = 0, ids = 0;
-        eits_options o = *eits_get_options(ctx);
-        o.follow_mm = b.c.model.pixel_mm;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.follow_mm = b.c.model.pixel_mm);
         for (uint32_t k = 0; k < 8; ++k) {
             const uint32_t pixel = k % 2 * apart;
             change_all(&b, 0.001 * k);
             change_fold(&b, pixel, b.c.model.v_ref[pixel] < 0 ? -0.5 : 0.5);
-            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-            CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
+            CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
             CHECK_EQUAL(count, 1);
             ids = touches[0].id > ids ? touches[0].id : ids;
         }
@@ -338,7 +327,7 @@ TEST(a_frame_of_no_use_is_not_followed)
     eits_context *ctx = set_up(&b, 1);
     uint64_t macs = 0;
     change_all(&b, 0.01);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
     CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, NULL, 0, EITS_FOLLOW_UNKNOWN, &macs), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     tear_down(&b);
@@ -382,7 +371,7 @@ TEST(touches_that_explain_little_are_drift)
                                    : taught()};
         small_context_open(&b.c, &b.made, 0);
         eits_context *ctx = b.c.ctx;
-        for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+        for (size_t k = 0; IN_TABLE(k, cases); ++k) {
             ctx->options.reference_frames = cases[k].frames;
             ctx->options.diagnostics = cases[k].diagnostics;
             ctx->options.detection_factor = 1;
@@ -412,30 +401,29 @@ TEST(as_a_caller_sees_it)
     const size_t size = eits_saved_size(&b.c.model);
     void *saved = small_aligned(&memory, size);
     change_all(&b, -0.01); /* less data than nothing: no touch by its sign */
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
+    CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     CHECK_EQUAL(count, 0);
     CHECK_NEAR(gone(&b, 5), 1, 3e4 * EPS);
-    CHECK_EQUAL(eits_save(ctx, saved, size), EITS_OK);
+    CHECK_OK(eits_save(ctx, saved, size));
     eits_real kept[SMALL_ROWS];
     eits_copy(kept, ctx->reference.v0, SMALL_ROWS);
     eits_copy(b.quiet, kept, SMALL_ROWS);
     change_all(&b, 0);
     change_fold(&b, 1, b.c.model.v_ref[1] < 0 ? -0.5 : 0.5);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
+    CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     CHECK_EQUAL(count, 1);
     CHECK(memcmp(kept, ctx->reference.v0, sizeof kept) == 0);
     change_all(&b, -0.01);
     const eits_real *frames = b.frame;
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, frames, SMALL_ROWS, 1, NULL, NULL, touches, results),
-                EITS_OK);
+    CHECK_OK(eits_reconstruct_batch(ctx, frames, SMALL_ROWS, 1, NULL, NULL, touches, results));
     CHECK_EQUAL(eits_get_options(ctx)->reference_frames, 1);
     CHECK(memcmp(kept, ctx->reference.v0, sizeof kept) == 0);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
+    CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     CHECK_NEAR(gone(&b, 5), 1, 3e4 * EPS);
-    CHECK_EQUAL(eits_restore(ctx, saved, size), EITS_OK);
+    CHECK_OK(eits_restore(ctx, saved, size));
     CHECK(memcmp(kept, ctx->reference.v0, sizeof kept) == 0);
     free(memory);
     tear_down(&b);

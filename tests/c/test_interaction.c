@@ -1,20 +1,12 @@
 /* What touches do to each other, against a dense computation with complex numbers; when it is left
  * alone; and v0 log(v / v0). */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
 #include "kernels/kernels.h"
 #include "touch/interaction.h"
 
 #include <complex.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 static dense_bench b;
 
@@ -30,17 +22,14 @@ static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out, e
     eits_context *ctx = dense_bench_open(b, spec, 0);
     CHANGE_OPTIONS(ctx, o.project_reference = 0, o.max_masked = SMALL_ROWS);
     uint64_t state = 3;
-    uint32_t masked;
-    uint64_t macs;
     small_reference(&b->c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] *= (eits_real)(1 + 0.05 * small_random(&state));
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
+    vary(frame, frame, 0.05, &state);
     for (int side = 0; left_out >= 0 && side < 2; ++side) {
         const eits_fold fold = b->c.model.fold[left_out];
-        CHECK_EQUAL(eits_mask_row(ctx, side ? fold.second : fold.first, 1), EITS_OK);
+        CHECK_OK(eits_mask_row(ctx, side ? fold.second : fold.first, 1));
     }
-    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    STAGE(ctx, frame);
     return ctx;
 }
 
@@ -203,7 +192,7 @@ TEST(reciprocals_give_the_same)
     small_model_seal(&made);
     CHECK(exchanged > 10);
     eits_context *now = open_bench(&turned, WITH_FIELDS, -1, frame);
-    CHECK_EQUAL(eits_model_open(&turned.c.model, made.blob, made.size), EITS_OK);
+    CHECK_OK(eits_model_open(&turned.c.model, made.blob, made.size));
     interplay(now, THREE, 3, other, &macs);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(other[i], added[i], 2e-3 * size_of(added));
@@ -320,9 +309,9 @@ TEST(log_data)
         CHECK(memcmp(ctx->frame.y, log_ctx->frame.y, RANK * sizeof *ctx->frame.y) != 0);
         uint32_t masked;
         uint64_t with = 0, without = 0;
-        CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &with), EITS_OK);
+        CHECK_OK(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &with));
         CHANGE_OPTIONS(ctx, o.touch_fit = EITS_TOUCH_FIT_SPLIT_MERGE | EITS_TOUCH_FIT_INTERACTION);
-        CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &without), EITS_OK);
+        CHECK_OK(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &without));
         CHECK_EQUAL(ctx->frame.has_y_log, 0);
         const uint32_t folds = SMALL_FOLDED - (left_out >= 0);
         CHECK(with - without >= folds * RANK && with - without <= (folds + 2) * RANK);
@@ -336,8 +325,6 @@ TEST(log_data)
 TEST(log_data_without_a_ratio)
 {
     eits_real frame[SMALL_ROWS], y[RANK];
-    uint32_t masked;
-    uint64_t macs;
     eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
     for (int i = 0; i < SMALL_ROWS; ++i)
         frame[i] = ctx->reference.v0[i];
@@ -345,7 +332,7 @@ TEST(log_data_without_a_ratio)
     ctx->reference.v0[fold.first] = ctx->reference.v0[fold.second] = 0;
     frame[fold.first] = frame[fold.second] = R(0.01);
     CHANGE_OPTIONS(ctx, o.diagnostics = 0);
-    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    STAGE(ctx, frame);
     eits_copy(y, ctx->frame.y, RANK);
     CHECK(eits_dot(ctx->kernels, y, y, RANK) > 0);
     for (int i = 0; i < RANK; ++i)

@@ -1,16 +1,6 @@
 /* The limit of multiply-accumulates: whatever it is, it holds, and the image is finite and no worse
  * than zero. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 enum { SIDE = 7, N = SIDE * SIDE, RANK = 12, SOLVERS = 4 };
 
@@ -43,9 +33,9 @@ static eits_info solve(eits_context *ctx, way w, uint32_t limit)
     o.mac_limit = 0;
     eits_forget(ctx);
     if (w.warm) {
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_OK(eits_set_options(ctx, &o));
         small_new_data(ctx, 71);
-        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+        CHECK_OK(eits_solve(ctx, NULL));
     }
     small_new_data(ctx, 72);
     for (uint32_t i = 0; w.warm && i < RANK; ++i) { /* near what the start is for */
@@ -56,8 +46,8 @@ static eits_info solve(eits_context *ctx, way w, uint32_t limit)
         ctx->frame.y[i] = kept + R(0.2) * ctx->frame.y[i];
     }
     o.mac_limit = limit;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
+    CHECK_OK(eits_solve(ctx, NULL));
     return *eits_get_info(ctx);
 }
 
@@ -158,19 +148,18 @@ static void of_a_whole_frame(int masked)
         eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
         uint64_t state = 63;
         small_reference(&b.c.model, 1, reference);
-        for (int i = 0; i < SMALL_ROWS; ++i)
-            frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
-        CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
+        vary(frame, reference, 0.3, &state);
+        CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
         for (int k = 0; k < 2 * masked; ++k) {
             const eits_fold fold = ctx->model->fold[2 + 4 * k];
-            CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
-            CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
+            CHECK_OK(eits_mask_row(ctx, fold.first, 1));
+            CHECK_OK(eits_mask_row(ctx, fold.second, 1));
         }
         uint64_t min = 0;
         for (uint32_t limit = 1; limit < 20000; limit += 1 + limit / 50) {
             CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.mac_limit = limit);
             eits_info info;
-            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, &info), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, &info));
             min = limit == 2 ? info.macs : min; /* the first frame also builds the basis */
             CHECK(limit <= 2 || info.macs <= (limit > min ? limit : min));
         }

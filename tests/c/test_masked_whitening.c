@@ -153,8 +153,8 @@ TEST(what_the_map_costs)
         uint32_t masked = 0;
         uint64_t first = 0, second = 0;
         leave_out(&b, (5 * count) % SMALL_FOLDED);
-        CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &first), EITS_OK);
-        CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &second), EITS_OK);
+        CHECK_OK(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &first));
+        CHECK_OK(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &second));
         const uint64_t fewer = count <= SMALL_FOLDED - count ? count : SMALL_FOLDED - count;
         CHECK_EQUAL(first - second, (fewer + 2 * 8) * triangle + 2 * factor + metric);
     }
@@ -188,12 +188,12 @@ TEST(until_nothing_is_left)
         eits_context *ctx = set_up(&b, WHITENED, project);
         eits_real whole[N], image[N], good[SMALL_ROWS], norm = 0;
         memcpy(good, b.frame, sizeof good);
-        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, whole, NULL), EITS_OK);
+        CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, whole, NULL));
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
             leave_out(&b, k);
-            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL));
             uint32_t count = 99;
-            CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+            CHECK_OK(eits_find_touches(ctx, NULL, 0, &count));
             for (int j = 0; j < N; ++j)
                 CHECK(eits_is_finite(image[j]));
             const uint32_t left = SMALL_FOLDED - 1 - k;
@@ -205,14 +205,14 @@ TEST(until_nothing_is_left)
             norm = k == 0 ? eits_get_info(ctx)->data_norm : norm;
             CHECK(eits_get_info(ctx)->data_norm < 4 * norm); /* 1 / sqrt(MIN_FRACTION), and some */
             eits_context *other = set_up(&fresh, WHITENED, project);
-            CHECK_EQUAL(eits_use_portable_kernels(other, 1), EITS_OK);
-            CHECK_EQUAL(eits_reconstruct(other, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_use_portable_kernels(other, 1));
+            CHECK_OK(eits_reconstruct(other, b.frame, SMALL_ROWS, NULL, NULL));
             CHECK(memcmp(eits_get_image(other), image, sizeof image) == 0 &&
                   memcmp(other->frame.y, ctx->frame.y, RANK * sizeof *ctx->frame.y) == 0);
             dense_bench_close(&fresh.b);
         }
         memcpy(b.frame, good, sizeof good);
-        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL), EITS_OK);
+        CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL));
         CHECK(!ctx->whitening.form && memcmp(whole, image, sizeof whole) == 0);
         dense_bench_close(&b.b);
     }
@@ -229,9 +229,9 @@ TEST(rows_out_do_not_count)
             b.frame[fold.first] = round ? R(1e6) : R(-2);
             b.frame[fold.second == EITS_FOLD_NONE ? fold.first : fold.second] =
                 round ? R(3) : R(-1e-9);
-            CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
+            CHECK_OK(eits_mask_row(ctx, fold.first, 1));
             if (fold.second != EITS_FOLD_NONE)
-                CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
+                CHECK_OK(eits_mask_row(ctx, fold.second, 1));
         }
         (void)stage(&b);
         memcpy(seen[round], ctx->frame.y, sizeof seen[round]);
@@ -275,7 +275,7 @@ static uint32_t can_whiten_masked_with(double factor, eits_real first_of_whiteni
     small_reference(ctx->model, 1, b.reference);
     memcpy(b.frame, b.reference, sizeof b.frame);
     b.frame[3] *= R(1.1);
-    CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, b.reference, SMALL_ROWS));
     leave_out(&b, 4);
     leave_out(&b, 9);
     (void)stage(&b);
@@ -283,7 +283,7 @@ static uint32_t can_whiten_masked_with(double factor, eits_real first_of_whiteni
     CHECK(can_whiten_masked <= ctx->whitening.possible);
     CHECK(can_whiten_masked ? ctx->projection.count == 1
                             : ctx->projection.count <= 3 && ctx->whitening.noise_ratio == 1);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
     for (uint32_t i = 0; i < RANK && can_whiten_masked; ++i)
         first_of_whitening[i] = ctx->projection.basis[STRIDE + i];
     small_context_close(&b.b.c);

@@ -1,13 +1,6 @@
 /* Numbers at the ends of the range: what would not be finite is left out, unknown or zero, and
  * never comes out. Found by fuzzing. */
-#include "check.h"
-#include "small_model.h"
-
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
-
-#include <math.h>
+#include "steps.h"
 
 static const small_spec SPEC = {.rank = 6, .side = 4};
 
@@ -26,7 +19,7 @@ TEST(touches_are_finite_whatever_the_units)
 {
     static const float units[][2] = {
         {1e38f, 0.02f}, {6.0f, 1e-45f}, {6.0f, 1e-39f}, {6.0f, 1e36f}, {1e-38f, 3e38f}};
-    for (size_t u = 0; u < sizeof units / sizeof units[0]; ++u) {
+    for (size_t u = 0; IN_TABLE(u, units); ++u) {
         small_spec spec = SPEC;
         spec.pixel_mm = units[u][0];
         small_model made = small_model_make(spec);
@@ -38,13 +31,13 @@ TEST(touches_are_finite_whatever_the_units)
         small_context_open(&c, &made, 0);
         eits_real frame[SMALL_ROWS];
         small_reference(&c.model, 1.0, frame);
-        CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_set(c.ctx, frame, SMALL_ROWS));
         for (uint32_t i = 0; i < SMALL_ROWS; i += 3)
             frame[i] *= (eits_real)(1.0 + 0.01 * (i % 7));
         eits_touch touches[EITS_MAX_TOUCHES];
         uint32_t count = 0;
         (void)eits_reconstruct(c.ctx, frame, SMALL_ROWS, NULL, NULL);
-        CHECK_EQUAL(eits_find_touches(c.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+        CHECK_OK(eits_find_touches(c.ctx, touches, EITS_MAX_TOUCHES, &count));
         finite_touches(c.ctx, touches, count);
         small_context_close(&c);
         small_model_free(&made);
@@ -65,14 +58,14 @@ static eits_real learn_noise(double first, double others)
     small_context_open(&c, &made, 0);
     look_for_nothing(c.ctx);
     eits_real frame[SMALL_ROWS];
-    CHECK_EQUAL(eits_reference_begin(c.ctx, 6), EITS_OK);
+    CHECK_OK(eits_reference_begin(c.ctx, 6));
     for (int k = 0; k < 6; ++k) {
         small_reference(&c.model, k == 0 ? first : others, frame);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             frame[i] *= (eits_real)(1.0 + 1e-3 * ((i + (uint32_t)k) % 5));
-        CHECK_EQUAL(eits_reference_add(c.ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_add(c.ctx, frame, SMALL_ROWS));
     }
-    CHECK_EQUAL(eits_reference_finish(c.ctx), EITS_OK);
+    CHECK_OK(eits_reference_finish(c.ctx));
     CHECK(c.ctx->reference.ready && isfinite(c.ctx->reference.lambda_noise) &&
           c.ctx->reference.lambda_noise > 0);
     const eits_real noise_v = c.ctx->reference.noise_v;
@@ -104,10 +97,10 @@ TEST(a_reference_frame_out_of_range_is_refused)
     small_context_open(&c, &made, 0);
     look_for_nothing(c.ctx);
     eits_real frame[SMALL_ROWS];
-    CHECK_EQUAL(eits_reference_begin(c.ctx, 4), EITS_OK);
+    CHECK_OK(eits_reference_begin(c.ctx, 4));
     small_reference(&c.model, 1.0, frame);
-    CHECK_EQUAL(eits_reference_add(c.ctx, frame, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_reference_add(c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_add(c.ctx, frame, SMALL_ROWS));
+    CHECK_OK(eits_reference_add(c.ctx, frame, SMALL_ROWS));
     frame[0] *= (eits_real)1.5;
     const eits_status status = eits_reference_add(c.ctx, frame, SMALL_ROWS);
     CHECK_EQUAL(status, BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
@@ -125,13 +118,11 @@ TEST(data_too_small_to_square_give_zero)
     small_context c;
     small_context_open(&c, &made, 0);
     for (uint32_t solver = 0; solver <= EITS_SOLVER_ACTIVE_SET; ++solver) {
-        eits_options options = *eits_get_options(c.ctx);
-        options.solver = (eits_solver)solver;
-        CHECK_EQUAL(eits_set_options(c.ctx, &options), EITS_OK);
+        CHANGE_OPTIONS(c.ctx, o.solver = (eits_solver)solver);
         small_new_data(c.ctx, 3);
         for (uint32_t i = 0; i < SPEC.rank; ++i)
             c.ctx->frame.y[i] *= (eits_real)BOTH_WIDTHS(1e-24, 1e-165);
-        CHECK_EQUAL(eits_solve(c.ctx, NULL), EITS_OK);
+        CHECK_OK(eits_solve(c.ctx, NULL));
         CHECK_EQUAL(eits_get_info(c.ctx)->stop, EITS_STOP_ZERO);
         CHECK(eits_get_info(c.ctx)->lambda_max > eits_get_info(c.ctx)->lambda);
         CHECK(eits_get_info(c.ctx)->residual <= eits_get_info(c.ctx)->data_norm &&

@@ -1,13 +1,8 @@
 /* Outliers where the other folds tell what is right: half scans, whose second rows are copies, and
  * which side of a fold is wrong; and channels: many folds that share a pair. */
-#include "check.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
-
-#include <math.h>
-#include <string.h>
 
 enum {
     RANK = 8,
@@ -134,12 +129,12 @@ static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kin
             b->reference[fold.second] = (eits_real)fold.sign;
     }
     CHANGE_OPTIONS(ctx, o.project_reference = 0, o.max_masked = SMALL_ROWS);
-    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+    CHECK_OK(eits_reference_begin(ctx, UNTOUCHED));
     for (int k = 0; k < UNTOUCHED; ++k) {
         clean_frame(b, 0);
-        CHECK_EQUAL(eits_reference_add(ctx, b->frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_add(ctx, b->frame, SMALL_ROWS));
     }
-    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    CHECK_OK(eits_reference_finish(ctx));
     CHECK(ctx->range.known && ctx->reference.noise_v > 0);
     return ctx;
 }
@@ -158,7 +153,7 @@ static void look_for(eits_context *ctx, uint32_t diagnostics, uint32_t max_maske
  */
 static uint32_t reconstruct(bench *b)
 {
-    CHECK_EQUAL(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
     return eits_get_info(b->c.ctx)->diagnostics &
            ~(uint32_t)(EITS_DIAGNOSTIC_CROWDED | EITS_DIAGNOSTIC_STALE_REFERENCE);
 }
@@ -175,7 +170,7 @@ TEST(clean_half_scans)
     for (int project = 0; project < 2; ++project) {
         eits_context *ctx = set_up(&b, 1);
         CHANGE_OPTIONS(ctx, o.project_reference = (uint32_t)project);
-        CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_set(ctx, b.reference, SMALL_ROWS));
         for (int k = 0; k < 40; ++k) {
             clean_frame(&b, k % 2 ? 0.15 : 0.001);
             CHECK_EQUAL(reconstruct(&b), 0);
@@ -219,9 +214,9 @@ TEST(one_outlier_of_a_half_scan)
         CHECK_EQUAL(reconstruct(&b), 0);
         CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
         look_for(ctx, EITS_DIAGNOSTICS_ALL, SMALL_ROWS);
-        CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
+        CHECK_OK(eits_mask_row(ctx, fold.first, 1));
         if (fold.second != EITS_FOLD_NONE)
-            CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
+            CHECK_OK(eits_mask_row(ctx, fold.second, 1));
         CHECK_EQUAL(reconstruct(&b), 0);
         CHECK(memcmp(data, ctx->frame.y, sizeof data) == 0);
     }
@@ -279,12 +274,12 @@ TEST(drift_is_no_mismatch)
         if (fold.second != EITS_FOLD_NONE)
             b.reference[fold.second] *= R(1) + R(0.1) * (eits_real)(k % 3);
     }
-    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+    CHECK_OK(eits_reference_begin(ctx, UNTOUCHED));
     for (int k = 0; k < UNTOUCHED; ++k) {
         clean_frame(&b, 0);
-        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_add(ctx, b.frame, SMALL_ROWS));
     }
-    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    CHECK_OK(eits_reference_finish(ctx));
     for (int project = 0; project < 2; ++project) {
         CHANGE_OPTIONS(ctx, o.project_reference = (uint32_t)project);
         clean_frame(&b, 0.02);
@@ -342,7 +337,7 @@ TEST(several_wrong_sides)
         }
     }
     clean_frame(&b, 0.15);
-    CHECK_EQUAL(eits_mask_row(ctx, b.c.model.fold[UNSEEN].first, 1), EITS_OK);
+    CHECK_OK(eits_mask_row(ctx, b.c.model.fold[UNSEEN].first, 1));
     b.frame[b.c.model.fold[2].first] *= R(1.5);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
     CHECK_EQUAL(eits_get_info(ctx)->outliers, 2);
@@ -358,7 +353,7 @@ TEST(what_sides_may_differ_by)
         int found;
     } CASES[] = {{0, 6e-4, 0, 1},   {0, 3e-4, 0, 0},   {0, 0.02, 0.5, 1},   {0, 0.01, 0.5, 0},
                  {0.3, 0.12, 0, 1}, {0.3, 0.08, 0, 0}, {-0.3, -0.08, 0, 0}, {-0.3, -0.12, 0, 1}};
-    for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
+    for (size_t n = 0; IN_TABLE(n, CASES); ++n) {
         eits_context *ctx = set_up(&b, 0);
         CHECK(ctx->reference.noise_v > R(4e-5) && ctx->reference.noise_v < R(7e-5));
         look_for(ctx, EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);

@@ -1,14 +1,6 @@
 /* Numbers at the ends of the width: what overflows or vanishes on the way is refused or answered
  * with zero, never NaN. */
-#include "check.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <string.h>
+#include "steps.h"
 
 enum { SIDE = 4, N = SIDE * SIDE, MAX_RANK = 40 };
 static const double GREATEST = BOTH_WIDTHS((double)FLT_MAX, DBL_MAX);
@@ -129,7 +121,7 @@ static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_l
         ctx->frame.y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
     CHANGE_OPTIONS(ctx, o.solver = solver, o.sign = EITS_SIGN_BOTH, o.lambda_rel = R(0.01),
                    o.iterations = 50, o.mac_limit = mac_limit);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     const eits_info info = *eits_get_info(ctx);
     if (sizeof(eits_real) == 4)
         check_cleared(ctx);

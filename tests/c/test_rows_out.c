@@ -1,11 +1,8 @@
 /* Rows left out of a taught model: filled in by the rows' precision (section PREC), F beside it;
  * and everything that a reader refuses. */
-#include "base/vec.h"
-#include "check.h"
-#include "frame/whitening.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include <math.h>
+#include "frame/whitening.h"
 
 enum { RANK = 4, PACKED = SMALL_FOLDED * (SMALL_FOLDED + 1) / 2, SIZE = 4 * PACKED, OTHER = 10 };
 
@@ -50,7 +47,7 @@ static void what_is_no_precision_is_refused(void)
 {
     uint8_t bytes[SIZE + 4];
     section_of(bytes, 0.5f);
-    CHECK_EQUAL(opened(1, bytes, SIZE), EITS_OK);
+    CHECK_OK(opened(1, bytes, SIZE));
     CHECK_EQUAL(opened(1, bytes, SIZE - 4), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(opened(1, bytes, SIZE + 4), EITS_E_MODEL_SECTION);
     /* a model that says how it was whitened needs none */
@@ -71,21 +68,16 @@ static void as_many_are_filled_in_as_are_spare(void)
     small_model made = with_precision(spec, 1, bytes, SIZE);
     for (uint32_t out = 0; out <= SMALL_FOLDED - MANY + 1; ++out) {
         eits_real frame[SMALL_ROWS];
-        uint32_t masked;
-        uint64_t macs;
         small_context c;
         small_context_open(&c, &made, 0);
         CHANGE_OPTIONS(c.ctx, o.project_reference = 0, o.diagnostics = 0,
                        o.max_masked = SMALL_ROWS);
         small_reference(&c.model, 1, frame);
-        CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_set(c.ctx, frame, SMALL_ROWS));
         for (uint32_t k = 0; k < out; ++k) {
-            const eits_fold fold = c.model.fold[k];
-            frame[fold.first] = (eits_real)NAN;
-            if (fold.second != EITS_FOLD_NONE)
-                frame[fold.second] = (eits_real)NAN;
+            lose_fold(&c.model, k, frame);
         }
-        CHECK_EQUAL(eits_frame_stage(c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+        STAGE(c.ctx, frame);
         CHECK_EQUAL(c.ctx->whitening.form, out > 0 && out <= SMALL_FOLDED - MANY
                                                ? EITS_WHITENING_TRIANGLE
                                                : EITS_WHITENING_STORED);
@@ -99,25 +91,20 @@ static void solved(float leaning, float pivot, eits_real wanted_scale, eits_whit
 {
     uint8_t bytes[SIZE + 4];
     eits_real frame[SMALL_ROWS];
-    uint32_t masked;
-    uint64_t macs;
     section_of(bytes, leaning);
     small_put_f32(entry(bytes, 0, 0), pivot);
     small_model made = with_precision(TAUGHT, 1, bytes, SIZE);
     small_context c;
     small_context_open(&c, &made, 0);
-    eits_options o = *eits_get_options(c.ctx);
-    o.project_reference = 0;
-    o.diagnostics = 0;
-    CHECK_EQUAL(eits_set_options(c.ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(c.ctx, o.project_reference = 0, o.diagnostics = 0);
     small_reference(&c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(c.ctx, frame, SMALL_ROWS));
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)1.25;
     frame[c.model.fold[0].first] = (eits_real)NAN;
     if (c.model.fold[0].second != EITS_FOLD_NONE)
         frame[c.model.fold[0].second] = (eits_real)NAN;
-    CHECK_EQUAL(eits_frame_stage(c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    STAGE(c.ctx, frame);
     CHECK_EQUAL(c.ctx->whitening.form, form);
     const eits_real p = (eits_real)((const float *)c.model.reduction.data)[0];
     CHECK_NEAR(c.ctx->frame.y[0], wanted_scale * p * c.ctx->frame.d[OTHER], 1e-5);

@@ -1,15 +1,6 @@
 /* What lies in the scratch, and in the gaps between arrays, makes no difference to a result: it is
  * nobody's. */
-#include "check.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
-
-#include <math.h>
-#include <string.h>
+#include "steps.h"
 
 enum { RANK = 12, SIDE = 12, N = SIDE * SIDE, SOLVERS = 4, FRAMES = 24, KEPT_NOISE = 6 };
 
@@ -62,16 +53,15 @@ static eits_context *set_up(bench *b, small_spec spec, int noise_known, eits_sol
     CHANGE_OPTIONS(ctx, o.solver = solver, o.warm_start = 1, o.max_masked = SMALL_ROWS);
     small_reference(&b->c.model, 1, frame);
     if (!noise_known) {
-        CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
         return ctx;
     }
-    CHECK_EQUAL(eits_reference_begin(ctx, KEPT_NOISE), EITS_OK);
+    CHECK_OK(eits_reference_begin(ctx, KEPT_NOISE));
     for (int k = 0; k < KEPT_NOISE; ++k) {
-        for (int i = 0; i < SMALL_ROWS; ++i)
-            v[i] = frame[i] * (eits_real)(1 + 1e-3 * small_random(&state));
-        CHECK_EQUAL(eits_reference_add(ctx, v, SMALL_ROWS), EITS_OK);
+        vary(v, frame, 1e-3, &state);
+        CHECK_OK(eits_reference_add(ctx, v, SMALL_ROWS));
     }
-    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    CHECK_OK(eits_reference_finish(ctx));
     return ctx;
 }
 
@@ -103,7 +93,7 @@ static void make_frame(const eits_model *model, int k, uint64_t *state, eits_rea
 static void what_lies_in_the_scratch_makes_no_difference(void)
 {
     static const double junk[] = {NAN, 1e30, -1e-30};
-    for (size_t spec = 0; spec < sizeof SPECS / sizeof *SPECS; ++spec) {
+    for (size_t spec = 0; IN_TABLE(spec, SPECS); ++spec) {
         for (int way = 0; way < 2 * SOLVERS; ++way) {
             bench clean, spoilt;
             eits_context *ctx = set_up(&clean, SPECS[spec], way % 2, (eits_solver)(way / 2)),
@@ -124,10 +114,8 @@ static void what_lies_in_the_scratch_makes_no_difference(void)
                     continue;
                 CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) ==
                       0);
-                CHECK_EQUAL(eits_find_touches(ctx, touches[0], EITS_MAX_TOUCHES, &count[0]),
-                            EITS_OK);
-                CHECK_EQUAL(eits_find_touches(other, touches[1], EITS_MAX_TOUCHES, &count[1]),
-                            EITS_OK);
+                CHECK_OK(eits_find_touches(ctx, touches[0], EITS_MAX_TOUCHES, &count[0]));
+                CHECK_OK(eits_find_touches(other, touches[1], EITS_MAX_TOUCHES, &count[1]));
                 CHECK_EQUAL(count[1], count[0]);
                 for (uint32_t t = 0; t < count[0] && t < count[1]; ++t)
                     CHECK(small_same_touch(&touches[0][t], &touches[1][t]));

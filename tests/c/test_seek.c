@@ -1,22 +1,13 @@
 /* Touches that are sought in the data, whatever the sparse image shows; and the one touch of an
  * instrument that is far from the model. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
 #include "evidence/evidence.h"
 #include "frame/constants.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 #include "touch/constants.h"
 #include "touch/disc_fit.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { SIDE = 20, RANK = 64 };
 static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
@@ -32,13 +23,13 @@ static eits_context *pressed(dense_bench *b, const eits_disc *disc, uint32_t cou
     o.sign = sign;
     o.touch_min_fraction = R(0.02);
     o.detection_factor = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
     eits_zero(ctx->frame.y, RANK);
     for (uint32_t k = 0; k < count; ++k) {
         (void)eits_disc_atom(ctx, &ctx->scratch, disc + k, atom, NULL);
         eits_axpy(ctx->kernels, ctx->frame.y, disc[k].change, atom, RANK);
     }
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     for (uint32_t j = 0; j < b->c.model.n_pixels; ++j)
         ctx->solver.image[j] = j == 0 ? 1 : 0;
     return ctx;
@@ -47,7 +38,7 @@ static eits_context *pressed(dense_bench *b, const eits_disc *disc, uint32_t cou
 static uint32_t found(eits_context *ctx, eits_touch *touch)
 {
     uint32_t count = 0;
-    CHECK_EQUAL(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_OK(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count));
     return count;
 }
 
@@ -85,7 +76,7 @@ TEST(touches_that_the_image_does_not_show_are_found)
           {0, 0, 9, R(0.04), 1, 0},
           {3, -45, 9, R(0.05), 1, 0}}},
     };
-    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
+    for (size_t c = 0; IN_TABLE(c, cases); ++c) {
         dense_bench b = {0};
         eits_touch touch[EITS_MAX_TOUCHES];
         eits_context *ctx = pressed(&b, cases[c].disc, cases[c].count, cases[c].sign);
@@ -94,9 +85,8 @@ TEST(touches_that_the_image_does_not_show_are_found)
         for (uint32_t k = 0; k < cases[c].count; ++k)
             CHECK(has(touch, count, &cases[c].disc[k]));
         CHECK(eits_get_info(ctx)->touch_macs > 0);
-        eits_options o = *eits_get_options(ctx);
-        o.touch_seek = 0; /* the image's peak is none of them */
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        /* the image's peak is none of them */
+        CHANGE_OPTIONS(ctx, o.touch_seek = 0);
         CHECK(found(ctx, touch) < 2u);
         dense_bench_close(&b);
     }
@@ -110,15 +100,15 @@ TEST(what_explains_too_little_is_no_touch)
     eits_context *ctx = pressed(&b, disc, 2, EITS_SIGN_INCREASE);
     eits_options o = *eits_get_options(ctx);
     o.touch_min_fraction = R(0.2); /* it explains a seventh */
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
     CHECK_EQUAL(found(ctx, touch), 1);
     CHECK(has(touch, 1, &disc[0]));
     o.touch_min_fraction = R(0.02);
     o.max_touches = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
     CHECK_EQUAL(found(ctx, touch), 1);
     o.max_touches = EITS_MAX_TOUCHES;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
     for (int i = 0; i < RANK; ++i) /* nothing of the sign that is looked for */
         ctx->frame.y[i] = 0;
     CHECK_EQUAL(found(ctx, touch), 0);
@@ -133,7 +123,7 @@ TEST(a_disc_a_whole_pixel_beyond_the_rim_is_no_touch)
         eits_real beyond; /* of the rim's pixel, pixels */
         uint32_t count;
     } cases[] = {{R(0.99), 1}, {R(0.9999), 0}, {1, 0}, {R(1.0001), 0}};
-    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
+    for (size_t c = 0; IN_TABLE(c, cases); ++c) {
         dense_bench b = {0};
         const eits_disc at = {0, 0, 9, R(0.05), 1, 0};
         eits_context *ctx = pressed(&b, &at, 1, EITS_SIGN_INCREASE);
@@ -257,7 +247,7 @@ static eits_reference tared(eits_context *ctx, double by, double apart)
         frame[fold.first] += (eits_real)off;
         frame[fold.second] -= (eits_real)(fold.sign * off);
     }
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     return ctx->reference;
 }
 

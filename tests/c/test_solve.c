@@ -1,16 +1,6 @@
 /* The solver on given reduced data: against the closed form, a textbook FISTA, and the conditions
  * of an optimum. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 enum { SIDE = 6, N = SIDE * SIDE, RANK = 12 };
 
@@ -52,7 +42,7 @@ static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
 static eits_info solve(eits_context *ctx, uint32_t iterations, eits_sign sign, double lambda)
 {
     CHANGE_OPTIONS(ctx, o.iterations = iterations, o.sign = sign, o.lambda_abs = (eits_real)lambda);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     return *eits_get_info(ctx);
 }
 
@@ -91,7 +81,7 @@ TEST(same_as_the_textbook)
     static const uint32_t counts[] = {1, 2, 3, 11, 60};
     for (int storage = 0; storage < 4; ++storage) {
         for (int sign = 0; sign < 3; ++sign) {
-            for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
+            for (size_t k = 0; IN_TABLE(k, counts); ++k) {
                 const small_spec spec = {
                     .rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
                 eits_context *ctx = set_up(&b, spec, (int)(k % 2));
@@ -124,7 +114,7 @@ TEST(same_bits_in_every_layout)
             const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
             eits_context *ctx = set_up(&b, spec, way % 2);
             CHECK((ctx->columns.panels != NULL) == (way % 2 == 1));
-            CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
+            CHECK_OK(eits_use_portable_kernels(ctx, way / 2));
             const eits_info info = solve(ctx, 60, EITS_SIGN_BOTH, 0.02);
             if (way == 0) {
                 memcpy(first, eits_get_image(ctx), sizeof first);
@@ -143,7 +133,7 @@ TEST(optimum_has_its_marks)
         eits_context *ctx = set_up(&b, RANDOM, 1);
         eits_options o = *eits_get_options(ctx);
         o.gap_rel = R(BOTH_WIDTHS(1e-6, 1e-12));
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_OK(eits_set_options(ctx, &o));
         const eits_info info = solve(ctx, 50000, (eits_sign)sign, 0.05);
         CHECK_EQUAL(info.stop, EITS_STOP_GAP);
         CHECK(info.gap_rel <= o.gap_rel && info.gap >= 0);
@@ -179,7 +169,7 @@ TEST(gap_bounds_the_suboptimality)
     static const uint32_t counts[] = {1, 2, 4, 8, 16, 32, 64, 128};
     for (int sign = 0; sign < 3; ++sign) {
         double before = 1e9;
-        for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
+        for (size_t k = 0; IN_TABLE(k, counts); ++k) {
             eits_context *ctx = set_up(&b, RANDOM, 0);
             const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
             double *x = dense_copy(eits_get_coefficients(ctx), N), best_x[N] = {0}, r[RANK];
@@ -266,12 +256,11 @@ TEST(solving_beside_a_basis)
     uint64_t state = 52, macs;
     uint32_t masked;
     small_reference(&b.c.model, 1, reference);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
+    vary(frame, reference, 0.3, &state);
     frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] =
         frame[b.c.model.fold[20].first] = R(NAN);
-    CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
+    CHECK_OK(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs));
     CHECK_EQUAL(ctx->projection.count, 3);
     const eits_info info = solve(ctx, 40, EITS_SIGN_INCREASE, 0.01);
     double *basis = dense_numbers(3 * RANK), *y = dense_copy(ctx->frame.y, RANK), x[N] = {0},
@@ -311,14 +300,14 @@ TEST(work_is_counted)
     eits_options o = *eits_get_options(ctx);
     o.gap_rel = R(1e-12); /* the gap is asked for every 5 iterations: another S'r each */
     o.gap_every = 5;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
     eits_info info = solve(ctx, 4, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + 3 * whole + whole + 4 * column);
     /* from the last coefficients: S x once more, and the first iteration's S'r */
     o = *eits_get_options(ctx);
     o.gap_rel = 0;
     o.warm_start = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + column + 3 * (whole + column) + whole);
     ctx->frame.y[3] = 0;
@@ -328,19 +317,19 @@ TEST(work_is_counted)
      * projections' passes for the drift direction at first */
     eits_real frame[SMALL_ROWS];
     small_reference(&b.c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     const uint64_t reduce = SMALL_FOLDED * 16, project = 2 * 16;
     CHECK_EQUAL(eits_get_info(ctx)->macs,
                 reduce + 2 * 16 /* direction, normalised */ + 2 * (reduce + project) + whole);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     CHECK_EQUAL(eits_get_info(ctx)->macs, 2 * (reduce + project) + whole); /* the basis is kept */
     /* one column of P less, and its rows whitened again: the rows left out once into the products,
      * three factors, eight probes of the noise; the data and the drift's direction by three
      * triangles; F' y */
     const uint64_t triangle = 16 * 17 / 2, cubic = 15 * 16 * 17 / 6;
     frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] = R(NAN);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     const uint64_t built =
         triangle + cubic + (2 * cubic + 2 * triangle - triangle) + cubic + 8 * 2 * triangle;
     CHECK(ctx->whitening.form);
@@ -348,14 +337,14 @@ TEST(work_is_counted)
     CHECK_EQUAL(eits_get_info(ctx)->macs, built + (reduce + 3 * triangle + 2 * 16) +
                                               2 * (reduce - 16 + 3 * triangle + project) +
                                               triangle + whole);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     /* the whitening is kept */
     CHECK_EQUAL(eits_get_info(ctx)->macs,
                 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
     o.project_reference = 0; /* each residual is mapped, there and back */
     o.warm_start = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     CHECK_EQUAL(ctx->projection.count, 0);
     ctx->frame.y[7] = 1;
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);

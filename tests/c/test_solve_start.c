@@ -1,17 +1,6 @@
 /* Where a solve starts from, and what it may not take over: after a halved step, from a start worse
  * than zero, over another stage's scratch, after a frame that was refused or empty. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 static dense_bench b;
 
@@ -24,12 +13,12 @@ static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVE
 
 static void set_options(eits_context *ctx, eits_options o)
 {
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
 }
 
 static eits_info solve(eits_context *ctx)
 {
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     return *eits_get_info(ctx);
 }
 
@@ -92,8 +81,7 @@ static void wandering_frame(const bench *b, uint32_t k, eits_real *frame)
 {
     uint64_t state = 93 + k / 2;
     small_reference(&b->c.model, 1, frame);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] *= (eits_real)(1 + 0.05 * small_random(&state));
+    vary(frame, frame, 0.05, &state);
 }
 
 static eits_context *open_warm(bench *b, int solver)
@@ -101,7 +89,7 @@ static eits_context *open_warm(bench *b, int solver)
     eits_context *ctx = dense_bench_open(b, WAVES, 0);
     eits_real frame[SMALL_ROWS];
     small_reference(&b->c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.warm_start = 1, o.iterations = 4,
                    o.sign = EITS_SIGN_BOTH);
     return ctx;
@@ -117,12 +105,12 @@ TEST(touches_leave_no_trace)
             eits_real frame[SMALL_ROWS];
             uint32_t count;
             wandering_frame(&seen, k, frame);
-            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-            CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
+            CHECK_OK(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL));
             CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) == 0);
             CHECK(memcmp(eits_get_info(ctx), eits_get_info(other), sizeof *eits_get_info(ctx)) ==
                   0);
-            CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+            CHECK_OK(eits_find_touches(ctx, NULL, 0, &count));
             CHECK(count > 0);
         }
         dense_bench_close(&seen);
@@ -145,7 +133,7 @@ TEST(cold_after_nothing)
         for (int i = 0; why == 2 && i < SMALL_ROWS; ++i)
             nothing[i] = 0;
         wandering_frame(&b, 0, frame);
-        CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
         CHECK_EQUAL(eits_reconstruct(ctx, nothing, SMALL_ROWS, NULL, NULL),
                     why == 0   ? EITS_OK
                     : why == 1 ? EITS_E_FRAME_CHANNELS
@@ -153,8 +141,8 @@ TEST(cold_after_nothing)
         /* makes the basis */
         CHECK_EQUAL(eits_reconstruct(other, nothing, SMALL_ROWS, NULL, NULL) == EITS_OK, why == 0);
         wandering_frame(&b, 4, frame);
-        CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_OK(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL));
+        CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
         CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) == 0);
         CHECK(eits_get_info(ctx)->iterations == eits_get_info(other)->iterations &&
               eits_get_info(ctx)->gap == eits_get_info(other)->gap);
@@ -217,7 +205,7 @@ TEST(steps_that_end_at_zero)
                 ctx->frame.y[i] = (eits_real)(1 + 0.1 * i);
             CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_FISTA, o.lambda_rel = R(0.1),
                            o.detection_factor = 0, o.gap_every = every, o.iterations = 60);
-            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            CHECK_OK(eits_solve(ctx, NULL));
             CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_ITERATIONS);
             CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 6);
             CHECK(eits_get_info(ctx)->step_halvings > 0 && eits_get_info(ctx)->gap_rel < R(1e-3));

@@ -1,17 +1,14 @@
 /* What the core finds reaches the host by name: in the frame's head, and what persists as faults;
  * on frames of the sheet. */
-#include "bench.h"
-#include "check.h"
-
-static bench b;
+#include "steps.h"
 
 /* Tared, and everything is streamed. */
 static void start(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
     b.board.noise_codes = 4;
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(8);
+    STREAM(7, 1, 0);
 }
 
 static const eits_packet_solved *head_of(const host_packet *packet)
@@ -30,14 +27,12 @@ static void test_open_while_nobody_looks(uint16_t every)
     host_run(&b.host, 50);
     for (uint32_t e = 2; e < 16; e += 6) {
         host_forget(&b.host);
-        b.sheet.detached[e] = true;
-        sheet_solve(&b.sheet);
+        detach(e, true);
         const uint32_t before = b.host.instrument.last_frame;
         host_run(&b.host, 60);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
         CHECK(fault != NULL && fault->index == (int32_t)e && fault->frame <= before + 2);
-        b.sheet.detached[e] = false;
-        sheet_solve(&b.sheet);
+        detach(e, false);
         host_run(&b.host, 300);
         CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0) != NULL);
     }
@@ -128,10 +123,8 @@ TEST(test_switched_off)
                                   .solver = o->solver,
                                   .diagnostics = EITS_DIAGNOSTICS_ALL &
                                                  ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN};
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SOLVER, &solver, sizeof solver).status,
-                EITS_REPLY_OK);
-    b.sheet.detached[5] = true;
-    sheet_solve(&b.sheet);
+    TAKEN(host_command(&b.host, EITS_PACKET_SOLVER, &solver, sizeof solver));
+    detach(5, true);
     host_run(&b.host, 60);
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
     CHECK_EQUAL(head_of(host_last(&b.host, EITS_PACKET_IMAGE))->open_electrodes, 0);

@@ -1,20 +1,16 @@
 /* Touches after each drive: drives are looked at while the main loop is busy, none is left out or
  * told twice, whole frames are brought to one instant, and all begins anew where it must. */
-#include "app/follow.h"
-#include "bench.h"
-#include "check.h"
+#include "steps.h"
 
-#include <string.h>
+#include "app/follow.h"
 
 enum { DRIVES = 16, DRIVE_US = 1300, SCAN_MS = 21, ALL = 31 & ~EITS_STREAM_IMAGE };
-
-static bench b;
 
 static void set_up(const skin_spec *spec)
 {
     bench_start(&b, spec);
     b.board.noise_codes = 0.5;
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    TARE(8);
 }
 
 static eits_packet_followed followed(uint32_t k)
@@ -50,8 +46,8 @@ TEST(test_what_is_refused)
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 2, 0).status, EITS_REPLY_DRIVES);
     eits_command_scan scan = host_default_scan();
     scan.check_every = 4;
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    TAKEN(scan_with(scan));
+    TARE(8);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
     bench_stop(&b);
 }
@@ -62,7 +58,7 @@ TEST(test_a_still_skin)
 {
     set_up(&SKIN_WITH_FIELDS);
     host_forget(&b.host);
-    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    STREAM(ALL, 1, 0);
     host_run(&b.host, 20 * SCAN_MS);
     const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
     CHECK(frames >= 18);
@@ -82,14 +78,13 @@ TEST(test_a_still_skin)
 static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
 {
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    STREAM(ALL, 1, 0);
     host_run(&b.host, 5 * SCAN_MS);
     b.board.clock_cost_ns = clock_cost_ns;
     b.board.write_cost_ns = write_cost_ns;
     const uint32_t begun = b.host.instrument.follow.begun;
     host_forget(&b.host);
-    sheet_touch(&b.sheet, -2, 1, 1.6, 4);
-    sheet_solve(&b.sheet);
+    touch(-2, 1, 4);
     const uint32_t scanned = b.host.instrument.scan.frames_scanned;
     const uint64_t from_ns = b.board.now_ns;
     host_run(&b.host, 30 * SCAN_MS);
@@ -120,7 +115,7 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
 TEST(test_a_slow_main_loop)
 {
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    STREAM(ALL, 1, 0);
     host_run(&b.host, 5 * SCAN_MS);
     const uint32_t begun = b.host.instrument.follow.begun;
     const uint32_t scanned = b.host.instrument.scan.frames_scanned;
@@ -142,7 +137,7 @@ TEST(test_a_slow_main_loop)
 TEST(test_beginning_anew)
 {
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    STREAM(ALL, 1, 0);
     host_run(&b.host, 3 * SCAN_MS);
     const fw_follow *follow = &b.host.instrument.follow;
     uint32_t begun = follow->begun;
@@ -150,9 +145,7 @@ TEST(test_beginning_anew)
     (void)host_stats(&b.host, 0);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK_EQUAL(follow->begun, begun);
-    eits_command_mask_row mask = {.row = 3, .masked = 1};
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
-                EITS_REPLY_OK);
+    TAKEN(mask_row(3, 1));
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(follow->begun > begun && follow->running);
     begun = follow->begun;
@@ -164,10 +157,10 @@ TEST(test_beginning_anew)
     host_run(&b.host, 3 * SCAN_MS);
     CHECK(follow->begun > begun && follow->running);
     begun = follow->begun;
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    TARE(8);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(follow->begun > begun && follow->running);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_TOUCHES, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_TOUCHES, 1, 0);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(!follow->running && b.host.instrument.scan.drive_done == NULL);
     bench_stop(&b);
@@ -178,7 +171,7 @@ TEST(test_beginning_anew)
 TEST(test_a_place_that_frames_find)
 {
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_FOLLOWED, 1, 0);
     host_run(&b.host, 3 * SCAN_MS);
     fw_instrument *instrument = &b.host.instrument;
     fw_frame *frame = &instrument->engine.frames[0];
@@ -193,8 +186,7 @@ TEST(test_a_place_that_frames_find)
             instrument->follow.owed_frame = frame->number;
             (void)fw_follow_align(instrument, frame);
         }
-        CHECK_EQUAL(eits_fast_touches(instrument->engine.fast, touches, EITS_FAST_TOUCHES, &count),
-                    EITS_OK);
+        CHECK_OK(eits_fast_touches(instrument->engine.fast, touches, EITS_FAST_TOUCHES, &count));
         CHECK_EQUAL(count, round);
     }
     bench_stop(&b);
