@@ -432,6 +432,21 @@ void small_model_free(small_model *model)
     model->memory = NULL;
 }
 
+void small_model_depend(small_model *model, uint32_t pixels, uint32_t rank, double off)
+{
+    uint32_t size;
+    uint8_t *sens = small_model_section(model, "SENS", &size);
+    const size_t column = size / pixels;
+    for (size_t j = 0; j < pixels; ++j) {
+        float *values = (float *)(void *)(sens + column * j);
+        if (j % 7 == 0)
+            memset(values, 0, column);
+        else if (j % 3 != 0)
+            memcpy(values, values - column / sizeof *values, column);
+        values[j % rank] *= (float)(1 + off);
+    }
+}
+
 void small_model_seal(small_model *model)
 {
     small_put_u32(model->blob + 12, eits_crc32(0, model->blob + 16, model->size - 16));

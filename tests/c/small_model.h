@@ -60,6 +60,10 @@ void small_model_free(small_model *model);
 small_model small_model_with_section(const small_model *model, const char *tag, const void *section,
                                      uint32_t size);
 
+/* Columns of S in groups of three that are alike but for `off` of one number each, every seventh
+ * zero; `model` has float storage. */
+void small_model_depend(small_model *model, uint32_t pixels, uint32_t rank, double off);
+
 /* Write the checksum again after bytes were changed. */
 void small_model_seal(small_model *model);
 

@@ -52,13 +52,21 @@ static inline void vary(eits_real *out, const eits_real *from, double by, uint64
         out[i] = from[i] * (eits_real)(1 + by * small_random(state));
 }
 
-/* The image, its coefficients: wholly zero; wholly finite. */
-#define CHECK_IMAGE(ctx, of)                                             \
-    do {                                                                 \
-        int all = 1;                                                     \
-        for (uint32_t j = 0; j < (ctx)->model->n_pixels; ++j)            \
-            all &= of((ctx)->solver.image[j]) && of((ctx)->solver.x[j]); \
-        CHECK(all && #of);                                               \
-    } while (0)
+/* Whether image and coefficients are wholly zero; wholly finite. */
+static inline int is_cleared(const eits_context *ctx)
+{
+    int all = 1;
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
+        all &= ctx->solver.image[j] == 0 && ctx->solver.x[j] == 0;
+    return all;
+}
+
+static inline int is_finite(const eits_context *ctx)
+{
+    int all = 1;
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
+        all &= eits_is_finite(ctx->solver.image[j]) && eits_is_finite(ctx->solver.x[j]);
+    return all;
+}
 
 #endif

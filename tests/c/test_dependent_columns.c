@@ -6,27 +6,12 @@ static dense_bench b;
 
 enum { SIDE = 7, N = SIDE * SIDE, RANK = 6 };
 
-/* Columns in groups of three that are alike but for `off` of one number each, every seventh zero.
- */
 static eits_context *set_up(dense_bench *b, double off)
 {
-    dense_bench_close(b);
-    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
-    uint32_t size;
-    uint8_t *sens = small_model_section(&b->made, "SENS", &size);
-    const size_t column = size / N;
-    for (size_t j = 0; j < N; ++j) {
-        float *values = (float *)(void *)(sens + column * j);
-        if (j % 7 == 0)
-            memset(values, 0, column);
-        else if (j % 3 != 0)
-            memcpy(values, values - column / sizeof *values, column);
-        values[j % RANK] *= (float)(1 + off);
-    }
-    small_model_seal(&b->made);
-    small_context_open(&b->c, &b->made, 0);
-    b->d = dense_of(&b->c.model);
-    return b->c.ctx;
+    small_model made =
+        small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
+    small_model_depend(&made, N, RANK, off);
+    return dense_bench_take(b, made, 0);
 }
 
 static void check_result(const dense_bench *b, double max)
@@ -38,8 +23,8 @@ static void check_result(const dense_bench *b, double max)
         CHECK(isfinite((double)eits_get_image(ctx)[j]) && isfinite(x[j]));
         nonzeros += x[j] != 0;
     }
-    CHECK_EQUAL(eits_get_info(ctx)->nonzeros, nonzeros);
-    CHECK(dense_objective(&b->d, y, x, (double)eits_get_info(ctx)->lambda) <= max);
+    CHECK_EQUAL(ctx->info.nonzeros, nonzeros);
+    CHECK(dense_objective(&b->d, y, x, (double)ctx->info.lambda) <= max);
     free(x), free(y);
 }
 
@@ -69,10 +54,9 @@ TEST(every_limit_beside_columns_that_depend)
             o.solver = EITS_SOLVER_ACTIVE_SET;
             CHECK_OK(eits_set_options(ctx, &o));
             CHECK_OK(eits_solve(ctx, NULL));
-            CHECK(eits_get_info(ctx)->macs <= limit);
-            CHECK(eits_get_info(ctx)->stop == EITS_STOP_MACS ||
-                  eits_get_info(ctx)->stop == EITS_STOP_OPTIMUM ||
-                  eits_get_info(ctx)->stop == EITS_STOP_ITERATIONS);
+            CHECK(ctx->info.macs <= limit);
+            CHECK(ctx->info.stop == EITS_STOP_MACS || ctx->info.stop == EITS_STOP_OPTIMUM ||
+                  ctx->info.stop == EITS_STOP_ITERATIONS);
             check_result(&b, at_zero * (1 + 1e-3));
         }
     }
@@ -101,9 +85,9 @@ TEST(starts_that_cancel)
     ctx->solver.warm = 1;
     double *y = dense_copy(ctx->frame.y, RANK);
     CHECK_OK(eits_solve(ctx, NULL));
-    CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
+    CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
     check_result(&b, 0.5 * dense_dot(y, y, RANK));
-    CHECK(eits_get_info(ctx)->gap_rel < R(1e-3));
+    CHECK(ctx->info.gap_rel < R(1e-3));
     free(y);
 }
 
@@ -174,8 +158,8 @@ TEST(sweeps_as_written_apart)
             CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_COORDINATE, o.sign = EITS_SIGN_BOTH,
                            o.iterations = SWEEPS, o.lambda_rel = R(0.02));
             CHECK_OK(eits_solve(ctx, NULL));
-            CHECK_EQUAL(eits_get_info(ctx)->iterations, SWEEPS);
-            dense_sweeps(&b.d, square, r, (double)eits_get_info(ctx)->lambda, SWEEPS, x);
+            CHECK_EQUAL(ctx->info.iterations, SWEEPS);
+            dense_sweeps(&b.d, square, r, (double)ctx->info.lambda, SWEEPS, x);
             CHECK(dense_greatest_difference(x, eits_get_coefficients(ctx), N) < 3000 * EPS);
             free(r), free(x);
         }
@@ -199,11 +183,11 @@ TEST(the_active_set_ends_soon)
         o.lambda_rel = (eits_real)lambdas[way % 3];
         CHECK_OK(eits_set_options(ctx, &o));
         CHECK_OK(eits_solve(ctx, NULL));
-        CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
-        CHECK(eits_get_info(ctx)->iterations < ROUNDS && eits_get_info(ctx)->nonzeros <= RANK_HERE);
+        CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+        CHECK(ctx->info.iterations < ROUNDS && ctx->info.nonzeros <= RANK_HERE);
         double *x = dense_copy(eits_get_coefficients(ctx), 81),
                *y = dense_copy(ctx->frame.y, RANK_HERE);
-        const double gap = dense_gap(&b.d, y, x, (double)eits_get_info(ctx)->lambda, o.sign);
+        const double gap = dense_gap(&b.d, y, x, (double)ctx->info.lambda, o.sign);
         CHECK(gap <= BOTH_WIDTHS(3e-6, 1e-14) * 0.5 * dense_dot(y, y, RANK_HERE));
         free(x), free(y);
     }
@@ -235,12 +219,11 @@ TEST(hidden_columns)
     small_reference(ctx->model, 1, frame);
     CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     vary(frame, frame, 0.2, &state);
-    CHECK_OK(eits_mask_row(ctx, ctx->model->fold[k].first, 1));
-    CHECK_OK(eits_mask_row(ctx, ctx->model->fold[k].second, 1));
+    mask_fold(ctx, k);
     CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
-    CHECK(ctx->projection.count == 1 && eits_get_info(ctx)->lambda > 0);
-    CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 0);
-    CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
+    CHECK(ctx->projection.count == 1 && ctx->info.lambda > 0);
+    CHECK_EQUAL(ctx->info.nonzeros, 0);
+    CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
     small_context_close(&b.c);
     small_model_free(&b.made);
 }

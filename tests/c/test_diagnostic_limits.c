@@ -28,7 +28,7 @@ static int crowded(eits_context *ctx, const eits_touch *touches, uint32_t count)
     const eits_fit fit = eits_fit_none(ctx, &ctx->scratch); /* the residual is what a test wrote */
     ctx->info.unexplained = fit.total > 0 ? eits_fit_left(ctx, &fit) / fit.total : 0;
     eits_check_crowd(ctx, touches, count);
-    return (eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_CROWDED) != 0;
+    return (ctx->info.diagnostics & EITS_DIAGNOSTIC_CROWDED) != 0;
 }
 
 /* The score of crowded.c, in double, from its features. */
@@ -63,7 +63,7 @@ TEST(crowds_on_both_sides_of_the_limit)
     eits_touch t[4] = {{.radius_mm = 9, .explained = 1},
                        {.x_mm = 18, .y_mm = 24, .radius_mm = 9, .explained = R(0.04)}};
     said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.01, 2, 2), 0);
-    CHECK_NEAR(eits_get_info(ctx)->unexplained, 0.01, 1e-6);
+    CHECK_NEAR(ctx->info.unexplained, 0.01, 1e-6);
     t[1].x_mm = 12, t[1].y_mm = 16; /* nearer */
     said_as(ctx, t, 2, score_of(2, 8, 20.0 / 18, 1, 0.01, 2, 2), 1);
     t[1].x_mm = 0, t[1].y_mm = 30; /* no matter which way */
@@ -143,8 +143,7 @@ TEST(stale_references_on_both_sides_of_the_limit)
         ctx->info.lambda_noise = (eits_real)CASES[k].noise;
         ctx->info.diagnostics = 0;
         eits_check_stale_reference(ctx, ctx->solver.gradient);
-        CHECK_EQUAL(eits_get_info(ctx)->diagnostics,
-                    CASES[k].stale ? EITS_DIAGNOSTIC_STALE_REFERENCE : 0);
+        CHECK_EQUAL(ctx->info.diagnostics, CASES[k].stale ? EITS_DIAGNOSTIC_STALE_REFERENCE : 0);
     }
 }
 
@@ -178,23 +177,21 @@ TEST(mismatches_on_both_sides_of_the_limits)
         CHECK_NEAR(ctx->range.shrink[i], s2 / (s2 + 1e-4) * inverse, 1e-4 * inverse);
         CHECK_NEAR(ctx->range.inverse[i], inverse, 1e-5);
     }
-    CHECK(!model_mismatch(ctx, 0.5) &&
-          eits_get_info(ctx)->model_mismatch == 0); /* the noise is not known */
+    CHECK(!model_mismatch(ctx, 0.5) && ctx->info.model_mismatch == 0); /* the noise is not known */
     ctx->reference.noise_v = R(1e-4);
     CHECK(model_mismatch(ctx, 0.06));
-    CHECK_NEAR(eits_get_info(ctx)->model_mismatch, 0.06, 2e-4);
+    CHECK_NEAR(ctx->info.model_mismatch, 0.06, 2e-4);
     CHECK(!model_mismatch(ctx, 0.045));
-    CHECK_NEAR(eits_get_info(ctx)->model_mismatch, 0.045, 2e-4);
+    CHECK_NEAR(ctx->info.model_mismatch, 0.045, 2e-4);
     /* of |d|^2 = (1 + off^2) 21/2; noise leaves 8 times noise_v^2 outside */
     const double off = 0.4, outside = off * off * SMALL_FOLDED / 2.0;
     ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 8.5));
     CHECK(!model_mismatch(ctx, off));
-    CHECK_NEAR(eits_get_info(ctx)->model_mismatch, sqrt(off * off * 7.5 / 8.5 / (1 + off * off)),
-               1e-3);
+    CHECK_NEAR(ctx->info.model_mismatch, sqrt(off * off * 7.5 / 8.5 / (1 + off * off)), 1e-3);
     ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 9.5));
     CHECK(model_mismatch(ctx, off));
     ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 0.9));
-    CHECK(!model_mismatch(ctx, off) && eits_get_info(ctx)->model_mismatch == 0);
+    CHECK(!model_mismatch(ctx, off) && ctx->info.model_mismatch == 0);
 }
 
 /* Two norms of the folds' data and one of the reduced: where the gain is not ignored nothing is
@@ -347,7 +344,7 @@ TEST(noise_of_any_size)
     CHANGE_OPTIONS(ctx, o.lambda_rel = R(1e-3), o.lambda_noise_factor = R(0.5),
                    o.detection_factor = 0);
     CHECK_OK(eits_solve(ctx, NULL));
-    CHECK(eits_get_info(ctx)->lambda == R(0.125) && eits_get_info(ctx)->lambda_noise == R(0.25));
+    CHECK(ctx->info.lambda == R(0.125) && ctx->info.lambda_noise == R(0.25));
 }
 
 RUN_TESTS("diagnostic limits", dense_bench_close(&b))

@@ -197,13 +197,12 @@ TEST(until_nothing_is_left)
             for (int j = 0; j < N; ++j)
                 CHECK(eits_is_finite(image[j]));
             const uint32_t left = SMALL_FOLDED - 1 - k;
-            CHECK(eits_is_finite(eits_get_info(ctx)->data_norm) && eits_get_info(ctx)->gap >= 0);
-            CHECK((eits_get_info(ctx)->data_norm > 0) == (left > (uint32_t)project));
+            CHECK(eits_is_finite(ctx->info.data_norm) && ctx->info.gap >= 0);
+            CHECK((ctx->info.data_norm > 0) == (left > (uint32_t)project));
             if (left <= (uint32_t)project)
-                CHECK(eits_get_info(ctx)->stop == EITS_STOP_ZERO &&
-                      eits_get_info(ctx)->nonzeros == 0 && count == 0);
-            norm = k == 0 ? eits_get_info(ctx)->data_norm : norm;
-            CHECK(eits_get_info(ctx)->data_norm < 4 * norm); /* 1 / sqrt(MIN_FRACTION), and some */
+                CHECK(ctx->info.stop == EITS_STOP_ZERO && ctx->info.nonzeros == 0 && count == 0);
+            norm = k == 0 ? ctx->info.data_norm : norm;
+            CHECK(ctx->info.data_norm < 4 * norm); /* 1 / sqrt(MIN_FRACTION), and some */
             eits_context *other = set_up(&fresh, WHITENED, project);
             CHECK_OK(eits_use_portable_kernels(other, 1));
             CHECK_OK(eits_reconstruct(other, b.frame, SMALL_ROWS, NULL, NULL));
@@ -229,9 +228,7 @@ TEST(rows_out_do_not_count)
             b.frame[fold.first] = round ? R(1e6) : R(-2);
             b.frame[fold.second == EITS_FOLD_NONE ? fold.first : fold.second] =
                 round ? R(3) : R(-1e-9);
-            CHECK_OK(eits_mask_row(ctx, fold.first, 1));
-            if (fold.second != EITS_FOLD_NONE)
-                CHECK_OK(eits_mask_row(ctx, fold.second, 1));
+            mask_fold(ctx, k);
         }
         (void)stage(&b);
         memcpy(seen[round], ctx->frame.y, sizeof seen[round]);

@@ -6,7 +6,7 @@ static const small_spec SPEC = {.rank = 6, .side = 4};
 
 static void finite_touches(const eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
-    CHECK(count <= EITS_MAX_TOUCHES && count == eits_get_info(ctx)->touches);
+    CHECK(count <= EITS_MAX_TOUCHES && count == ctx->info.touches);
     for (uint32_t k = 0; k < count; ++k)
         CHECK(isfinite(touches[k].x_mm) && isfinite(touches[k].y_mm) &&
               isfinite(touches[k].radius_mm) && isfinite(touches[k].strength_s_per_m_mm2) &&
@@ -123,10 +123,10 @@ TEST(data_too_small_to_square_give_zero)
         for (uint32_t i = 0; i < SPEC.rank; ++i)
             c.ctx->frame.y[i] *= (eits_real)BOTH_WIDTHS(1e-24, 1e-165);
         CHECK_OK(eits_solve(c.ctx, NULL));
-        CHECK_EQUAL(eits_get_info(c.ctx)->stop, EITS_STOP_ZERO);
-        CHECK(eits_get_info(c.ctx)->lambda_max > eits_get_info(c.ctx)->lambda);
-        CHECK(eits_get_info(c.ctx)->residual <= eits_get_info(c.ctx)->data_norm &&
-              eits_get_info(c.ctx)->gap == 0 && eits_get_info(c.ctx)->nonzeros == 0);
+        CHECK_EQUAL(c.ctx->info.stop, EITS_STOP_ZERO);
+        CHECK(c.ctx->info.lambda_max > c.ctx->info.lambda);
+        CHECK(c.ctx->info.residual <= c.ctx->info.data_norm && c.ctx->info.gap == 0 &&
+              c.ctx->info.nonzeros == 0);
         for (uint32_t j = 0; j < 16; ++j)
             CHECK(eits_get_image(c.ctx)[j] == 0);
     }

@@ -8,8 +8,8 @@ TEST(a_clean_frame_has_no_diagnostics)
     for (int known = 0; known < 2; ++known) {
         eits_context *ctx = set_up(&b, known);
         reconstruct(&b);
-        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
-        CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+        CHECK_EQUAL(ctx->info.diagnostics, 0);
+        CHECK_EQUAL(ctx->info.masked, 0);
         CHECK(ctx->reference.outliers == 0 && (ctx->reference.noise_v > 0) == known);
     }
 }
@@ -26,17 +26,17 @@ TEST(one_outlier_is_left_out)
             b.frame[fold.first] *= R(1.3);
             reconstruct(&b);
             if (fold.second == EITS_FOLD_NONE) {
-                CHECK_EQUAL(eits_get_info(ctx)->outliers, 0);
+                CHECK_EQUAL(ctx->info.outliers, 0);
             } else {
-                CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
-                CHECK_EQUAL(eits_get_info(ctx)->outliers, 2);
-                CHECK_EQUAL(eits_get_info(ctx)->masked, 2);
+                CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+                CHECK_EQUAL(ctx->info.outliers, 2);
+                CHECK_EQUAL(ctx->info.masked, 2);
                 CHECK(ctx->rows.unusable[fold.first] == EITS_ROW_OUTLIER &&
                       ctx->rows.unusable[fold.second] == EITS_ROW_OUTLIER);
             }
             look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_OUTLIER);
             reconstruct(&b);
-            CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+            CHECK_EQUAL(ctx->info.masked, 0);
         }
     }
 }
@@ -52,20 +52,19 @@ TEST(many_outliers)
         b.frame[i] *= row_uses(ctx, i, 5) ? R(1.2) : R(1);
     }
     reconstruct(&b);
-    CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_ELECTRODE_NOISY);
-    CHECK_EQUAL(eits_get_info(ctx)->noisy_electrodes, 1u << 5);
+    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_ELECTRODE_NOISY);
+    CHECK_EQUAL(ctx->info.noisy_electrodes, 1u << 5);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         CHECK_EQUAL(ctx->rows.unusable[i], row_uses(ctx, i, 5) ? EITS_ROW_NOISY : 0);
     look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_NOISY);
     reconstruct(&b);
-    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+    CHECK_EQUAL(ctx->info.masked, 0);
     memcpy(b.frame, b.untouched[0], sizeof b.frame);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
         b.frame[b.c.model.fold[k].first] *= k % 2 == 0 ? R(1.2) : R(0.9);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
     reconstruct(&b);
-    CHECK((eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0 &&
-          eits_get_info(ctx)->masked == 0);
+    CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0 && ctx->info.masked == 0);
 }
 
 /* One reading of any of the reference frames: left out, and the reference is as without it. */

@@ -154,7 +154,7 @@ static void look_for(eits_context *ctx, uint32_t diagnostics, uint32_t max_maske
 static uint32_t reconstruct(bench *b)
 {
     CHECK_OK(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
-    return eits_get_info(b->c.ctx)->diagnostics &
+    return b->c.ctx->info.diagnostics &
            ~(uint32_t)(EITS_DIAGNOSTIC_CROWDED | EITS_DIAGNOSTIC_STALE_REFERENCE);
 }
 
@@ -174,8 +174,8 @@ TEST(clean_half_scans)
         for (int k = 0; k < 40; ++k) {
             clean_frame(&b, k % 2 ? 0.15 : 0.001);
             CHECK_EQUAL(reconstruct(&b), 0);
-            CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
-            CHECK(eits_get_info(ctx)->model_mismatch < EITS_MISMATCH_FRACTION || k % 2 == 0);
+            CHECK_EQUAL(ctx->info.masked, 0);
+            CHECK(ctx->info.model_mismatch < EITS_MISMATCH_FRACTION || k % 2 == 0);
         }
     }
 }
@@ -193,30 +193,27 @@ TEST(one_outlier_of_a_half_scan)
         spoil(&b, k, 0.6);
         const uint32_t found = reconstruct(&b);
         if (k == 15 || k == 18) { /* what no other says anything about may be so */
-            CHECK(found == 0 && eits_get_info(ctx)->masked == 0);
+            CHECK(found == 0 && ctx->info.masked == 0);
             continue;
         }
         CHECK_EQUAL(found, EITS_DIAGNOSTIC_OUTLIER);
-        CHECK_EQUAL(eits_get_info(ctx)->outliers, rows);
-        CHECK_EQUAL(eits_get_info(ctx)->masked, rows);
-        CHECK(eits_get_info(ctx)->model_mismatch == 0 &&
-              ctx->rows.unusable[fold.first] == EITS_ROW_OUTLIER);
+        CHECK_EQUAL(ctx->info.outliers, rows);
+        CHECK_EQUAL(ctx->info.masked, rows);
+        CHECK(ctx->info.model_mismatch == 0 && ctx->rows.unusable[fold.first] == EITS_ROW_OUTLIER);
         memcpy(data, ctx->frame.y, sizeof data);
         look_for(ctx, EITS_DIAGNOSTICS_ALL, rows - 1);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
-        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
-        CHECK_EQUAL(eits_get_info(ctx)->outliers, rows);
+        CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+        CHECK_EQUAL(ctx->info.outliers, rows);
         look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-        CHECK(eits_get_info(ctx)->model_mismatch > EITS_MISMATCH_FRACTION &&
-              eits_get_info(ctx)->model_mismatch <= 1 && eits_get_info(ctx)->masked == 0);
+        CHECK(ctx->info.model_mismatch > EITS_MISMATCH_FRACTION && ctx->info.model_mismatch <= 1 &&
+              ctx->info.masked == 0);
         look_for(ctx, 0, SMALL_ROWS);
         CHECK_EQUAL(reconstruct(&b), 0);
-        CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+        CHECK_EQUAL(ctx->info.masked, 0);
         look_for(ctx, EITS_DIAGNOSTICS_ALL, SMALL_ROWS);
-        CHECK_OK(eits_mask_row(ctx, fold.first, 1));
-        if (fold.second != EITS_FOLD_NONE)
-            CHECK_OK(eits_mask_row(ctx, fold.second, 1));
+        mask_fold(ctx, k);
         CHECK_EQUAL(reconstruct(&b), 0);
         CHECK(memcmp(data, ctx->frame.y, sizeof data) == 0);
     }
@@ -231,37 +228,37 @@ TEST(mismatches_that_are_no_outlier)
     for (uint32_t k = 0; k < 9; k += 3)
         spoil(&b, k, 0.6);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK(eits_get_info(ctx)->masked == 0 && eits_get_info(ctx)->outliers == 0);
+    CHECK(ctx->info.masked == 0 && ctx->info.outliers == 0);
     clean_frame(&b, 0.15); /* noise all over: nothing stands out of it */
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
         spoil(&b, k, 0.05 * small_random(&b.state));
     spoil(&b, 4, 0.4);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+    CHECK_EQUAL(ctx->info.masked, 0);
     clean_frame(&b, 0.02); /* a lesser one beside it does not matter */
     spoil(&b, 0, 0.6);
     spoil(&b, 3, 0.36);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
-    CHECK(eits_get_info(ctx)->outliers == 2 &&
+    CHECK(ctx->info.outliers == 2 &&
           ctx->rows.unusable[b.c.model.fold[0].first] == EITS_ROW_OUTLIER);
     clean_frame(&b, 0.02); /* a fold that none determines is not blamed, however large */
     spoil(&b, 18, 6);
     for (uint32_t k = 0; k < 9; k += 3)
         spoil(&b, k, 0.3);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+    CHECK_EQUAL(ctx->info.masked, 0);
     clean_frame(&b, 0.02); /* rows that have turned, though one stands out */
     spoil(&b, 0, -7);
     spoil(&b, 3, -1.1);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+    CHECK_EQUAL(ctx->info.masked, 0);
     ctx = set_up(&b, 0);
     clean_frame(&b, 0.15);
     const eits_fold fold = b.c.model.fold[5];
     b.frame[fold.first] += R(0.6);
     b.frame[fold.second] += (eits_real)fold.sign * R(0.6);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+    CHECK_EQUAL(ctx->info.masked, 0);
 }
 
 /* How far the gain drifted is no news; an outlier beside it is. */
@@ -287,7 +284,7 @@ TEST(drift_is_no_mismatch)
         for (int i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] += R(0.2) * b.reference[i];
         CHECK_EQUAL(reconstruct(&b), project ? 0 : EITS_DIAGNOSTIC_MODEL_MISMATCH);
-        CHECK((eits_get_info(ctx)->model_mismatch < R(0.01)) == project);
+        CHECK((ctx->info.model_mismatch < R(0.01)) == project);
         const eits_fold fold = b.c.model.fold[7];
         b.frame[fold.first] += R(0.05);
         b.frame[fold.second] += (eits_real)fold.sign * R(0.05);
@@ -310,7 +307,7 @@ TEST(the_wrong_side_goes)
                 CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
                 CHECK_EQUAL(ctx->rows.unusable[wrong], EITS_ROW_OUTLIER);
                 CHECK_EQUAL(ctx->rows.unusable[right], block_of(k) < BLOCKS ? 0 : EITS_ROW_OUTLIER);
-                CHECK_EQUAL(eits_get_info(ctx)->outliers, block_of(k) < BLOCKS ? 1 : 2);
+                CHECK_EQUAL(ctx->info.outliers, block_of(k) < BLOCKS ? 1 : 2);
             }
         }
     }
@@ -330,7 +327,7 @@ TEST(several_wrong_sides)
             b.frame[l % 3 ? fold.first : fold.second] *= (eits_real)FACTORS[count % 3][l % 2];
         }
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
-        CHECK_EQUAL(eits_get_info(ctx)->outliers, wrong);
+        CHECK_EQUAL(ctx->info.outliers, wrong);
         for (uint32_t l = 0; l < wrong; ++l) {
             const eits_fold fold = b.c.model.fold[l + l / 2];
             CHECK_EQUAL(ctx->rows.unusable[l % 3 ? fold.first : fold.second], EITS_ROW_OUTLIER);
@@ -340,7 +337,7 @@ TEST(several_wrong_sides)
     CHECK_OK(eits_mask_row(ctx, b.c.model.fold[UNSEEN].first, 1));
     b.frame[b.c.model.fold[2].first] *= R(1.5);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
-    CHECK_EQUAL(eits_get_info(ctx)->outliers, 2);
+    CHECK_EQUAL(ctx->info.outliers, 2);
 }
 
 /* The thresholds, from both sides: noise, the fraction of the largest datum, the fraction of their
@@ -398,14 +395,14 @@ TEST(noisy_channel)
             b.frame[measures_across(ctx, fold.second) ? fold.second : fold.first] *= R(1.3);
         }
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_ELECTRODE_NOISY);
-        CHECK_EQUAL(eits_get_info(ctx)->noisy_electrodes, 3);
+        CHECK_EQUAL(ctx->info.noisy_electrodes, 3);
         uint32_t count = 0;
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
             const int left = crossed ? uses_either(ctx, i) : measures_across(ctx, i);
             CHECK_EQUAL(ctx->rows.unusable[i], left ? EITS_ROW_NOISY : 0);
             count += (uint32_t)left;
         }
-        CHECK(count >= PAIR_FOLDS && eits_get_info(ctx)->masked == count);
+        CHECK(count >= PAIR_FOLDS && ctx->info.masked == count);
     }
 }
 

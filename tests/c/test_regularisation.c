@@ -109,14 +109,14 @@ TEST(only_where_asked_for)
     eits_real plain[N], image[N], raised[N];
     eits_context *ctx = set_up(&b, WHITENED, 1);
     reconstruct(&b, plain);
-    CHECK(eits_get_info(ctx)->regularisation == ctx->whitening.mu);
+    CHECK(ctx->info.regularisation == ctx->whitening.mu);
     CHECK_NEAR(ctx->whitening.mu, SMALL_REGULARISATION, 1e-5);
     const double little[] = {1e-4, SMALL_REGULARISATION / FACTOR,
                              1.009 * SMALL_REGULARISATION / FACTOR};
     for (size_t k = 0; IN_TABLE(k, little); ++k) {
         pretend_noise(ctx, little[k]);
         reconstruct(&b, image);
-        CHECK(!ctx->whitening.form && eits_get_info(ctx)->regularisation == ctx->whitening.mu &&
+        CHECK(!ctx->whitening.form && ctx->info.regularisation == ctx->whitening.mu &&
               memcmp(image, plain, sizeof image) == 0);
     }
     pretend_noise(ctx, 1.012 * SMALL_REGULARISATION / FACTOR);
@@ -125,7 +125,7 @@ TEST(only_where_asked_for)
     CHECK(memcmp(image, plain, sizeof image) != 0);
     pretend_noise(ctx, 0.02);
     reconstruct(&b, raised);
-    CHECK_NEAR(eits_get_info(ctx)->regularisation, 0.1, 1e-5);
+    CHECK_NEAR(ctx->info.regularisation, 0.1, 1e-5);
     choose_factor(ctx, 0);
     reconstruct(&b, image);
     CHECK(memcmp(image, plain, sizeof image) == 0);
@@ -134,7 +134,7 @@ TEST(only_where_asked_for)
     CHECK(memcmp(image, raised, sizeof image) == 0);
     choose_factor(ctx, 1e29);
     reconstruct(&b, image);
-    CHECK(eits_get_info(ctx)->regularisation == R(1.0));
+    CHECK(ctx->info.regularisation == R(1.0));
     eits_context *portable = set_up(&other, WHITENED, 1);
     pretend_noise(portable, 0.02);
     CHECK_OK(eits_use_portable_kernels(portable, 1));
@@ -158,22 +158,21 @@ TEST(models_of_other_forms)
     pretend_noise(ctx, 0.1);
     (void)stage(&b);
     reconstruct(&b, NULL);
-    CHECK(!ctx->whitening.form && eits_get_info(ctx)->regularisation == 0);
+    CHECK(!ctx->whitening.form && ctx->info.regularisation == 0);
     spec.shape =
         SMALL_IDENTITY; /* whitened with no regularisation at all; all directions are alike */
     ctx = set_up(&b, spec, 0);
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
     CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_DIAGONAL);
-    CHECK_NEAR(eits_get_info(ctx)->regularisation, 0.5, 1e-6);
+    CHECK_NEAR(ctx->info.regularisation, 0.5, 1e-6);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->frame.y[i], ctx->frame.d[i], 1e-5);
     /* as of a row of P that is far greater than the others */
     ctx->whitening.row_scale[2] = R(BOTH_WIDTHS(1e-20, 1e-160));
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
-    CHECK(!ctx->whitening.form && ctx->whitening.noise_ratio == 1 &&
-          eits_get_info(ctx)->regularisation == 0);
+    CHECK(!ctx->whitening.form && ctx->whitening.noise_ratio == 1 && ctx->info.regularisation == 0);
 }
 
 /* The reference frames' own noise raises the regularisation for the second half of them already,

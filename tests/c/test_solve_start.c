@@ -6,8 +6,6 @@ static dense_bench b;
 
 enum { SIDE = 8, N = SIDE * SIDE, RANK = 16 };
 
-typedef dense_bench bench;
-
 static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
 static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
 
@@ -51,7 +49,7 @@ TEST(a_halved_step_starts_afresh)
 TEST(a_start_worse_than_zero)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        bench warm = {0}, cold = {0};
+        dense_bench warm = {0}, cold = {0};
         eits_context *ctx = dense_bench_open(&warm, RANDOM, 0),
                      *other = dense_bench_open(&cold, RANDOM, 0);
         small_new_data(ctx, 92);
@@ -62,7 +60,7 @@ TEST(a_start_worse_than_zero)
         o.lambda_rel = R(1e-4);
         o.iterations = 3000;
         set_options(ctx, o);
-        CHECK(solve(ctx).residual < R(0.5) * eits_get_info(ctx)->data_norm);
+        CHECK(solve(ctx).residual < R(0.5) * ctx->info.data_norm);
         o.lambda_rel = R(0.8);
         o.iterations = 3;
         set_options(ctx, o);
@@ -77,14 +75,14 @@ TEST(a_start_worse_than_zero)
 }
 
 /* Frame k of a touch that wanders. */
-static void wandering_frame(const bench *b, uint32_t k, eits_real *frame)
+static void wandering_frame(const dense_bench *b, uint32_t k, eits_real *frame)
 {
     uint64_t state = 93 + k / 2;
     small_reference(&b->c.model, 1, frame);
     vary(frame, frame, 0.05, &state);
 }
 
-static eits_context *open_warm(bench *b, int solver)
+static eits_context *open_warm(dense_bench *b, int solver)
 {
     eits_context *ctx = dense_bench_open(b, WAVES, 0);
     eits_real frame[SMALL_ROWS];
@@ -99,7 +97,7 @@ static eits_context *open_warm(bench *b, int solver)
 TEST(touches_leave_no_trace)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        bench seen = {0}, unseen = {0};
+        dense_bench seen = {0}, unseen = {0};
         eits_context *ctx = open_warm(&seen, solver), *other = open_warm(&unseen, solver);
         for (uint32_t k = 0; k < 12; ++k) {
             eits_real frame[SMALL_ROWS];
@@ -123,7 +121,7 @@ TEST(touches_leave_no_trace)
 TEST(cold_after_nothing)
 {
     for (int why = 0; why < 3; ++why) {
-        bench b = {0}, fresh = {0};
+        dense_bench b = {0}, fresh = {0};
         eits_context *ctx = open_warm(&b, EITS_SOLVER_WORKING_SET),
                      *other = open_warm(&fresh, EITS_SOLVER_WORKING_SET);
         eits_real frame[SMALL_ROWS], nothing[SMALL_ROWS];
@@ -144,10 +142,9 @@ TEST(cold_after_nothing)
         CHECK_OK(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL));
         CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
         CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) == 0);
-        CHECK(eits_get_info(ctx)->iterations == eits_get_info(other)->iterations &&
-              eits_get_info(ctx)->gap == eits_get_info(other)->gap);
+        CHECK(ctx->info.iterations == other->info.iterations && ctx->info.gap == other->info.gap);
         if (why == 0)
-            CHECK_EQUAL(eits_get_info(ctx)->macs, eits_get_info(other)->macs);
+            CHECK_EQUAL(ctx->info.macs, other->info.macs);
         dense_bench_close(&b);
         dense_bench_close(&fresh);
     }
@@ -206,9 +203,9 @@ TEST(steps_that_end_at_zero)
             CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_FISTA, o.lambda_rel = R(0.1),
                            o.detection_factor = 0, o.gap_every = every, o.iterations = 60);
             CHECK_OK(eits_solve(ctx, NULL));
-            CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_ITERATIONS);
-            CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 6);
-            CHECK(eits_get_info(ctx)->step_halvings > 0 && eits_get_info(ctx)->gap_rel < R(1e-3));
+            CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
+            CHECK_EQUAL(ctx->info.nonzeros, 6);
+            CHECK(ctx->info.step_halvings > 0 && ctx->info.gap_rel < R(1e-3));
         }
     }
 }
