@@ -426,6 +426,23 @@ small_model small_model_with_section(const small_model *model, const char *tag, 
     return made;
 }
 
+small_model small_model_with(small_spec spec, const char *tag, const void *section, uint32_t size)
+{
+    small_model bare = small_model_make(spec);
+    const small_model made = small_model_with_section(&bare, tag, section, size);
+    small_model_free(&bare);
+    return made;
+}
+
+eits_status small_model_try(small_model model)
+{
+    eits_model opened;
+    small_model_seal(&model);
+    const eits_status status = eits_model_open(&opened, model.blob, model.size);
+    small_model_free(&model);
+    return status;
+}
+
 void small_model_free(small_model *model)
 {
     free(model->memory);

@@ -60,6 +60,12 @@ void small_model_free(small_model *model);
 small_model small_model_with_section(const small_model *model, const char *tag, const void *section,
                                      uint32_t size);
 
+/* A model of this spec with such a section. */
+small_model small_model_with(small_spec spec, const char *tag, const void *section, uint32_t size);
+
+/* Seals, tries to open and frees it. */
+eits_status small_model_try(small_model model);
+
 /* Columns of S in groups of three that are alike but for `off` of one number each, every seventh
  * zero; `model` has float storage. */
 void small_model_depend(small_model *model, uint32_t pixels, uint32_t rank, double off);

@@ -6,38 +6,30 @@
 enum { SIDE = 8, N = SIDE * SIDE, FRAMES = 5, SHORT = 1, REFUSED = 3 };
 
 typedef struct bench {
-    small_model made;
-    small_context c;
+    dense_bench on;
     eits_real frames[FRAMES][SMALL_ROWS];
 } bench;
 
 static bench b;
 
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 /* Frames of noise on the reference; one has nothing but NaN. */
 static eits_context *set_up(bench *b)
 {
-    tear_down(b);
-    b->made = small_model_make((small_spec){.rank = 12, .side = SIDE, .shape = SMALL_WAVES});
-    small_context_open(&b->c, &b->made, 0);
+    const small_spec spec = {.rank = 12, .side = SIDE, .shape = SMALL_WAVES};
+    eits_context *ctx = dense_bench_open(&b->on, spec, 0);
     uint64_t state = 12;
     eits_real reference[SMALL_ROWS];
-    small_reference(&b->c.model, 1, reference);
-    CHECK_OK(eits_reference_set(b->c.ctx, reference, SMALL_ROWS));
+    small_reference(ctx->model, 1, reference);
+    CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
     for (int k = 0; k < FRAMES; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
             b->frames[k][i] =
                 k == REFUSED ? R(NAN) : reference[i] * (eits_real)(1 + 0.1 * small_random(&state));
     }
-    return b->c.ctx;
+    return ctx;
 }
 
-static void each_as_if_alone(void)
+TEST(each_as_if_alone)
 {
     bench b = {0}, alone = {0};
     eits_context *ctx = set_up(&b), *other = set_up(&alone);
@@ -67,12 +59,12 @@ static void each_as_if_alone(void)
     CHECK(touches_seen >= FRAMES - 1);
     for (int j = 0; j < N; ++j)
         CHECK(images[REFUSED][j] == 0 && coefficients[REFUSED][j] == 0);
-    tear_down(&b);
-    tear_down(&alone);
+    dense_bench_close(&b.on);
+    dense_bench_close(&alone.on);
 }
 
 /* What is not wanted is not looked for; a frame of another length is refused by itself. */
-static void without_outputs(void)
+TEST(without_outputs)
 {
     eits_context *ctx = set_up(&b);
     eits_result results[FRAMES];
@@ -90,10 +82,4 @@ static void without_outputs(void)
     CHECK_REFUSED(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, NULL));
 }
 
-int main(void)
-{
-    each_as_if_alone();
-    without_outputs();
-    tear_down(&b);
-    return checks_report("batch");
-}
+RUN_TESTS("batch", dense_bench_close(&b.on))

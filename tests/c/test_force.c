@@ -26,19 +26,13 @@ static uint32_t section_of(uint8_t *bytes, uint32_t order)
 static eits_status open_with(const uint8_t *bytes, uint32_t size, eits_model *model,
                              small_model *kept)
 {
-    small_model bare = small_model_make(TINY);
-    *kept = small_model_with_section(&bare, "LOAD", bytes, size);
-    small_model_free(&bare);
+    *kept = small_model_with(TINY, "LOAD", bytes, size);
     return eits_model_open(model, kept->blob, kept->size);
 }
 
 static eits_status refused(const uint8_t *bytes, uint32_t size)
 {
-    eits_model model;
-    small_model kept;
-    const eits_status status = open_with(bytes, size, &model, &kept);
-    small_model_free(&kept);
-    return status;
+    return small_model_try(small_model_with(TINY, "LOAD", bytes, size));
 }
 
 static eits_status with_word(uint32_t order, uint32_t at, uint32_t word)
@@ -155,29 +149,26 @@ TEST(touches_have_forces)
 {
     uint8_t bytes[MAX];
     const small_spec spec = {.rank = 24, .side = 12, .shape = SMALL_WAVES};
-    small_model bare = small_model_make(spec),
-                made = small_model_with_section(&bare, "LOAD", bytes, section_of(bytes, 2));
-    small_context c;
+    dense_bench b = {0};
+    eits_context *ctx =
+        dense_bench_take(&b, small_model_with(spec, "LOAD", bytes, section_of(bytes, 2)), 0);
     eits_touch touches[EITS_MAX_TOUCHES];
     eits_real frame[SMALL_ROWS];
     uint32_t count = 0;
-    small_context_open(&c, &made, 0);
-    CHANGE_OPTIONS(c.ctx, o.sign = EITS_SIGN_BOTH, o.detection_factor = 0);
-    small_reference(&c.model, 1, frame);
-    CHECK_OK(eits_reference_set(c.ctx, frame, SMALL_ROWS));
+    CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_BOTH, o.detection_factor = 0);
+    small_reference(ctx->model, 1, frame);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)(1 + 0.05 * sin(1.7 * i));
-    CHECK_OK(eits_reconstruct(c.ctx, frame, SMALL_ROWS, NULL, NULL));
-    CHECK_OK(eits_find_touches(c.ctx, touches, EITS_MAX_TOUCHES, &count));
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
+    CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     CHECK(count > 0);
     for (uint32_t k = 0; k < count; ++k) {
         const eits_touch *t = &touches[k];
         CHECK(t->force_n > 0 &&
-              t->force_n == eits_force_n(&c.model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2));
+              t->force_n == eits_force_n(ctx->model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2));
     }
-    small_context_close(&c);
-    small_model_free(&made);
-    small_model_free(&bare);
+    dense_bench_close(&b);
 }
 
 RUN_TESTS("force")

@@ -460,18 +460,16 @@ TEST(zeros_are_skipped)
 
 TEST(choice_of_kernels)
 {
-    small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
-    small_context c;
-    small_context_open(&c, &made, 0);
-    CHECK(strcmp(eits_kernels_name(c.ctx), eits_kernels_best()->name) == 0);
-    CHECK_OK(eits_use_portable_kernels(c.ctx, 1));
-    CHECK(strcmp(eits_kernels_name(c.ctx), "portable") == 0);
-    CHECK_OK(eits_use_portable_kernels(c.ctx, 0));
-    CHECK(strcmp(eits_kernels_name(c.ctx), eits_kernels_best()->name) == 0);
+    dense_bench b = {0};
+    eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = 3, .side = 3}, 0);
+    CHECK(strcmp(eits_kernels_name(ctx), eits_kernels_best()->name) == 0);
+    CHECK_OK(eits_use_portable_kernels(ctx, 1));
+    CHECK(strcmp(eits_kernels_name(ctx), "portable") == 0);
+    CHECK_OK(eits_use_portable_kernels(ctx, 0));
+    CHECK(strcmp(eits_kernels_name(ctx), eits_kernels_best()->name) == 0);
     CHECK_REFUSED(eits_use_portable_kernels(NULL, 0));
     CHECK(strcmp(eits_kernels_name(NULL), "") == 0);
-    small_context_close(&c);
-    small_model_free(&made);
+    dense_bench_close(&b);
 }
 
 RUN_TESTS("kernels")

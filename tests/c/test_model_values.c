@@ -8,12 +8,8 @@ static const small_spec TINY = {.rank = 3, .side = 3};
 static eits_status with_word(small_spec spec, const char *tag, uint32_t at, uint32_t word)
 {
     small_model made = small_model_make(spec);
-    eits_model model;
     small_put_u32(small_model_section(&made, tag, NULL) + at, word);
-    small_model_seal(&made);
-    const eits_status status = eits_model_open(&model, made.blob, made.size);
-    small_model_free(&made);
-    return status;
+    return small_model_try(made);
 }
 
 static eits_status with_number(small_spec spec, const char *tag, uint32_t at, float number)
@@ -41,14 +37,12 @@ static eits_status with_order(uint32_t i, uint32_t j, uint32_t at, uint32_t valu
     }
     if (at < 2 * ROWS)
         small_put_u16(bytes + 2 * at, value);
-    small_model bare = small_model_make(TINY);
-    small_model made = small_model_with_section(&bare, "ORDR", bytes, size);
+    small_model made = small_model_with(TINY, "ORDR", bytes, size);
     eits_model model;
     const eits_status status = eits_model_open(&model, made.blob, made.size);
     if (status == EITS_OK)
         CHECK(model.scan_order[6] == 16 && model.scan_place[16] == 6);
     small_model_free(&made);
-    small_model_free(&bare);
     return status;
 }
 
@@ -70,14 +64,12 @@ static eits_status with_place_factor(float factor, uint32_t size)
 {
     uint8_t bytes[8] = {0};
     small_put_f32(bytes, factor);
-    small_model bare = small_model_make(TINY);
-    small_model made = small_model_with_section(&bare, "PLAC", bytes, size);
+    small_model made = small_model_with(TINY, "PLAC", bytes, size);
     eits_model model;
     const eits_status status = eits_model_open(&model, made.blob, made.size);
     if (status == EITS_OK)
         CHECK(model.place_factor == factor);
     small_model_free(&made);
-    small_model_free(&bare);
     return status;
 }
 
@@ -119,18 +111,14 @@ TEST(dimensions)
     CHECK_EQUAL(with_word(TINY, "DIMS", 32, EITS_STORAGE_F16), EITS_E_MODEL_SECTION);
     /* no row folded: allowed, but not of this size */
     CHECK_EQUAL(with_word(TINY, "DIMS", 8, 40), EITS_E_MODEL_SECTION);
-    small_model large = small_model_make(TINY);
-    uint8_t *dims = small_model_section(&large, "DIMS", NULL);
-    eits_model model;
-    small_put_u32(dims + 12, 1024); /* the greatest rank */
-    small_put_u32(dims + 16, 1024);
-    small_model_seal(&large);
-    CHECK_EQUAL(eits_model_open(&model, large.blob, large.size), EITS_E_MODEL_SECTION);
-    small_put_u32(dims + 12, 1025);
-    small_put_u32(dims + 16, 1032);
-    small_model_seal(&large);
-    CHECK_EQUAL(eits_model_open(&model, large.blob, large.size), EITS_E_MODEL_VALUE);
-    small_model_free(&large);
+    for (uint32_t rank = 1024; rank <= 1025; ++rank) { /* the greatest, and one more */
+        small_model large = small_model_make(TINY);
+        uint8_t *dims = small_model_section(&large, "DIMS", NULL);
+        small_put_u32(dims + 12, rank);
+        small_put_u32(dims + 16, (rank + 7) / 8 * 8);
+        CHECK_EQUAL(small_model_try(large),
+                    rank == 1024 ? EITS_E_MODEL_SECTION : EITS_E_MODEL_VALUE);
+    }
     /* the rank may be any with this stride */
     CHECK_OK(with_word(TINY, "DIMS", 12, 8));
     CHECK_OK(with_word(TINY, "DIMS", 24, 4096));
@@ -149,36 +137,28 @@ TEST(numbers_of_the_dimensions)
     }
 }
 
-/* Open with another row of the protocol, its hash right. */
-static eits_status with_protocol_row(uint32_t row, uint32_t electrodes)
+/* Open with rows `from` to before `to` of the protocol on these electrodes of so many, its hash
+ * right. */
+static eits_status with_rows(uint32_t count, uint32_t from, uint32_t to, uint32_t electrodes)
 {
     small_model made = small_model_make(TINY);
-    eits_model model;
     uint8_t *table = small_model_section(&made, "PROT", NULL);
-    small_put_u32(table + 4 * row, electrodes);
-    const uint64_t hash = eits_protocol_hash(SMALL_ELECTRODES, SMALL_ROWS, table);
-    memcpy(made.blob + 24, &hash, sizeof hash);
-    small_model_seal(&made);
-    const eits_status status = eits_model_open(&model, made.blob, made.size);
-    small_model_free(&made);
-    return status;
-}
-
-/* Open with each row of the protocol on the first four of so many electrodes. */
-static eits_status with_electrodes(uint32_t count)
-{
-    small_model made = small_model_make(TINY);
-    eits_model model;
-    uint8_t *table = small_model_section(&made, "PROT", NULL);
-    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-        small_put_u32(table + 4 * i, 0x03020100u);
+    for (uint32_t i = from; i < to; ++i)
+        small_put_u32(table + 4 * i, electrodes);
+    small_put_u32(small_model_section(&made, "DIMS", NULL), count);
     const uint64_t hash = eits_protocol_hash(count, SMALL_ROWS, table);
     memcpy(made.blob + 24, &hash, sizeof hash);
-    small_put_u32(small_model_section(&made, "DIMS", NULL), count);
-    small_model_seal(&made);
-    const eits_status status = eits_model_open(&model, made.blob, made.size);
-    small_model_free(&made);
-    return status;
+    return small_model_try(made);
+}
+
+static eits_status with_protocol_row(uint32_t row, uint32_t electrodes)
+{
+    return with_rows(SMALL_ELECTRODES, row, row + 1, electrodes);
+}
+
+static eits_status with_electrodes(uint32_t count)
+{
+    return with_rows(count, 0, SMALL_ROWS, 0x03020100u);
 }
 
 TEST(electrodes_folds_and_pixels)
@@ -199,30 +179,29 @@ TEST(electrodes_folds_and_pixels)
     CHECK_OK(with_protocol_row(39, 0x07060504u));
     /* the hash is another */
     CHECK_EQUAL(with_word(TINY, "PROT", 4 * 39, 0x07060504u), EITS_E_MODEL_VALUE);
-    /* first row 40 of 40 */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 0, 40u | 1u << 16), EITS_E_MODEL_VALUE);
-    /* no first row */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 8 * 20, 0xFFFFFFFFu), EITS_E_MODEL_VALUE);
-    /* second row 40 */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 0, 0u | 40u << 16), EITS_E_MODEL_VALUE);
-    /* no second row */
-    CHECK_OK(with_word(TINY, "FOLD", 0, 0u | 0xFFFFu << 16));
-    CHECK_OK(with_word(TINY, "FOLD", 4, 0xFFFFu)); /* sign -1 */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 4, 0), EITS_E_MODEL_VALUE);
-    CHECK_EQUAL(with_word(TINY, "FOLD", 8 * 20 + 4, 2), EITS_E_MODEL_VALUE);
-    CHECK_EQUAL(with_word(TINY, "FOLD", 4, 0xFFFEu), EITS_E_MODEL_VALUE);
-    /* column 3 of 3 */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 3u | 2u << 16), EITS_E_MODEL_VALUE);
-    /* row 3 of 3 */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 2u | 3u << 16), EITS_E_MODEL_VALUE);
-    /* the pixel before again */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 1u | 2u << 16), EITS_E_MODEL_VALUE);
-    /* not by column */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 0u | 2u << 16), EITS_E_MODEL_VALUE);
-    /* not by row */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 2u | 1u << 16), EITS_E_MODEL_VALUE);
-    /* the next one's place */
-    CHECK_EQUAL(with_word(TINY, "GRID", 0, 1u), EITS_E_MODEL_VALUE);
+    static const struct {
+        const char *name, *tag;
+        uint32_t at, word, right;
+    } cases[] = {{"first row 40 of 40", "FOLD", 0, 40u | 1u << 16, 0},
+                 {"no first row", "FOLD", 8 * 20, 0xFFFFFFFFu, 0},
+                 {"second row 40", "FOLD", 0, 40u << 16, 0},
+                 {"no second row", "FOLD", 0, 0xFFFFu << 16, 1},
+                 {"sign -1", "FOLD", 4, 0xFFFFu, 1},
+                 {"sign 0", "FOLD", 4, 0, 0},
+                 {"sign 2", "FOLD", 8 * 20 + 4, 2, 0},
+                 {"sign -2", "FOLD", 4, 0xFFFEu, 0},
+                 {"column 3 of 3", "GRID", 4 * 8, 3u | 2u << 16, 0},
+                 {"row 3 of 3", "GRID", 4 * 8, 2u | 3u << 16, 0},
+                 {"the pixel before again", "GRID", 4 * 8, 1u | 2u << 16, 0},
+                 {"not by column", "GRID", 4 * 8, 2u << 16, 0},
+                 {"not by row", "GRID", 4 * 8, 2u | 1u << 16, 0},
+                 {"the next one's place", "GRID", 0, 1u, 0}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
+        CHECK_EQUAL(with_word(TINY, cases[k].tag, cases[k].at, cases[k].word),
+                    cases[k].right ? EITS_OK : EITS_E_MODEL_VALUE);
+    }
+    CASE("");
     const small_spec single = {.rank = 1, .side = 1};
     CHECK_OK(with_word(single, "GRID", 0, 0));
     CHECK_EQUAL(with_word(single, "GRID", 0, 1), EITS_E_MODEL_VALUE); /* the only pixel outside */
@@ -258,7 +237,7 @@ TEST(not_finite_in_each_section)
 
 /* Section FLDS: of one size, its numbers finite and not negative, each half finite, the padding of
  * columns too. */
-static void fields(void)
+TEST(fields)
 {
     const small_spec spec = {.rank = 3, .side = 3, .fields = 1};
     static const float wrong[] = {-1.0f, NAN, INFINITY, -INFINITY, 1.1e30f},
@@ -298,7 +277,7 @@ static void fields(void)
     small_model_free(&made);
 }
 
-static void defaults(void)
+TEST(defaults)
 {
     static const struct {
         uint32_t at;
@@ -434,10 +413,4 @@ TEST(many_bytes_changed_and_sealed)
     }
 }
 
-int main(void)
-{
-    run_tests();
-    fields();
-    defaults();
-    return checks_report("model_values");
-}
+RUN_TESTS("model_values")

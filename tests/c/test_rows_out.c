@@ -36,14 +36,10 @@ static small_model with_precision(small_spec spec, int taught, const uint8_t *by
 
 static eits_status opened(int taught, const uint8_t *bytes, uint32_t size)
 {
-    small_model made = with_precision(taught ? TAUGHT : WHITENED, taught, bytes, size);
-    eits_model model;
-    const eits_status status = eits_model_open(&model, made.blob, made.size);
-    small_model_free(&made);
-    return status;
+    return small_model_try(with_precision(taught ? TAUGHT : WHITENED, taught, bytes, size));
 }
 
-static void what_is_no_precision_is_refused(void)
+TEST(what_is_no_precision_is_refused)
 {
     uint8_t bytes[SIZE + 4];
     section_of(bytes, 0.5f);
@@ -59,7 +55,7 @@ static void what_is_no_precision_is_refused(void)
 }
 
 /* Of 21 folds 16 directions are made: five may be filled in, of six all would be a guess. */
-static void as_many_are_filled_in_as_are_spare(void)
+TEST(as_many_are_filled_in_as_are_spare)
 {
     enum { MANY = 16 };
     uint8_t bytes[SIZE + 4];
@@ -112,13 +108,12 @@ static void solved(float leaning, float pivot, eits_real wanted_scale, eits_whit
     small_model_free(&made);
 }
 
-int main(void)
+TEST(a_row_leans_on_others_by_its_precision)
 {
-    what_is_no_precision_is_refused();
-    as_many_are_filled_in_as_are_spare();
     /* d_0 = -.5 / 2 d_OTHER, F_00 = sqrt(1 - 1 / 2), y = d_0 / F_00 */
     solved(0.5f, 2.0f, (eits_real)(-0.25 / sqrt(0.5)), EITS_WHITENING_TRIANGLE);
     /* a precision of nothing cannot be divided by: the row is projected out, as without PREC */
     solved(0.5f, 0.0f, 0, EITS_WHITENING_STORED);
-    return checks_report("rows out");
 }
+
+RUN_TESTS("rows out")
