@@ -222,7 +222,7 @@ TEST(masked_and_forgotten)
 TEST(small_rows)
 {
     eits_context *ctx = set_up(&b, 0);
-    const eits_fold fold = b.c.model.fold[4];
+    const eits_fold fold = b.on.c.model.fold[4];
     b.frame[fold.first] = R(0.01), b.frame[fold.second] = (eits_real)fold.sign * R(0.01);
     CHECK_OK(eits_reference_set(ctx, b.frame, SMALL_ROWS));
     for (int grown = 0; grown < 2; ++grown) {
@@ -257,4 +257,4 @@ TEST(impossible_rows)
     CHECK_EQUAL(ctx->info.masked, 0);
 }
 
-RUN_TESTS("electrodes", tear_down(&b))
+RUN_TESTS("electrodes", dense_bench_close(&b.on))

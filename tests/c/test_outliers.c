@@ -21,7 +21,7 @@ TEST(one_outlier_is_left_out)
     for (int known = 0; known < 2; ++known) {
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
             eits_context *ctx = set_up(&b, known);
-            const eits_fold fold = b.c.model.fold[k];
+            const eits_fold fold = b.on.c.model.fold[k];
             CHECK(!ctx->range.known);
             b.frame[fold.first] *= R(1.3);
             reconstruct(&b);
@@ -48,7 +48,7 @@ TEST(many_outliers)
     eits_context *ctx = set_up(&b, 1);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
-        const uint32_t i = b.c.model.fold[k].first;
+        const uint32_t i = b.on.c.model.fold[k].first;
         b.frame[i] *= row_uses(ctx, i, 5) ? R(1.2) : R(1);
     }
     reconstruct(&b);
@@ -61,7 +61,7 @@ TEST(many_outliers)
     CHECK_EQUAL(ctx->info.masked, 0);
     memcpy(b.frame, b.untouched[0], sizeof b.frame);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
-        b.frame[b.c.model.fold[k].first] *= k % 2 == 0 ? R(1.2) : R(0.9);
+        b.frame[b.on.c.model.fold[k].first] *= k % 2 == 0 ? R(1.2) : R(0.9);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
     reconstruct(&b);
     CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0 && ctx->info.masked == 0);
@@ -73,7 +73,7 @@ TEST(an_outlier_in_the_reference)
     for (int at = 0; at < UNTOUCHED; ++at) {
         eits_context *ctx = set_up(&b, 1);
         const eits_real noise = ctx->reference.noise_v, lambda_noise = ctx->reference.lambda_noise;
-        const uint32_t row = at % 3 ? b.c.model.fold[at].second : b.c.model.fold[at].first;
+        const uint32_t row = at % 3 ? b.on.c.model.fold[at].second : b.on.c.model.fold[at].first;
         b.untouched[at][row] += R(0.5);
         CHECK_OK(eits_reference_begin(ctx, UNTOUCHED));
         for (int k = 0; k < UNTOUCHED; ++k) {
@@ -98,8 +98,8 @@ TEST(an_outlier_in_the_reference)
 TEST(an_outlier_beside_an_unused_row)
 {
     eits_context *ctx = set_up(&b, 0);
-    const uint32_t unused = b.c.model.fold[1].first;
-    b.untouched[4][b.c.model.fold[3].first] += R(0.5);
+    const uint32_t unused = b.on.c.model.fold[1].first;
+    b.untouched[4][b.on.c.model.fold[3].first] += R(0.5);
     CHECK_OK(eits_mask_row(ctx, unused, 1));
     CHECK_OK(eits_reference_begin(ctx, UNTOUCHED));
     for (int k = 0; k < UNTOUCHED; ++k) {
@@ -118,7 +118,7 @@ TEST(reference_frame_of_another_kind)
 {
     eits_context *ctx = set_up(&b, 1);
     for (uint32_t count = 1; count <= EITS_OUTLIER_MAX + 1; ++count) {
-        b.untouched[5][b.c.model.fold[count].first] += R(0.5);
+        b.untouched[5][b.on.c.model.fold[count].first] += R(0.5);
         LEARN(ctx, UNTOUCHED, b.untouched);
         CHECK_EQUAL(ctx->reference.outliers, count <= EITS_OUTLIER_MAX ? count : 0);
         CHECK((ctx->reference.noise_v < R(2e-3)) == (count <= EITS_OUTLIER_MAX));
@@ -161,4 +161,4 @@ TEST(options_and_names)
     CHECK(strcmp(eits_diagnostic_text((eits_diagnostic)0), "unknown diagnostic") == 0);
 }
 
-RUN_TESTS("diagnostics", tear_down(&b))
+RUN_TESTS("diagnostics", dense_bench_close(&b.on))

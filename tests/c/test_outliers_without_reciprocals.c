@@ -26,20 +26,13 @@ static uint32_t block_of(uint32_t k)
 }
 
 typedef struct bench {
-    small_model made;
-    small_context c;
+    dense_bench on;
     eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
     uint64_t state;
     int half; /* second rows are copies */
 } bench;
 
 static bench b;
-
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
 
 static void shape_reduction(small_model *made)
 {
@@ -51,7 +44,6 @@ static void shape_reduction(small_model *made)
                           block_of(k) == i ? (float)(i < BLOCKS ? weight / sqrt(3) : weight)
                                            : 0.0f);
     }
-    small_model_seal(made);
 }
 
 /* The first folds all drive across the pair (0, 1) and measure across another, or the other way
@@ -73,13 +65,12 @@ static void shape_protocol(small_model *made, int crossed)
     }
     const uint64_t hash = eits_protocol_hash(SMALL_ELECTRODES, SMALL_ROWS, rows);
     memcpy(made->blob + 24, &hash, sizeof hash);
-    small_model_seal(made);
 }
 
 static void copy_halves(const bench *b, eits_real *frame)
 {
     for (uint32_t k = 0; k < SMALL_PAIRS && b->half; ++k) {
-        const eits_fold fold = b->c.model.fold[k];
+        const eits_fold fold = b->on.c.model.fold[k];
         frame[fold.second] = (eits_real)fold.sign * frame[fold.first];
     }
 }
@@ -98,7 +89,7 @@ static void clean_frame(bench *b, double size)
     for (uint32_t i = 0; i <= RANK; ++i)
         change[i] = i < RANK ? size * small_random(&b->state) : 0;
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
-        const eits_fold fold = b->c.model.fold[k];
+        const eits_fold fold = b->on.c.model.fold[k];
         b->frame[fold.first] = b->reference[fold.first] + (eits_real)change[block_of(k)];
         if (fold.second != EITS_FOLD_NONE)
             b->frame[fold.second] =
@@ -111,19 +102,16 @@ enum { PLAIN, PAIR, CROSSED };
 
 static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kind kind)
 {
-    tear_down(b);
-    memset(b, 0, sizeof *b);
-    b->made = small_model_make(
+    small_model made = small_model_make(
         (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind});
-    shape_reduction(&b->made);
+    shape_reduction(&made);
     if (protocol != PLAIN)
-        shape_protocol(&b->made, protocol == CROSSED);
-    small_context_open(&b->c, &b->made, 0);
-    eits_context *ctx = b->c.ctx;
+        shape_protocol(&made, protocol == CROSSED);
+    eits_context *ctx = dense_bench_take(&b->on, made, 0);
     b->state = 7;
     b->half = half;
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
-        const eits_fold fold = b->c.model.fold[k];
+        const eits_fold fold = b->on.c.model.fold[k];
         b->reference[fold.first] = 1;
         if (fold.second != EITS_FOLD_NONE)
             b->reference[fold.second] = (eits_real)fold.sign;
@@ -153,15 +141,15 @@ static void look_for(eits_context *ctx, uint32_t diagnostics, uint32_t max_maske
  */
 static uint32_t reconstruct(bench *b)
 {
-    CHECK_OK(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
-    return b->c.ctx->info.diagnostics &
+    CHECK_OK(eits_reconstruct(b->on.c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
+    return b->on.c.ctx->info.diagnostics &
            ~(uint32_t)(EITS_DIAGNOSTIC_CROWDED | EITS_DIAGNOSTIC_STALE_REFERENCE);
 }
 
 /* Row and copy of fold k are off by `off`. */
 static void spoil(bench *b, uint32_t k, double off)
 {
-    b->frame[b->c.model.fold[k].first] += (eits_real)off;
+    b->frame[b->on.c.model.fold[k].first] += (eits_real)off;
     copy_halves(b, b->frame);
 }
 
@@ -186,7 +174,7 @@ TEST(one_outlier_of_a_half_scan)
 {
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         eits_context *ctx = set_up(&b, 1);
-        const eits_fold fold = b.c.model.fold[k];
+        const eits_fold fold = b.on.c.model.fold[k];
         const uint32_t rows = fold.second == EITS_FOLD_NONE ? 1 : 2;
         eits_real data[RANK];
         clean_frame(&b, 0.15);
@@ -240,7 +228,7 @@ TEST(mismatches_that_are_no_outlier)
     spoil(&b, 3, 0.36);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
     CHECK(ctx->info.outliers == 2 &&
-          ctx->rows.unusable[b.c.model.fold[0].first] == EITS_ROW_OUTLIER);
+          ctx->rows.unusable[b.on.c.model.fold[0].first] == EITS_ROW_OUTLIER);
     clean_frame(&b, 0.02); /* a fold that none determines is not blamed, however large */
     spoil(&b, 18, 6);
     for (uint32_t k = 0; k < 9; k += 3)
@@ -254,7 +242,7 @@ TEST(mismatches_that_are_no_outlier)
     CHECK_EQUAL(ctx->info.masked, 0);
     ctx = set_up(&b, 0);
     clean_frame(&b, 0.15);
-    const eits_fold fold = b.c.model.fold[5];
+    const eits_fold fold = b.on.c.model.fold[5];
     b.frame[fold.first] += R(0.6);
     b.frame[fold.second] += (eits_real)fold.sign * R(0.6);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
@@ -266,7 +254,7 @@ TEST(drift_is_no_mismatch)
 {
     eits_context *ctx = set_up(&b, 0);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) { /* a reference that the model cannot give */
-        const eits_fold fold = b.c.model.fold[k];
+        const eits_fold fold = b.on.c.model.fold[k];
         b.reference[fold.first] *= R(1) + R(0.1) * (eits_real)(k % 3);
         if (fold.second != EITS_FOLD_NONE)
             b.reference[fold.second] *= R(1) + R(0.1) * (eits_real)(k % 3);
@@ -285,7 +273,7 @@ TEST(drift_is_no_mismatch)
             b.frame[i] += R(0.2) * b.reference[i];
         CHECK_EQUAL(reconstruct(&b), project ? 0 : EITS_DIAGNOSTIC_MODEL_MISMATCH);
         CHECK((ctx->info.model_mismatch < R(0.01)) == project);
-        const eits_fold fold = b.c.model.fold[7];
+        const eits_fold fold = b.on.c.model.fold[7];
         b.frame[fold.first] += R(0.05);
         b.frame[fold.second] += (eits_real)fold.sign * R(0.05);
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
@@ -298,7 +286,7 @@ TEST(the_wrong_side_goes)
     for (int kind = 0; kind < 3; ++kind) {
         for (uint32_t k = 0; k < SMALL_PAIRS; ++k) {
             eits_context *ctx = open_shaped(&b, PLAIN, 0, (eits_data_kind)kind);
-            const eits_fold fold = b.c.model.fold[k];
+            const eits_fold fold = b.on.c.model.fold[k];
             for (int side = 0; side < 2; ++side) {
                 const uint32_t wrong = side ? fold.second : fold.first,
                                right = side ? fold.first : fold.second;
@@ -323,19 +311,19 @@ TEST(several_wrong_sides)
         const uint32_t wrong = (count - 1) / 3 + 1;
         clean_frame(&b, 0.15);
         for (uint32_t l = 0; l < wrong; ++l) { /* folds 0, 1, 3, 4, ... */
-            const eits_fold fold = b.c.model.fold[l + l / 2];
+            const eits_fold fold = b.on.c.model.fold[l + l / 2];
             b.frame[l % 3 ? fold.first : fold.second] *= (eits_real)FACTORS[count % 3][l % 2];
         }
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
         CHECK_EQUAL(ctx->info.outliers, wrong);
         for (uint32_t l = 0; l < wrong; ++l) {
-            const eits_fold fold = b.c.model.fold[l + l / 2];
+            const eits_fold fold = b.on.c.model.fold[l + l / 2];
             CHECK_EQUAL(ctx->rows.unusable[l % 3 ? fold.first : fold.second], EITS_ROW_OUTLIER);
         }
     }
     clean_frame(&b, 0.15);
-    CHECK_OK(eits_mask_row(ctx, b.c.model.fold[UNSEEN].first, 1));
-    b.frame[b.c.model.fold[2].first] *= R(1.5);
+    CHECK_OK(eits_mask_row(ctx, b.on.c.model.fold[UNSEEN].first, 1));
+    b.frame[b.on.c.model.fold[2].first] *= R(1.5);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
     CHECK_EQUAL(ctx->info.outliers, 2);
 }
@@ -356,7 +344,7 @@ TEST(what_sides_may_differ_by)
         look_for(ctx, EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);
         memcpy(b.frame, b.reference, sizeof b.frame);
         for (uint32_t k = 0; k < 6; ++k) {
-            const eits_fold fold = b.c.model.fold[k];
+            const eits_fold fold = b.on.c.model.fold[k];
             const eits_real change = (eits_real)(k < 3 ? CASES[n].largest : CASES[n].change);
             b.frame[fold.first] += change;
             b.frame[fold.second] +=
@@ -391,7 +379,7 @@ TEST(noisy_channel)
         eits_context *ctx = open_shaped(&b, crossed ? CROSSED : PAIR, 0, EITS_DATA_DIFFERENCE);
         clean_frame(&b, 0.02);
         for (uint32_t k = 0; k < PAIR_FOLDS; ++k) {
-            const eits_fold fold = b.c.model.fold[k];
+            const eits_fold fold = b.on.c.model.fold[k];
             b.frame[measures_across(ctx, fold.second) ? fold.second : fold.first] *= R(1.3);
         }
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_ELECTRODE_NOISY);
@@ -406,4 +394,4 @@ TEST(noisy_channel)
     }
 }
 
-RUN_TESTS("unpaired", tear_down(&b))
+RUN_TESTS("unpaired", dense_bench_close(&b.on))

@@ -4,11 +4,6 @@
 
 enum { RANK = 12, SIDE = 12, N = SIDE * SIDE, SOLVERS = 4, FRAMES = 24, KEPT_NOISE = 6 };
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-} bench;
-
 static const small_spec SPECS[] = {
     {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES},
     {.rank = RANK, .side = SIDE, .fields = 1},
@@ -43,32 +38,21 @@ static void spoil(eits_context *ctx, eits_real with)
     fill(ctx->range.off_range, folds, room, with);
 }
 
-static eits_context *set_up(bench *b, small_spec spec, int noise_known, eits_solver solver)
+static eits_context *set_up(dense_bench *b, small_spec spec, int noise_known, eits_solver solver)
 {
-    b->made = small_model_make(spec);
-    small_context_open(&b->c, &b->made, 0);
-    eits_context *ctx = b->c.ctx;
+    eits_context *ctx = dense_bench_open(b, spec, 0);
     uint64_t state = 5;
-    eits_real frame[SMALL_ROWS], v[SMALL_ROWS];
+    eits_real frame[SMALL_ROWS], v[KEPT_NOISE][SMALL_ROWS];
     CHANGE_OPTIONS(ctx, o.solver = solver, o.warm_start = 1, o.max_masked = SMALL_ROWS);
     small_reference(&b->c.model, 1, frame);
     if (!noise_known) {
         CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
         return ctx;
     }
-    CHECK_OK(eits_reference_begin(ctx, KEPT_NOISE));
-    for (int k = 0; k < KEPT_NOISE; ++k) {
-        vary(v, frame, 1e-3, &state);
-        CHECK_OK(eits_reference_add(ctx, v, SMALL_ROWS));
-    }
-    CHECK_OK(eits_reference_finish(ctx));
+    for (int k = 0; k < KEPT_NOISE; ++k)
+        vary(v[k], frame, 1e-3, &state);
+    LEARN(ctx, KEPT_NOISE, v);
     return ctx;
-}
-
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
 }
 
 /* A change of 5 %, pairs alike but for 0.1 %; in every other frame a reading that may or may not
@@ -90,12 +74,12 @@ static void make_frame(const eits_model *model, int k, uint64_t *state, eits_rea
         frame[i] = model->protocol[4 * (size_t)i] == k % SMALL_ELECTRODES ? R(NAN) : frame[i];
 }
 
-static void what_lies_in_the_scratch_makes_no_difference(void)
+TEST(what_lies_in_the_scratch_makes_no_difference)
 {
     static const double junk[] = {NAN, 1e30, -1e-30};
     for (size_t spec = 0; IN_TABLE(spec, SPECS); ++spec) {
         for (int way = 0; way < 2 * SOLVERS; ++way) {
-            bench clean, spoilt;
+            dense_bench clean = {0}, spoilt = {0};
             eits_context *ctx = set_up(&clean, SPECS[spec], way % 2, (eits_solver)(way / 2)),
                          *other = set_up(&spoilt, SPECS[spec], way % 2, (eits_solver)(way / 2));
             uint64_t state = 17;
@@ -120,14 +104,10 @@ static void what_lies_in_the_scratch_makes_no_difference(void)
                 for (uint32_t t = 0; t < count[0] && t < count[1]; ++t)
                     CHECK(small_same_touch(&touches[0][t], &touches[1][t]));
             }
-            tear_down(&clean);
-            tear_down(&spoilt);
+            dense_bench_close(&clean);
+            dense_bench_close(&spoilt);
         }
     }
 }
 
-int main(void)
-{
-    what_lies_in_the_scratch_makes_no_difference();
-    return checks_report("scratch");
-}
+RUN_TESTS("scratch")
