@@ -1,6 +1,8 @@
 /* The workspace: its size, its bounds, contexts beside each other; the options; the self-test. */
 #include "steps.h"
 
+static dense_bench b;
+
 /* The size is a constant expression: this compiles only if it is. */
 static uint8_t constant[EITS_WORKSPACE_SIZE(40, 21, 12, 36, 36, 1)];
 
@@ -9,44 +11,38 @@ TEST(sizes_agree)
     static const uint32_t ranks[] = {1, 3, 8, 12, 20}, sides[] = {3, 4, 6, 13};
     CHECK_EQUAL(eits_workspace_size(NULL, 0), 0);
     CHECK_EQUAL(eits_workspace_size(NULL, 1), 0);
-    for (size_t r = 0; r < 5; ++r) {
-        for (size_t s = 0; s < 4; ++s) {
-            for (int round = 0; round < 2; ++round) {
-                small_model made = small_model_make(
-                    (small_spec){.rank = ranks[r], .side = sides[s], .round = round});
-                eits_model m;
-                CHECK_OK(eits_model_open(&m, made.blob, made.size));
-                for (int prepared = 0; prepared < 2; ++prepared) {
-                    const size_t size = eits_workspace_size(&m, prepared);
-                    CHECK_EQUAL(size, EITS_WORKSPACE_SIZE(m.n_rows, m.n_folded, m.rank, m.n_pixels,
-                                                          (size_t)m.nx * m.ny, prepared));
-                    CHECK_EQUAL(size % 16, 0);
-                    void *memory;
-                    eits_context *ctx;
-                    uint8_t *workspace = small_aligned(&memory, size);
-                    CHECK_OK(eits_init(workspace, size, &m, &ctx));
-                    const uint8_t *cache_end =
-                        ctx->columns.wanted + EITS_ALIGN16(EITS_CACHED(m.n_pixels));
-                    const uint8_t *end =
-                        prepared ? (uint8_t *)ctx->solver.working_panels +
-                                       EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank)
-                                 : cache_end;
-                    /* nothing is missing; panels may need room to be aligned */
-                    const size_t spare = (size_t)(workspace + size - end);
-                    CHECK(prepared ? spare <= EITS_LINE - 16 : spare == 0);
-                    CHECK((uintptr_t)ctx->columns.panels % EITS_LINE == 0);
-                    CHECK((ctx->columns.panels != NULL) == prepared &&
-                          (ctx->solver.working_panels != NULL) == prepared);
-                    CHECK((uint8_t *)ctx == workspace);
-                    CHECK(((uintptr_t)ctx->frame.y | (uintptr_t)ctx->projection.basis |
-                           (uintptr_t)eits_get_coefficients(ctx) | (uintptr_t)ctx->scratch.index) %
-                              16 ==
-                          0);
-                    free(memory);
-                }
-                small_model_free(&made);
-            }
+    for (uint32_t way = 0; way < 5 * 4 * 2; ++way) {
+        small_model made = small_model_make(
+            (small_spec){.rank = ranks[way / 8], .side = sides[way / 2 % 4], .round = way % 2});
+        eits_model m;
+        CHECK_OK(eits_model_open(&m, made.blob, made.size));
+        for (int prepared = 0; prepared < 2; ++prepared) {
+            const size_t size = eits_workspace_size(&m, prepared);
+            CHECK_EQUAL(size, EITS_WORKSPACE_SIZE(m.n_rows, m.n_folded, m.rank, m.n_pixels,
+                                                  (size_t)m.nx * m.ny, prepared));
+            CHECK_EQUAL(size % 16, 0);
+            void *memory;
+            eits_context *ctx;
+            uint8_t *workspace = small_aligned(&memory, size);
+            CHECK_OK(eits_init(workspace, size, &m, &ctx));
+            const uint8_t *cache_end = ctx->columns.wanted + EITS_ALIGN16(EITS_CACHED(m.n_pixels));
+            const uint8_t *end = prepared ? (uint8_t *)ctx->solver.working_panels +
+                                                EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank)
+                                          : cache_end;
+            /* nothing is missing; panels may need room to be aligned */
+            const size_t spare = (size_t)(workspace + size - end);
+            CHECK(prepared ? spare <= EITS_LINE - 16 : spare == 0);
+            CHECK((uintptr_t)ctx->columns.panels % EITS_LINE == 0);
+            CHECK((ctx->columns.panels != NULL) == prepared &&
+                  (ctx->solver.working_panels != NULL) == prepared);
+            CHECK((uint8_t *)ctx == workspace);
+            CHECK(((uintptr_t)ctx->frame.y | (uintptr_t)ctx->projection.basis |
+                   (uintptr_t)eits_get_coefficients(ctx) | (uintptr_t)ctx->scratch.index) %
+                      16 ==
+                  0);
+            free(memory);
         }
+        small_model_free(&made);
     }
     CHECK(sizeof constant > 0 && sizeof constant % 16 == 0);
 }
@@ -83,16 +79,13 @@ TEST(refused_workspaces)
 /* Everything that a context does, with many touches and rows left out. */
 static void exercise(eits_context *ctx, uint64_t *state)
 {
-    eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+    eits_real reference[SMALL_ROWS], frame[SMALL_ROWS], frames[8][SMALL_ROWS];
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count;
     small_reference(ctx->model, 1, reference);
-    CHECK_OK(eits_reference_begin(ctx, 8));
-    for (int k = 0; k < 8; ++k) {
-        vary(frame, reference, 1e-4, state);
-        CHECK_OK(eits_reference_add(ctx, frame, SMALL_ROWS));
-    }
-    CHECK_OK(eits_reference_finish(ctx));
+    for (int k = 0; k < 8; ++k)
+        vary(frames[k], reference, 1e-4, state);
+    LEARN(ctx, 8, frames);
     CHANGE_OPTIONS(ctx, o.touch_min_fraction = 0, o.touch_threshold = 0,
                    o.max_touches = EITS_MAX_TOUCHES, o.warm_start = 1, o.sign = EITS_SIGN_BOTH);
     for (int k = 0; k < 6; ++k) {
@@ -262,20 +255,18 @@ TEST(options_out_of_range)
         WORD(track_hold, 1001),
         REAL_WRONG(track_smooth),
     };
-    small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
-    small_context c;
-    small_context_open(&c, &made, 0);
-    const eits_options before = *eits_get_options(c.ctx);
+    eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = 3, .side = 3}, 0);
+    const eits_options before = *eits_get_options(ctx);
     CHECK_REFUSED(eits_set_options(NULL, &before));
-    CHECK_REFUSED(eits_set_options(c.ctx, NULL));
+    CHECK_REFUSED(eits_set_options(ctx, NULL));
     for (size_t k = 0; IN_TABLE(k, wrong); ++k) {
         eits_options o = before;
         const uint32_t whole = wrong[k].whole ? (uint32_t)wrong[k].value : 0;
         const eits_real real = (eits_real)wrong[k].value;
         memcpy((uint8_t *)&o + wrong[k].offset, wrong[k].whole ? (const void *)&whole : &real,
                wrong[k].whole ? 4 : sizeof real);
-        CHECK_REFUSED(eits_set_options(c.ctx, &o));
-        CHECK(memcmp(eits_get_options(c.ctx), &before, sizeof before) == 0);
+        CHECK_REFUSED(eits_set_options(ctx, &o));
+        CHECK(memcmp(eits_get_options(ctx), &before, sizeof before) == 0);
     }
     eits_options o = before; /* all limits that are still allowed, at once */
     o.iterations = o.gap_every = UINT32_MAX;
@@ -289,10 +280,8 @@ TEST(options_out_of_range)
         o.touch_change_s_per_m = R(1e30);
     o.regularisation_noise_factor = R(1e30);
     o.touch_min_radius_mm = o.touch_seed_radius_mm = o.touch_max_radius_mm = R(1e-6);
-    CHECK_OK(eits_set_options(c.ctx, &o));
-    CHECK(memcmp(eits_get_options(c.ctx), &o, sizeof o) == 0);
-    small_context_close(&c);
-    small_model_free(&made);
+    CHECK_OK(eits_set_options(ctx, &o));
+    CHECK(memcmp(eits_get_options(ctx), &o, sizeof o) == 0);
 }
 
 /* A golden image that is what this build gives: no difference. One pixel changed: just that
@@ -326,13 +315,10 @@ TEST(self_test)
         CHECK(c.ctx->reference.ready);
         CHECK_NEAR(c.ctx->reference.v0[3], c.model.golden.reference[3], 0);
         /* a context as before: learning starts from nothing */
-        CHECK_OK(eits_reference_begin(c.ctx, 4));
-        for (int k = 0; k < 4; ++k) {
-            eits_real frame[SMALL_ROWS];
-            small_reference(&c.model, 1, frame);
-            CHECK_OK(eits_reference_add(c.ctx, frame, SMALL_ROWS));
-        }
-        CHECK_OK(eits_reference_finish(c.ctx));
+        eits_real frames[4][SMALL_ROWS];
+        for (int k = 0; k < 4; ++k)
+            small_reference(&c.model, 1, frames[k]);
+        LEARN(c.ctx, 4, frames);
         CHECK(c.ctx->reference.noise_v <= R(1e-6));
         small_context_close(&c);
     }
@@ -415,4 +401,4 @@ TEST(self_test_sums)
     small_model_free(&plain);
 }
 
-RUN_TESTS("context")
+RUN_TESTS("context", dense_bench_close(&b))
