@@ -20,6 +20,21 @@ static inline eits_packet_reply scan_with(eits_command_scan scan)
     return host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
 }
 
+/* Both rows of each fold in every so many-th scan. */
+static inline void check_each(uint16_t scans)
+{
+    eits_command_scan scan = host_default_scan();
+    scan.check_every = scans;
+    TAKEN(scan_with(scan));
+}
+
+/* So many milliseconds, of which alone the packets are kept. */
+static inline void hear(uint32_t ms)
+{
+    host_forget(&b.host);
+    host_run(&b.host, ms);
+}
+
 static inline eits_packet_reply mask_row(uint16_t row, uint16_t masked)
 {
     eits_command_mask_row c = {.row = row, .masked = masked};

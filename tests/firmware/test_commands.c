@@ -145,8 +145,7 @@ TEST(test_scan_and_tare)
     SCAN((s.sample_rate_hz = 5000000, s.samples = 400), RANGE, 8, 0);
     CHECK_EQUAL(host_info(&b.host).tared, 1);
     CHECK_EQUAL(host_info(&b.host).sample_rate_hz, 1000000);
-    host_forget(&b.host);
-    host_run(&b.host, 100);
+    hear(100);
     CHECK(host_count(&b.host, EITS_PACKET_IMAGE) >= 3);
     SCAN(s.excitation_millihz = 25000000, OK, 0, 0);
     CHECK_NEAR(fake_generator_hz(&b.board), 25000, 0.02);

@@ -36,7 +36,6 @@ static void test_open_while_nobody_looks(uint16_t every)
         host_run(&b.host, 300);
         CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0) != NULL);
     }
-    bench_stop(&b);
 }
 
 /* Two electrodes that are merged: both named, each with the other. */
@@ -76,7 +75,6 @@ TEST(test_bridged)
     CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, false, 0) != NULL);
     CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, false, 1) != NULL);
     CHECK_EQUAL(host_info(&b.host).faults >> EITS_FAULT_BRIDGED & 1u, 0);
-    bench_stop(&b);
 }
 
 /* One reading that is off for a frame: left out, in the head and in STATS, and no fault. */
@@ -108,7 +106,6 @@ TEST(test_outlier)
     CHECK(rows >= 1);
     CHECK_EQUAL(host_stats(&b.host, 0).outliers - before, rows);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_FAULT), 0);
-    bench_stop(&b);
 }
 
 /* What is not looked for is not found. */
@@ -128,7 +125,6 @@ TEST(test_switched_off)
     host_run(&b.host, 60);
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
     CHECK_EQUAL(head_of(host_last(&b.host, EITS_PACKET_IMAGE))->open_electrodes, 0);
-    bench_stop(&b);
 }
 
 int main(void)
@@ -136,5 +132,6 @@ int main(void)
     test_open_while_nobody_looks(0);
     test_open_while_nobody_looks(5);
     run_tests();
+    bench_stop(&b);
     return checks_report("found");
 }

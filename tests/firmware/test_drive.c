@@ -14,7 +14,6 @@ static bool drives(void)
 /* A host whose presence is known by its packets alone. */
 static void start_unheard(void)
 {
-    bench_stop(&b); /* of the test before */
     b.host.quiet = true;
     bench_start(&b, &SKIN_ADJACENT);
 }
@@ -80,8 +79,7 @@ TEST(test_silence)
     CHECK(drives());
     host_run(&b.host, 150);
     CHECK(!drives());
-    host_forget(&b.host);
-    host_run(&b.host, 2000);
+    hear(2000);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_RAW), 0);
     const eits_packet_info info = host_info(&b.host);
     CHECK_EQUAL(info.drive, EITS_DRIVE_SILENT);

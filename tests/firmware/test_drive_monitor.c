@@ -121,7 +121,6 @@ static void does_not_wait(void *ctx, uint32_t ns)
 /* The sentence about two seconds of an instrument before a host, or one that believes so. */
 static const char *run(fw_lines_ops ops, bool asked, bool heard)
 {
-    bench_stop(&b);
     b.host.quiet = true;
     bench_start(&b, &SKIN_ADJACENT);
     fw_instrument *instrument = &b.host.instrument;

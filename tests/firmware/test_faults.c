@@ -32,7 +32,6 @@ TEST(test_last_reset)
     CHECK_EQUAL(host_info(&b.host).faults, 0);
     host_run(&b.host, 5);
     CHECK((b.board.leds & 4u) == 0);
-    bench_stop(&b);
 }
 
 /* What is cleared by command and still there rises again. */
@@ -43,7 +42,6 @@ TEST(test_cleared_but_there)
     TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
     CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, false), 1);
     CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, true), 2);
-    bench_stop(&b);
     bench_start(&b, &SKIN_ADJACENT);
     detach(9, true);
     host_run(&b.host, 200);
@@ -52,7 +50,6 @@ TEST(test_cleared_but_there)
     host_run(&b.host, 60);
     CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, true), 2);
     CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, false), 1);
-    bench_stop(&b);
 }
 
 /* The generator cannot be written at start-up: told, tried again, and the scan begins when it can.
@@ -77,7 +74,6 @@ TEST(test_generator_bus)
         CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
         CHECK_NEAR(fake_generator_hz(&b.board), 50000, 0.02);
         TARE(4);
-        bench_stop(&b);
     }
 }
 
@@ -116,7 +112,6 @@ TEST(test_multiplexer_bus)
     CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
     CHECK_EQUAL(told(EITS_FAULT_SOLVER, false), 1);
     CHECK_EQUAL(host_info(&b.host).faults, 0);
-    bench_stop(&b);
 }
 
 /* A bus that fails while a scan starts is told as that, and not as a converter that gives nothing.
@@ -137,7 +132,6 @@ TEST(test_bus_at_the_start_of_a_scan)
         CHECK_EQUAL(host_info(&b.host).faults, 0);
     }
     CHECK(buses >= 3);
-    bench_stop(&b);
 }
 
 /* So many frames with a fault and then without it: when it rises and goes, each electrode by
@@ -185,7 +179,6 @@ TEST(test_hysteresis)
     CHECK_EQUAL(faults->there[EITS_FAULT_BRIDGED], 1u << 15 | 1u);
     fw_faults_clear(faults, 0);
     CHECK_EQUAL(faults->raised, 0);
-    bench_stop(&b);
 }
 
 TEST(test_watchdog_is_fed)
@@ -200,7 +193,6 @@ TEST(test_watchdog_is_fed)
         lit += b.board.leds & 1u;
     }
     CHECK(lit >= 8 && lit <= 12); /* alive: blinks */
-    bench_stop(&b);
 }
 
-RUN_TESTS("faults")
+RUN_TESTS("faults", bench_stop(&b))

@@ -41,15 +41,11 @@ TEST(test_what_is_refused)
 {
     set_up(&SKIN_ADJACENT); /* without fields */
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
-    bench_stop(&b);
     set_up(&SKIN_WITH_FIELDS);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 2, 0).status, EITS_REPLY_DRIVES);
-    eits_command_scan scan = host_default_scan();
-    scan.check_every = 4;
-    TAKEN(scan_with(scan));
+    check_each(4);
     TARE(8);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
-    bench_stop(&b);
 }
 
 /* A still skin: one packet says that it begins, all frames are brought to one instant and solved,
@@ -71,7 +67,6 @@ TEST(test_a_still_skin)
     CHECK(memcmp(engine->aligned, engine->frames[(b.host.instrument.scan.taken - 1) % 2u].volts,
                  engine->model.n_rows * sizeof(float)) == 0);
     CHECK_EQUAL(b.host.gaps, 0);
-    bench_stop(&b);
 }
 
 /* A touch: packets of drives in the order that they are measured, each for its own instant. */
@@ -107,7 +102,6 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
     CHECK_EQUAL(b.host.gaps, 0);
     CHECK_EQUAL(b.board.nested_writes, 0);
     CHECK(b.host.instrument.follow.running);
-    bench_stop(&b);
 }
 
 /* A main loop that is slower than the scan: frames are left out, drives are not, and a frame that
@@ -129,7 +123,6 @@ TEST(test_a_slow_main_loop)
     CHECK(host_count(&b.host, EITS_PACKET_TOUCHES) <= aligned + 1);
     CHECK(b.host.instrument.follow.running);
     CHECK_EQUAL(b.host.instrument.follow.begun, begun);
-    bench_stop(&b);
 }
 
 /* Commands that change what drives build on begin anew; questions do not. Drives that waited too
@@ -163,7 +156,6 @@ TEST(test_beginning_anew)
     STREAM(EITS_STREAM_TOUCHES, 1, 0);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(!follow->running && b.host.instrument.scan.drive_done == NULL);
-    bench_stop(&b);
 }
 
 /* A touch that only frames find is one once two of them have found it; a frame that is brought to
@@ -189,7 +181,6 @@ TEST(test_a_place_that_frames_find)
         CHECK_OK(eits_fast_touches(instrument->engine.fast, touches, EITS_FAST_TOUCHES, &count));
         CHECK_EQUAL(count, round);
     }
-    bench_stop(&b);
 }
 
 int main(void)
@@ -197,5 +188,6 @@ int main(void)
     run_tests();
     test_a_touch(0, 0);
     test_a_touch(2000, 900000);
+    bench_stop(&b);
     return checks_report("follow");
 }

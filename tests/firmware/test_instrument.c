@@ -129,9 +129,7 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     b.board.noise_codes = 2;
     b.board.write_cost_ns = busy_ms * 1000000u; /* meanwhile the scan goes on, as far as it may */
     if (check_every != 1) {
-        eits_command_scan scan = host_default_scan();
-        scan.check_every = check_every;
-        TAKEN(scan_with(scan));
+        check_each(check_every);
     }
     STREAM(EITS_STREAM_RAW, 1, 0);
     host_forget(&b.host);
@@ -172,7 +170,6 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     CHECK_EQUAL(mirror.different, 0);
     CHECK_EQUAL(b.host.gaps, 0);
     CHECK_EQUAL(host_info(&b.host).tared, 1);
-    bench_stop(&b);
 }
 
 /* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the
@@ -192,7 +189,6 @@ TEST(test_phase_of_the_voltages)
         b.board.extra_turn += 1 / 6.0;
         host_run(&b.host, 60);
         CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 0.5) <= 0.5);
-        bench_stop(&b);
     }
 }
 
@@ -201,8 +197,7 @@ TEST(test_streaming)
     bench_start(&b, &SKIN_ADJACENT);
     TARE(1);
     STREAM(EITS_STREAM_TOUCHES, 3, 5);
-    host_forget(&b.host);
-    host_run(&b.host, 600);
+    hear(600);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 5);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_IMAGE) + host_count(&b.host, EITS_PACKET_RAW), 0);
     for (uint32_t k = 1; k < 5; ++k) {
@@ -226,10 +221,8 @@ TEST(test_streaming)
     CHECK_EQUAL(info.streaming, EITS_STREAM_IMAGE);
     CHECK_EQUAL(info.every, 2);
     STREAM(0, 1, 0);
-    host_forget(&b.host);
-    host_run(&b.host, 200);
+    hear(200);
     CHECK_EQUAL(b.host.packets, 0);
-    bench_stop(&b);
 }
 
 /* Where the link takes no more, whole packets are dropped and counted, and nothing waits. */
@@ -251,7 +244,6 @@ TEST(test_back_pressure)
     CHECK_EQUAL(b.host.gaps, stats.packets_dropped);
     CHECK(stats.packets_sent > sent);
     CHECK_EQUAL(b.host.decoder.crc_errors + b.host.decoder.framing_errors, 0);
-    bench_stop(&b);
 }
 
 /* A tare that fails leaves the last reference, its angle and its images. */
@@ -284,8 +276,7 @@ TEST(test_failed_tare)
     b.sheet.detached[3] = false;
     b.board.extra_turn -= 0.1;
     sheet_init(&b.sheet);
-    host_forget(&b.host);
-    host_run(&b.host, 100);
+    hear(100);
     const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
     CHECK(image != NULL);
     float peak = 0;
@@ -295,7 +286,6 @@ TEST(test_failed_tare)
         peak = value > peak ? value : peak;
     }
     CHECK(peak < 1e-5f);
-    bench_stop(&b);
 }
 
 /* Frames whose scan began before the command are not untouched ones; frames of a tare are all sent,
@@ -320,7 +310,6 @@ TEST(test_reference_frames)
     }
     CHECK_EQUAL(untouched, 6);
     CHECK_EQUAL(b.host.packet[b.host.packets - 1].type, EITS_PACKET_REPLY);
-    bench_stop(&b);
 }
 
 TEST(test_self_test_keeps_the_tare)
@@ -349,7 +338,6 @@ TEST(test_self_test_keeps_the_tare)
     host_run(&b.host, 60);
     const float volts = raw_volts(host_last(&b.host, EITS_PACKET_RAW), 0);
     CHECK_NEAR(volts, 0.5 * bench_volts(&b, 0), 0.5 * fake_lsb_v(&b.board));
-    bench_stop(&b);
 }
 
 /* A tare takes frames whose scan began with the command or later, also where the clock wraps. */
@@ -374,5 +362,6 @@ int main(void)
     test_same_bits(&SKIN_OPPOSITE, 5, 1, 4, 0);
     test_same_bits(&SKIN_ADJACENT, 4, 1, 1, 50);
     run_tests();
+    bench_stop(&b);
     return checks_report("instrument");
 }

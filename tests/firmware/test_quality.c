@@ -6,9 +6,7 @@ static void start(uint16_t check_every)
 {
     bench_start(&b, &SKIN_ADJACENT);
     b.board.noise_codes = 4;
-    eits_command_scan scan = host_default_scan();
-    scan.check_every = check_every;
-    TAKEN(scan_with(scan));
+    check_each(check_every);
     STREAM(EITS_STREAM_RAW, 1, 0);
 }
 
@@ -108,7 +106,6 @@ static void test_open(bool tared, uint16_t check_every)
               gone->frame <= back + EITS_FAULT_CLEAR_FRAMES);
         CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_ELECTRODE_OPEN, 0);
     }
-    bench_stop(&b);
 }
 
 /* Two at once, neighbours or not. */
@@ -127,7 +124,6 @@ TEST(test_two_open)
         host_run(&b.host, 300);
         CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
     }
-    bench_stop(&b);
 }
 
 /* An electrode behind an amplifier that runs into its limit is open too. */
@@ -146,7 +142,6 @@ TEST(test_open_at_the_rail)
     CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 6);
     const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_SATURATED, true, 0);
     CHECK(fault != NULL);
-    bench_stop(&b);
 }
 
 /* A skin of other voltages than the model's by far: the tare says what is to be expected. */
@@ -165,7 +160,6 @@ TEST(test_faint_skin)
     tare();
     host_run(&b.host, 50);
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
-    bench_stop(&b);
 }
 
 /* One row that reads something whatever is connected, and is masked for that: it does not speak for
@@ -189,7 +183,6 @@ TEST(test_masked_row_is_not_judged)
     detach(5, true);
     host_run(&b.host, 60);
     CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 5);
-    bench_stop(&b);
 }
 
 /* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half
@@ -211,7 +204,6 @@ static void test_touches_are_not_open(bool tared)
         }
     }
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
-    bench_stop(&b);
 }
 
 static double one_row_saturates(void *user, const uint8_t e[4], uint64_t at_ns)
@@ -248,7 +240,6 @@ TEST(test_saturation)
     CHECK_EQUAL(image->masked, 2);
     CHECK_EQUAL(image->saturated, 2);
     CHECK_EQUAL(image->diagnostics, EITS_DIAGNOSTIC_SATURATED);
-    bench_stop(&b);
 }
 
 static double broken_reciprocity(void *user, const uint8_t e[4], uint64_t at_ns)
@@ -289,7 +280,6 @@ static void test_reciprocity(uint16_t check_every)
         }
     }
     CHECK(marked >= 2);
-    bench_stop(&b);
 }
 
 /* A dead front end: no voltage at all. */
@@ -321,7 +311,6 @@ TEST(test_dead)
     const eits_packet_solved *touches =
         (const void *)host_last(&b.host, EITS_PACKET_TOUCHES)->payload;
     CHECK_EQUAL(touches->count, 0);
-    bench_stop(&b);
 }
 
 int main(void)
@@ -334,5 +323,6 @@ int main(void)
     test_touches_are_not_open(false);
     test_reciprocity(1);
     test_reciprocity(3);
+    bench_stop(&b);
     return checks_report("quality");
 }

@@ -26,7 +26,6 @@ static void test_order(const skin_spec *spec, uint32_t rows)
     CHECK(b.board.monitor.violation == NULL);
     CHECK_EQUAL(b.host.instrument.scan.slots_repeated, 0);
     CHECK_EQUAL(b.board.setup.slot_us, 100);
-    bench_stop(&b);
 }
 
 /* Voltages of untouched and touched skins within half a step of the converter, on every row. */
@@ -41,8 +40,7 @@ static void test_voltages(const skin_spec *spec)
             sheet_solve(&b.sheet);
         }
         host_run(&b.host, 60); /* the frame under way is neither */
-        host_forget(&b.host);
-        host_run(&b.host, 60);
+        hear(60);
         const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
         CHECK(packet != NULL);
         if (packet == NULL)
@@ -52,7 +50,6 @@ static void test_voltages(const skin_spec *spec)
         for (uint32_t i = 0; i < b.open.n_rows; ++i)
             CHECK_EQUAL(raw_quality(packet, i), 0);
     }
-    bench_stop(&b);
 }
 
 /* With settling as long as what the multiplexers take, what was before is not seen; without it, it
@@ -71,7 +68,6 @@ TEST(test_settling)
         const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
         CHECK(settled ? raw_steps_off(packet, 1) < 0.5 : raw_steps_off(packet, 1) > 2);
     }
-    bench_stop(&b);
 }
 
 /* A switch that comes too late costs a slot, and the row is measured again. */
@@ -99,7 +95,6 @@ TEST(test_late_switch)
     for (uint32_t k = 0; (packet = host_packet_of(&b.host, EITS_PACKET_RAW, k)) != NULL; ++k)
         CHECK(raw_steps_off(packet, 1) < 0.5);
     CHECK_EQUAL(host_stats(&b.host, 0).slots_repeated, before + 4);
-    bench_stop(&b);
 }
 
 /* Rows that cannot be measured at all are given up, marked, and are not a number. */
@@ -115,22 +110,18 @@ TEST(test_never_settles)
     CHECK(packet != NULL && !isnan(raw_volts(packet, 0)));
     b.board.latency_ns = 600;
     b.board.lose = 1000000;
-    host_forget(&b.host);
-    host_run(&b.host, 400);
+    hear(400);
     packet = host_last(&b.host, EITS_PACKET_RAW);
     CHECK(packet != NULL);
     for (uint32_t i = 0; packet != NULL && i < b.open.n_rows; ++i) {
         CHECK(isnan(raw_volts(packet, i)));
         CHECK_EQUAL(raw_quality(packet, i), EITS_QUALITY_UNSETTLED);
     }
-    bench_stop(&b);
 }
 
 static void set_check_every(uint16_t every)
 {
-    eits_command_scan scan = host_default_scan();
-    scan.check_every = every;
-    TAKEN(scan_with(scan));
+    check_each(every);
     host_run(&b.host, 30);
     host_forget(&b.host);
 }
@@ -176,7 +167,6 @@ static void test_reciprocal(const skin_spec *spec)
                     EITS_QUALITY_COPIED | (every == 0 ? EITS_QUALITY_MASKED : 0));
         TAKEN(mask_row(row, 0));
     }
-    bench_stop(&b);
 }
 
 TEST(test_frame_period)
@@ -192,8 +182,7 @@ TEST(test_frame_period)
     reply = scan_with(scan);
     TAKEN(reply);
     host_run(&b.host, 50);
-    host_forget(&b.host);
-    host_run(&b.host, 1100); /* over the wrap of the clock */
+    hear(1100); /* over the wrap of the clock */
     const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
     CHECK(frames >= 32);
     for (uint32_t k = 1; k < frames; ++k) {
@@ -207,8 +196,7 @@ TEST(test_frame_period)
     /* one that is a whole number of slots is kept to the microsecond, from the first frame on */
     scan.frame_period_us = 30000;
     TAKEN(scan_with(scan));
-    host_forget(&b.host);
-    host_run(&b.host, 200);
+    hear(200);
     for (uint32_t k = 1; k < host_count(&b.host, EITS_PACKET_RAW); ++k)
         CHECK_EQUAL(raw_head(k)->time_us - raw_head(k - 1)->time_us, 30000);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 5);
@@ -220,7 +208,6 @@ TEST(test_frame_period)
     b.board.clock_cost_ns = 0;
     host_run(&b.host, 1000);
     CHECK(host_fault(&b.host, EITS_FAULT_DEADLINE, false, 0) != NULL);
-    bench_stop(&b);
 }
 
 /* While the main loop is busy, one frame is filled, then the scan waits; no frame is half old and
@@ -240,7 +227,6 @@ TEST(test_two_buffers)
         CHECK_EQUAL(raw_head(k)->scan_us, 20780);
         CHECK_NEAR(raw_volts(packet, 207), bench_volts(&b, 207), 0.5 * fake_lsb_v(&b.board));
     }
-    bench_stop(&b);
 }
 
 TEST(test_stall)
@@ -258,23 +244,20 @@ TEST(test_stall)
                 EITS_REPLY_CORE);
     CHECK_EQUAL(host_info(&b.host).tared, 1); /* by the last one */
     b.board.stalled = false;
-    host_forget(&b.host);
-    host_run(&b.host, 600);
+    hear(600);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, false, 0) != NULL);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) > 10);
     /* the generator was not touched: its phase is the one that the tare knows */
     CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 1) <= 0.5);
     b.board.configure_status = FW_E_TIMEOUT; /* the converter does not even start */
     b.board.stalled = true;
-    host_forget(&b.host);
-    host_run(&b.host, 2000);
+    hear(2000);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 0) != NULL);
     b.board.configure_status = FW_OK;
     b.board.stalled = false;
     host_run(&b.host, 2000);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, false, 0) != NULL);
     CHECK_EQUAL(host_info(&b.host).faults, 0);
-    bench_stop(&b);
 }
 
 TEST(test_slots)
@@ -302,5 +285,6 @@ int main(void)
     test_reciprocal(&SKIN_ADJACENT);
     test_reciprocal(&SKIN_OPPOSITE);
     test_reciprocal(&SKIN_BY_SEVEN);
+    bench_stop(&b);
     return checks_report("scan");
 }

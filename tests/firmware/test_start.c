@@ -34,7 +34,6 @@ TEST(test_no_model)
     CHECK_EQUAL(info.n_folded, 104);
     CHECK_EQUAL(info.faults, 0);
     skin_model_free(&model);
-    bench_stop(&b);
 }
 
 /* After a change of the model the new table is scanned, reciprocals and all, and the old tare is
@@ -42,9 +41,7 @@ TEST(test_no_model)
 TEST(test_model_change)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    eits_command_scan scan = host_default_scan();
-    scan.check_every = 3;
-    TAKEN(scan_with(scan));
+    check_each(3);
     TARE(4);
     STREAM(7, 1, 0);
     host_run(&b.host, 70);
@@ -64,8 +61,7 @@ TEST(test_model_change)
     CHECK_EQUAL(info.streaming, 0);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_IMAGE, 1, 0).status, EITS_REPLY_NOT_TARED);
     STREAM(EITS_STREAM_RAW, 1, 0);
-    host_forget(&b.host);
-    host_run(&b.host, 100);
+    hear(100);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 5);
     for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
         const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
@@ -77,7 +73,6 @@ TEST(test_model_change)
     bench_restart(&b); /* the newer one is opened */
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
     CHECK_EQUAL(host_info(&b.host).bank, 1);
-    bench_stop(&b);
 }
 
 TEST(test_starts_and_ends)
@@ -109,7 +104,6 @@ TEST(test_starts_and_ends)
     wrong = b.board.board;
     wrong.mclk_hz = 8388608;
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &wrong), 1);
-    bench_stop(&b);
 }
 
-RUN_TESTS("start")
+RUN_TESTS("start", bench_stop(&b))

@@ -72,8 +72,7 @@ static void still_adjacent(int tared)
     CHECK_EQUAL(info.model_crc, adjacent.crc);
     CHECK_EQUAL(info.bank, 0);
     CHECK_EQUAL(info.tared, tared);
-    host_forget(&b.host);
-    host_run(&b.host, 60);
+    hear(60);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 2); /* scanning, and still streamed */
     if (tared)
         CHECK(host_count(&b.host, EITS_PACKET_IMAGE) >= 2);
@@ -280,5 +279,6 @@ int main(void)
     test_upload(52);
     skin_model_free(&adjacent);
     skin_model_free(&opposite);
+    bench_stop(&b);
     return checks_report("store");
 }
