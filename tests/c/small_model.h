@@ -70,6 +70,14 @@ eits_status small_model_try(small_model model);
  * zero; `model` has float storage. */
 void small_model_depend(small_model *model, uint32_t pixels, uint32_t rank, double off);
 
+/* Room for `count` sections of these tags and sizes, the first `required` of them required; the
+ * table and the header but for checksum and hash. `at` gets where each section is. */
+small_model small_model_lay_out(uint32_t count, const char (*tags)[5], const uint32_t *sizes,
+                                uint32_t required, uint8_t **at);
+
+/* Write the protocol's hash again. */
+void small_model_hash(small_model *model, uint32_t electrodes, uint32_t rows, const uint8_t *table);
+
 /* Write the checksum again after bytes were changed. */
 void small_model_seal(small_model *model);
 

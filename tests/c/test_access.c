@@ -5,6 +5,8 @@
 enum { RANK = 13, SIDE = 6, N = SIDE * SIDE };
 static const small_spec WHITENED = {.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED};
 
+static dense_bench bench[2];
+
 /* The size is a constant expression. */
 static uint8_t constant[EITS_SAVED_SIZE(SMALL_ROWS)];
 
@@ -34,11 +36,10 @@ static void reconstruct(eits_context *ctx, uint64_t state, uint32_t unknown, eit
 
 TEST(accessors_give_what_calls_give)
 {
-    static dense_bench b;
-    eits_context *ctx = dense_bench_open(&b, WHITENED, 0);
+    eits_context *ctx = dense_bench_open(&bench[0], WHITENED, 0);
     eits_real image[N];
     eits_reference_info reference;
-    CHECK(eits_get_model(ctx) == &b.c.model);
+    CHECK(eits_get_model(ctx) == &bench[0].c.model);
     CHECK_REFUSED(eits_get_reference(NULL, &reference));
     CHECK_REFUSED(eits_get_reference(ctx, NULL));
     CHECK_OK(eits_get_reference(ctx, &reference));
@@ -66,17 +67,15 @@ TEST(accessors_give_what_calls_give)
     CHECK(memcmp(eits_get_image(ctx), image, sizeof image) != 0);
     CHECK_OK(eits_solve(ctx, y));
     CHECK(memcmp(eits_get_image(ctx), image, sizeof image) == 0);
-    dense_bench_close(&b);
 }
 
 /* Frames between, of other rows, change neither image nor touches of those that are solved. */
 TEST(examined_frames_leave_no_trace)
 {
-    static dense_bench b[2];
     eits_context *ctx[2];
     eits_real frame[SMALL_ROWS], image[2][N];
     for (int k = 0; k < 2; ++k) {
-        ctx[k] = dense_bench_open(&b[k], WHITENED, 0);
+        ctx[k] = dense_bench_open(&bench[k], WHITENED, 0);
         CHECK_EQUAL(eits_examine(ctx[k], frame, SMALL_ROWS), EITS_E_NO_REFERENCE);
         tare(ctx[k], 1, 1);
     }
@@ -101,19 +100,16 @@ TEST(examined_frames_leave_no_trace)
     for (int k = 0; k < 2; ++k)
         reconstruct(ctx[k], 9, 0, image[k]);
     CHECK(memcmp(image[0], image[1], sizeof image[0]) == 0);
-    dense_bench_close(&b[0]);
-    dense_bench_close(&b[1]);
 }
 
 /* A frame that is refused after it was folded leaves a basis that fits no frame: the next one, of
  * the same rows, must not take it. */
 TEST(a_refused_frame_leaves_no_basis)
 {
-    static dense_bench b[2];
     eits_context *ctx[2];
     eits_real frame[SMALL_ROWS], image[2][N];
     for (int k = 0; k < 2; ++k) {
-        ctx[k] = dense_bench_open(&b[k], WHITENED, 0);
+        ctx[k] = dense_bench_open(&bench[k], WHITENED, 0);
         CHANGE_OPTIONS(ctx[k], o.max_masked = 2);
         tare(ctx[k], 1, 1);
         reconstruct(ctx[k], 7, 0, NULL);
@@ -127,17 +123,14 @@ TEST(a_refused_frame_leaves_no_basis)
     for (int k = 0; k < 2; ++k)
         reconstruct(ctx[k], 8, 2, image[k]);
     CHECK(memcmp(image[0], image[1], sizeof image[0]) == 0);
-    dense_bench_close(&b[0]);
-    dense_bench_close(&b[1]);
 }
 
 TEST(saved_and_restored)
 {
-    static dense_bench b;
-    eits_context *ctx = dense_bench_open(&b, WHITENED, 0);
+    eits_context *ctx = dense_bench_open(&bench[0], WHITENED, 0);
     eits_real before[N], after[N];
     CHECK_EQUAL(eits_saved_size(NULL), 0);
-    const size_t size = eits_saved_size(&b.c.model);
+    const size_t size = eits_saved_size(&bench[0].c.model);
     CHECK_EQUAL(size, sizeof constant);
     void *memory;
     uint8_t *saved = small_aligned(&memory, size + 16);
@@ -160,13 +153,14 @@ TEST(saved_and_restored)
     /* a tare that was given up; then a context laid out again, as after another model's turn */
     for (int again = 0; again < 2; ++again) {
         if (again)
-            CHECK_OK(eits_init(ctx, eits_workspace_size(&b.c.model, 0), &b.c.model, &ctx));
+            CHECK_OK(
+                eits_init(ctx, eits_workspace_size(&bench[0].c.model, 0), &bench[0].c.model, &ctx));
         CHANGE_OPTIONS(ctx, o.iterations = 7);
         CHECK_OK(eits_mask_row(ctx, 5, 0));
         CHECK_OK(eits_mask_row(ctx, 6, 1));
         CHECK_OK(eits_reference_begin(ctx, 4));
         eits_real frame[SMALL_ROWS];
-        small_reference(&b.c.model, 5, frame);
+        small_reference(&bench[0].c.model, 5, frame);
         CHECK_OK(eits_reference_add(ctx, frame, SMALL_ROWS));
         ctx->solver.warm = 1;
         ctx->tracker.count = 1;
@@ -180,7 +174,6 @@ TEST(saved_and_restored)
         CHECK_REFUSED(eits_reference_add(ctx, frame, SMALL_ROWS));
     }
     free(memory);
-    dense_bench_close(&b);
 }
 
-RUN_TESTS("access")
+RUN_TESTS("access", dense_bench_close(&bench[0]), dense_bench_close(&bench[1]))

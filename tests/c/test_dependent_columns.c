@@ -176,18 +176,14 @@ TEST(the_active_set_ends_soon)
             &b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)},
             way % 2);
         small_new_data(ctx, 85 + (uint64_t)way);
-        eits_options o = *eits_get_options(ctx);
-        o.solver = EITS_SOLVER_ACTIVE_SET;
-        o.sign = (eits_sign)(way / 3 % 3);
-        o.iterations = ROUNDS;
-        o.lambda_rel = (eits_real)lambdas[way % 3];
-        CHECK_OK(eits_set_options(ctx, &o));
+        CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.sign = (eits_sign)(way / 3 % 3),
+                       o.iterations = ROUNDS, o.lambda_rel = (eits_real)lambdas[way % 3]);
         CHECK_OK(eits_solve(ctx, NULL));
         CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
         CHECK(ctx->info.iterations < ROUNDS && ctx->info.nonzeros <= RANK_HERE);
         double *x = dense_copy(eits_get_coefficients(ctx), 81),
                *y = dense_copy(ctx->frame.y, RANK_HERE);
-        const double gap = dense_gap(&b.d, y, x, (double)ctx->info.lambda, o.sign);
+        const double gap = dense_gap(&b.d, y, x, (double)ctx->info.lambda, ctx->options.sign);
         CHECK(gap <= BOTH_WIDTHS(3e-6, 1e-14) * 0.5 * dense_dot(y, y, RANK_HERE));
         free(x), free(y);
     }

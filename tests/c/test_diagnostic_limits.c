@@ -132,14 +132,12 @@ TEST(stale_references_on_both_sides_of_the_limit)
     };
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     for (size_t k = 0; IN_TABLE(k, CASES); ++k) {
-        eits_options o = *eits_get_options(ctx);
-        o.sign = CASES[k].sign;
-        CHECK_OK(eits_set_options(ctx, &o));
+        CHANGE_OPTIONS(ctx, o.sign = CASES[k].sign);
         eits_zero(ctx->solver.gradient, N);
         ctx->solver.gradient[5] = (eits_real)CASES[k].up;
         ctx->solver.gradient[N - 1] = (eits_real)-CASES[k].down;
         ctx->info.lambda_max =
-            (eits_real)(o.sign == EITS_SIGN_DECREASE ? CASES[k].down : CASES[k].up);
+            (eits_real)(ctx->options.sign == EITS_SIGN_DECREASE ? CASES[k].down : CASES[k].up);
         ctx->info.lambda_noise = (eits_real)CASES[k].noise;
         ctx->info.diagnostics = 0;
         eits_check_stale_reference(ctx, ctx->solver.gradient);

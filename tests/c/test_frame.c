@@ -92,10 +92,8 @@ TEST(data_of_each_kind)
                     CHECK_NEAR(ctx->frame.d[k], sum / used, 10 * EPS);
                 }
                 CHECK_EQUAL(ctx->projection.count, project);
-                eits_options o =
-                    *eits_get_options(ctx); /* the option counts from the next frame on */
-                o.project_reference = !project;
-                CHECK_OK(eits_set_options(ctx, &o));
+                /* the option counts from the next frame on */
+                CHANGE_OPTIONS(ctx, o.project_reference = !project);
                 check_stage(&b, 0);
                 CHECK_EQUAL(ctx->projection.count, !project);
             }

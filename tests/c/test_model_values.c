@@ -146,8 +146,7 @@ static eits_status with_rows(uint32_t count, uint32_t from, uint32_t to, uint32_
     for (uint32_t i = from; i < to; ++i)
         small_put_u32(table + 4 * i, electrodes);
     small_put_u32(small_model_section(&made, "DIMS", NULL), count);
-    const uint64_t hash = eits_protocol_hash(count, SMALL_ROWS, table);
-    memcpy(made.blob + 24, &hash, sizeof hash);
+    small_model_hash(&made, count, SMALL_ROWS, table);
     return small_model_try(made);
 }
 

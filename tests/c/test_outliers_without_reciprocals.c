@@ -63,8 +63,7 @@ static void shape_protocol(small_model *made, int crossed)
         memcpy(second, first + 2, 2);
         memcpy(second + 2, first, 2);
     }
-    const uint64_t hash = eits_protocol_hash(SMALL_ELECTRODES, SMALL_ROWS, rows);
-    memcpy(made->blob + 24, &hash, sizeof hash);
+    small_model_hash(made, SMALL_ELECTRODES, SMALL_ROWS, rows);
 }
 
 static void copy_halves(const bench *b, eits_real *frame)

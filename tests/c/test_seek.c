@@ -96,17 +96,13 @@ TEST(what_explains_too_little_is_no_touch)
     const eits_disc disc[2] = {{-21, 9, 9, R(0.05), 1, 0}, {27, -15, 9, R(0.02), 1, 0}};
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = pressed(disc, 2, EITS_SIGN_INCREASE);
-    eits_options o = *eits_get_options(ctx);
-    o.touch_min_fraction = R(0.2); /* it explains a seventh */
-    CHECK_OK(eits_set_options(ctx, &o));
+    /* it explains a seventh */
+    CHANGE_OPTIONS(ctx, o.touch_min_fraction = R(0.2));
     CHECK_EQUAL(found(ctx, touch), 1);
     CHECK(has(touch, 1, &disc[0]));
-    o.touch_min_fraction = R(0.02);
-    o.max_touches = 1;
-    CHECK_OK(eits_set_options(ctx, &o));
+    CHANGE_OPTIONS(ctx, o.touch_min_fraction = R(0.02), o.max_touches = 1);
     CHECK_EQUAL(found(ctx, touch), 1);
-    o.max_touches = EITS_MAX_TOUCHES;
-    CHECK_OK(eits_set_options(ctx, &o));
+    CHANGE_OPTIONS(ctx, o.max_touches = EITS_MAX_TOUCHES);
     for (int i = 0; i < RANK; ++i) /* nothing of the sign that is looked for */
         ctx->frame.y[i] = 0;
     CHECK_EQUAL(found(ctx, touch), 0);

@@ -89,12 +89,10 @@ TEST(optimum_has_its_marks)
 {
     for (int sign = 0; sign < 3; ++sign) {
         eits_context *ctx = set_up(RANDOM, 1);
-        eits_options o = *eits_get_options(ctx);
-        o.gap_rel = R(BOTH_WIDTHS(1e-6, 1e-12));
-        CHECK_OK(eits_set_options(ctx, &o));
+        CHANGE_OPTIONS(ctx, o.gap_rel = R(BOTH_WIDTHS(1e-6, 1e-12)));
         const eits_info info = solve(ctx, 50000, (eits_sign)sign, 0.05);
         CHECK_EQUAL(info.stop, EITS_STOP_GAP);
-        CHECK(info.gap_rel <= o.gap_rel && info.gap >= 0);
+        CHECK(info.gap_rel <= ctx->options.gap_rel && info.gap >= 0);
         double *x = dense_copy(eits_get_coefficients(ctx), N), r[RANK], c[N], largest = 0;
         dense_residual(&b.d, y, x, r);
         dense_correlate(&b.d, r, c);
@@ -254,17 +252,12 @@ TEST(work_is_counted)
          * gap; S x in each */
         CHECK_EQUAL(info.macs, whole + (iterations - 1) * whole + whole + iterations * column);
     }
-    eits_options o = *eits_get_options(ctx);
-    o.gap_rel = R(1e-12); /* the gap is asked for every 5 iterations: another S'r each */
-    o.gap_every = 5;
-    CHECK_OK(eits_set_options(ctx, &o));
+    /* the gap is asked for every 5 iterations: another S'r each */
+    CHANGE_OPTIONS(ctx, o.gap_rel = R(1e-12), o.gap_every = 5);
     eits_info info = solve(ctx, 4, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + 3 * whole + whole + 4 * column);
     /* from the last coefficients: S x once more, and the first iteration's S'r */
-    o = *eits_get_options(ctx);
-    o.gap_rel = 0;
-    o.warm_start = 1;
-    CHECK_OK(eits_set_options(ctx, &o));
+    CHANGE_OPTIONS(ctx, o.gap_rel = 0, o.warm_start = 1);
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + column + 3 * (whole + column) + whole);
     ctx->frame.y[3] = 0;
@@ -296,9 +289,8 @@ TEST(work_is_counted)
     CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     /* the whitening is kept */
     CHECK_EQUAL(ctx->info.macs, 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
-    o.project_reference = 0; /* each residual is mapped, there and back */
-    o.warm_start = 0;
-    CHECK_OK(eits_set_options(ctx, &o));
+    /* each residual is mapped, there and back */
+    CHANGE_OPTIONS(ctx, o.project_reference = 0, o.warm_start = 0);
     CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     CHECK_EQUAL(ctx->projection.count, 0);
     ctx->frame.y[7] = 1;

@@ -27,13 +27,9 @@ TEST(a_halved_step_starts_afresh)
     spec.lipschitz_factor = 1.02 / 6;
     eits_context *ctx = dense_bench_open(&b, spec, 0);
     small_new_data(ctx, 91);
-    eits_options o = *eits_get_options(ctx);
-    o.solver = EITS_SOLVER_FISTA;
-    o.lambda_rel = R(0.1);
-    o.gap_rel = R(1e-30); /* so that each check is made */
-    o.iterations = 60;
-    o.gap_every = 10;
-    set_options(ctx, o);
+    /* so that each check is made */
+    CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_FISTA, o.lambda_rel = R(0.1), o.gap_rel = R(1e-30),
+                   o.iterations = 60, o.gap_every = 10);
     const eits_info info = solve(ctx);
     CHECK(info.step_halvings >= 1 && info.step_halvings <= 3);
     const double lipschitz = (double)b.c.model.lipschitz * pow(2, info.step_halvings);

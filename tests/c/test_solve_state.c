@@ -27,11 +27,6 @@ static void fill_y(dense_bench *b, double size, double noise, uint32_t shift)
     }
 }
 
-static void set_options(eits_context *ctx, eits_options o)
-{
-    CHECK_OK(eits_set_options(ctx, &o));
-}
-
 static eits_info solve(eits_context *ctx)
 {
     CHECK_OK(eits_solve(ctx, NULL));
@@ -42,11 +37,8 @@ TEST(detection_threshold_and_lambda_rule)
 {
     eits_context *ctx = set_up(&b, RANDOM);
     fill_y(&b, 1, 0, 0);
-    eits_options o = *eits_get_options(ctx);
-    o.detection_factor = R(1.5);
-    o.lambda_rel = R(0.1);
-    o.lambda_noise_factor = R(0.5);
-    set_options(ctx, o);
+    CHANGE_OPTIONS(ctx, o.detection_factor = R(1.5), o.lambda_rel = R(0.1),
+                   o.lambda_noise_factor = R(0.5));
     eits_info info = solve(ctx); /* the noise is not known: nothing is below a threshold */
     const double top = (double)info.lambda_max;
     CHECK(top > 0.1 && info.stop == EITS_STOP_ITERATIONS);
@@ -58,8 +50,8 @@ TEST(detection_threshold_and_lambda_rule)
     ctx->reference.lambda_noise = (eits_real)(0.5 * top);
     info = solve(ctx);
     CHECK_NEAR(info.lambda, 0.25 * top, 2 * EPS * top);
-    o.lambda_abs = (eits_real)(0.6 * top); /* goes before both */
-    set_options(ctx, o);
+    /* goes before both */
+    CHANGE_OPTIONS(ctx, o.lambda_abs = (eits_real)(0.6 * top));
     info = solve(ctx);
     CHECK_NEAR(info.lambda, 0.6 * top, 2 * EPS * top);
     CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
@@ -71,8 +63,7 @@ TEST(detection_threshold_and_lambda_rule)
     ctx->reference.lambda_noise = (eits_real)(top / 1.51);
     info = solve(ctx);
     CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros > 0);
-    o.detection_factor = 0;
-    set_options(ctx, o);
+    CHANGE_OPTIONS(ctx, o.detection_factor = 0);
     ctx->reference.lambda_noise = (eits_real)(100 * top);
     /* no threshold, and lambda_abs does not look at the noise */
     CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS);
@@ -125,11 +116,8 @@ TEST(no_ghost_after_lift_off)
 TEST(warm_start_is_forgotten)
 {
     eits_context *ctx = set_up(&b, RANDOM);
-    eits_options o = *eits_get_options(ctx);
     eits_real cold[N], warm[N], reference[SMALL_ROWS];
-    o.warm_start = 1;
-    o.iterations = 6;
-    set_options(ctx, o);
+    CHANGE_OPTIONS(ctx, o.warm_start = 1, o.iterations = 6);
     fill_y(&b, 1, 0.01, 0);
     (void)solve(ctx);
     memcpy(cold, eits_get_coefficients(ctx), sizeof cold);
@@ -139,10 +127,9 @@ TEST(warm_start_is_forgotten)
     eits_forget(ctx);
     (void)solve(ctx);
     CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
-    o.sign = EITS_SIGN_DECREASE; /* coefficients of the other sign are no start */
-    set_options(ctx, o);
-    o.sign = EITS_SIGN_INCREASE;
-    set_options(ctx, o);
+    /* coefficients of the other sign are no start */
+    CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_DECREASE);
+    CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_INCREASE);
     (void)solve(ctx);
     CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
     small_reference(&b.c.model, 1, reference);
@@ -150,8 +137,7 @@ TEST(warm_start_is_forgotten)
     CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
     (void)solve(ctx);
     CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
-    o.warm_start = 0;
-    set_options(ctx, o);
+    CHANGE_OPTIONS(ctx, o.warm_start = 0);
     (void)solve(ctx);
     CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
     eits_forget(NULL);
