@@ -52,6 +52,14 @@ static inline void vary(eits_real *out, const eits_real *from, double by, uint64
         out[i] = from[i] * (eits_real)(1 + by * small_random(state));
 }
 
+static inline uint32_t count_nonzeros(const eits_context *ctx)
+{
+    uint32_t count = 0;
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
+        count += ctx->solver.x[j] != 0;
+    return count;
+}
+
 /* Whether image and coefficients are wholly zero; wholly finite. */
 static inline int is_cleared(const eits_context *ctx)
 {

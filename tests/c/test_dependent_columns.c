@@ -18,12 +18,8 @@ static void check_result(const dense_bench *b, double max)
 {
     const eits_context *ctx = b->c.ctx;
     double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
-    uint32_t nonzeros = 0;
-    for (int j = 0; j < N; ++j) {
-        CHECK(isfinite((double)eits_get_image(ctx)[j]) && isfinite(x[j]));
-        nonzeros += x[j] != 0;
-    }
-    CHECK_EQUAL(ctx->info.nonzeros, nonzeros);
+    CHECK(is_finite(ctx));
+    CHECK_EQUAL(ctx->info.nonzeros, count_nonzeros(ctx));
     CHECK(dense_objective(&b->d, y, x, (double)ctx->info.lambda) <= max);
     free(x), free(y);
 }

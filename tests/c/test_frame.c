@@ -111,8 +111,7 @@ TEST(drift_of_the_gain)
                 eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1.7, project);
                 for (int i = 0; i < SMALL_ROWS; ++i)
                     b.frame[i] = b.reference[i] * (eits_real)(1 + drifts[e]);
-                uint32_t masked;
-                CHECK_OK(stage(&b, &masked));
+                STAGE(ctx, b.frame);
                 double *y = dense_copy(ctx->frame.y, RANK);
                 size[project] = sqrt(dense_dot(y, y, RANK));
                 free(y);

@@ -53,12 +53,8 @@ static void check_result(const dense_bench *b, const eits_info *info)
 {
     const eits_context *ctx = b->c.ctx;
     double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
-    uint32_t nonzeros = 0;
-    for (int j = 0; j < N; ++j) {
-        CHECK(isfinite((double)eits_get_image(ctx)[j]) && isfinite(x[j]));
-        nonzeros += x[j] != 0;
-    }
-    CHECK_EQUAL(nonzeros, info->nonzeros);
+    CHECK(is_finite(ctx));
+    CHECK_EQUAL(count_nonzeros(ctx), info->nonzeros);
     if (info->lambda > 0) {
         const double scale = 0.5 * dense_dot(y, y, RANK);
         CHECK_NEAR(dense_gap(&b->d, y, x, (double)info->lambda, eits_get_options(ctx)->sign),

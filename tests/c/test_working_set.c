@@ -60,32 +60,25 @@ static void check_same(const eits_context *a, const eits_context *b)
 TEST(looking_always_gives_the_bits_of_fista)
 {
     static const uint32_t counts[] = {1, 2, 11, 60};
-    for (int storage = 0; storage < 4; ++storage) {
-        for (int sign = 0; sign < 3; ++sign) {
-            for (int prepared = 0; prepared < 2; ++prepared) {
-                for (size_t k = 0; IN_TABLE(k, counts); ++k) {
-                    dense_bench b[2] = {0};
-                    for (int solver = 0; solver < 2; ++solver) {
-                        eits_context *ctx = set_up(&b[solver],
-                                                   (small_spec){.rank = RANK,
-                                                                .side = SIDE,
-                                                                .storage = (eits_storage)storage},
-                                                   prepared);
-                        eits_options o =
-                            with(ctx, (eits_solver)solver, counts[k], (eits_sign)sign, 0.05);
-                        look_always(&o);
-                        o.warm_start = 1;
-                        (void)solve(ctx, o);
-                        small_new_data(ctx, 62); /* and from there to other data */
-                        (void)solve(ctx, o);
-                    }
-                    CHECK(b[0].c.ctx->info.nonzeros > 0);
-                    check_same(b[0].c.ctx, b[1].c.ctx);
-                    dense_bench_close(&b[0]);
-                    dense_bench_close(&b[1]);
-                }
-            }
+    for (int way = 0; way < 4 * 3 * 2 * 4; ++way) {
+        const int storage = way / 24, sign = way / 8 % 3, prepared = way / 4 % 2, k = way % 4;
+        dense_bench b[2] = {0};
+        for (int solver = 0; solver < 2; ++solver) {
+            eits_context *ctx =
+                set_up(&b[solver],
+                       (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
+                       prepared);
+            eits_options o = with(ctx, (eits_solver)solver, counts[k], (eits_sign)sign, 0.05);
+            look_always(&o);
+            o.warm_start = 1;
+            (void)solve(ctx, o);
+            small_new_data(ctx, 62); /* and from there to other data */
+            (void)solve(ctx, o);
         }
+        CHECK(b[0].c.ctx->info.nonzeros > 0);
+        check_same(b[0].c.ctx, b[1].c.ctx);
+        dense_bench_close(&b[0]);
+        dense_bench_close(&b[1]);
     }
 }
 
