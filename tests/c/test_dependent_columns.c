@@ -189,22 +189,19 @@ TEST(the_active_set_ends_soon)
  * for ever. */
 TEST(hidden_columns)
 {
-    dense_bench b = {0};
-    b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
+    small_model made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
     uint32_t size, k = 3;
-    uint8_t *sens = small_model_section(&b.made, "SENS", &size);
+    uint8_t *sens = small_model_section(&made, "SENS", &size);
     uint64_t state = 3;
     for (size_t j = 0; j < N; ++j) {
         const float *hidden =
-            (const float *)(const void *)small_model_section(&b.made, "REDU", NULL) +
+            (const float *)(const void *)small_model_section(&made, "REDU", NULL) +
             EITS_STRIDE(RANK) * k;
         for (size_t i = 0; i < RANK; ++i)
             small_put_f32(sens + size / N * j + 4 * i,
                           hidden[i] * (float)(1 + BOTH_WIDTHS(1e-3, 2e-6) * small_random(&state)));
     }
-    small_model_seal(&b.made);
-    small_context_open(&b.c, &b.made, 0);
-    eits_context *ctx = b.c.ctx;
+    eits_context *ctx = dense_bench_take(&b, made, 0);
     CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.diagnostics = o.project_reference = 0,
                    o.max_masked = SMALL_ROWS, o.detection_factor = o.gap_rel = 0);
     eits_real frame[SMALL_ROWS];
@@ -216,8 +213,6 @@ TEST(hidden_columns)
     CHECK(ctx->projection.count == 1 && ctx->info.lambda > 0);
     CHECK_EQUAL(ctx->info.nonzeros, 0);
     CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
-    small_context_close(&b.c);
-    small_model_free(&b.made);
 }
 
 RUN_TESTS("exact solvers at their edges", dense_bench_close(&b))

@@ -103,9 +103,7 @@ TEST(crowds_on_both_sides_of_the_limit)
 
 TEST(a_reference_unlike_the_model_is_named_where_that_is_asked_for)
 {
-    static dense_bench bench;
-    eits_context *ctx =
-        dense_bench_open(&bench, (small_spec){.rank = 13, .side = 6, .shape = SMALL_WHITENED}, 0);
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     for (uint32_t k = 0; k < 4; ++k) {
         ctx->reference.far = k & 1u;
         ctx->options.diagnostics = k & 2u ? EITS_DIAGNOSTICS_ALL : EITS_DIAGNOSTIC_CROWDED;
@@ -113,7 +111,6 @@ TEST(a_reference_unlike_the_model_is_named_where_that_is_asked_for)
         eits_check_unlike_model(ctx);
         CHECK_EQUAL(ctx->info.diagnostics, k == 3 ? EITS_DIAGNOSTIC_UNLIKE_MODEL : 0);
     }
-    dense_bench_close(&bench);
 }
 
 /* ---- a stale reference ---- */

@@ -252,10 +252,9 @@ static void scale(uint8_t *at, double factor)
  * whitened (factor 0): whether frames with rows left out are whitened again. */
 static uint32_t can_whiten_masked_with(double factor, eits_real first_of_whitening[RANK])
 {
-    bench b = {0};
-    b.b.made = small_model_make(WHITENED);
-    uint8_t *p = small_model_section(&b.b.made, "REDU", NULL),
-            *form = small_model_section(&b.b.made, "WHIT", NULL);
+    small_model made = small_model_make(WHITENED);
+    uint8_t *p = small_model_section(&made, "REDU", NULL),
+            *form = small_model_section(&made, "WHIT", NULL);
     for (uint32_t i = 0; factor > 0 && i < SMALL_FOLDED * STRIDE; ++i)
         scale(p + 4 * i, factor);
     for (uint32_t i = 0; factor > 0 && i < STRIDE; ++i) {
@@ -265,10 +264,8 @@ static uint32_t can_whiten_masked_with(double factor, eits_real first_of_whiteni
     if (factor > 0)
         scale(form + 4, 1 / factor);
     else
-        memcpy(small_model_entry(&b.b.made, "WHIT"), "XTRW", 4);
-    small_model_seal(&b.b.made);
-    small_context_open(&b.b.c, &b.b.made, 0);
-    eits_context *ctx = b.b.c.ctx;
+        memcpy(small_model_entry(&made, "WHIT"), "XTRW", 4);
+    eits_context *ctx = dense_bench_take(&b.b, made, 0);
     small_reference(ctx->model, 1, b.reference);
     memcpy(b.frame, b.reference, sizeof b.frame);
     b.frame[3] *= R(1.1);
@@ -283,8 +280,6 @@ static uint32_t can_whiten_masked_with(double factor, eits_real first_of_whiteni
     CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
     for (uint32_t i = 0; i < RANK && can_whiten_masked; ++i)
         first_of_whitening[i] = ctx->projection.basis[STRIDE + i];
-    small_context_close(&b.b.c);
-    small_model_free(&b.b.made);
     return can_whiten_masked;
 }
 

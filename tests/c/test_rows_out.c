@@ -6,6 +6,7 @@
 
 enum { RANK = 4, PACKED = SMALL_FOLDED * (SMALL_FOLDED + 1) / 2, SIZE = 4 * PACKED, OTHER = 10 };
 
+static dense_bench b;
 static const small_spec TAUGHT = {.rank = RANK, .side = 5, .shape = SMALL_IDENTITY};
 static const small_spec WHITENED = {.rank = RANK, .side = 5, .shape = SMALL_WHITENED};
 
@@ -61,25 +62,19 @@ TEST(as_many_are_filled_in_as_are_spare)
     uint8_t bytes[SIZE + 4];
     section_of(bytes, 0.5f);
     const small_spec spec = {.rank = MANY, .side = 5, .shape = SMALL_IDENTITY};
-    small_model made = with_precision(spec, 1, bytes, SIZE);
     for (uint32_t out = 0; out <= SMALL_FOLDED - MANY + 1; ++out) {
         eits_real frame[SMALL_ROWS];
-        small_context c;
-        small_context_open(&c, &made, 0);
-        CHANGE_OPTIONS(c.ctx, o.project_reference = 0, o.diagnostics = 0,
-                       o.max_masked = SMALL_ROWS);
-        small_reference(&c.model, 1, frame);
-        CHECK_OK(eits_reference_set(c.ctx, frame, SMALL_ROWS));
-        for (uint32_t k = 0; k < out; ++k) {
-            lose_fold(&c.model, k, frame);
-        }
-        STAGE(c.ctx, frame);
-        CHECK_EQUAL(c.ctx->whitening.form, out > 0 && out <= SMALL_FOLDED - MANY
-                                               ? EITS_WHITENING_TRIANGLE
-                                               : EITS_WHITENING_STORED);
-        small_context_close(&c);
+        eits_context *ctx = dense_bench_take(&b, with_precision(spec, 1, bytes, SIZE), 0);
+        CHANGE_OPTIONS(ctx, o.project_reference = 0, o.diagnostics = 0, o.max_masked = SMALL_ROWS);
+        small_reference(ctx->model, 1, frame);
+        CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
+        for (uint32_t k = 0; k < out; ++k)
+            lose_fold(ctx->model, k, frame);
+        STAGE(ctx, frame);
+        CHECK_EQUAL(ctx->whitening.form, out > 0 && out <= SMALL_FOLDED - MANY
+                                             ? EITS_WHITENING_TRIANGLE
+                                             : EITS_WHITENING_STORED);
     }
-    small_model_free(&made);
 }
 
 /* A frame without fold 0, `pivot` the precision of that fold. */
@@ -89,23 +84,17 @@ static void solved(float leaning, float pivot, eits_real wanted_scale, eits_whit
     eits_real frame[SMALL_ROWS];
     section_of(bytes, leaning);
     small_put_f32(entry(bytes, 0, 0), pivot);
-    small_model made = with_precision(TAUGHT, 1, bytes, SIZE);
-    small_context c;
-    small_context_open(&c, &made, 0);
-    CHANGE_OPTIONS(c.ctx, o.project_reference = 0, o.diagnostics = 0);
-    small_reference(&c.model, 1, frame);
-    CHECK_OK(eits_reference_set(c.ctx, frame, SMALL_ROWS));
+    eits_context *ctx = dense_bench_take(&b, with_precision(TAUGHT, 1, bytes, SIZE), 0);
+    CHANGE_OPTIONS(ctx, o.project_reference = 0, o.diagnostics = 0);
+    small_reference(ctx->model, 1, frame);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)1.25;
-    frame[c.model.fold[0].first] = (eits_real)NAN;
-    if (c.model.fold[0].second != EITS_FOLD_NONE)
-        frame[c.model.fold[0].second] = (eits_real)NAN;
-    STAGE(c.ctx, frame);
-    CHECK_EQUAL(c.ctx->whitening.form, form);
-    const eits_real p = (eits_real)((const float *)c.model.reduction.data)[0];
-    CHECK_NEAR(c.ctx->frame.y[0], wanted_scale * p * c.ctx->frame.d[OTHER], 1e-5);
-    small_context_close(&c);
-    small_model_free(&made);
+    lose_fold(ctx->model, 0, frame);
+    STAGE(ctx, frame);
+    CHECK_EQUAL(ctx->whitening.form, form);
+    const eits_real p = (eits_real)((const float *)ctx->model->reduction.data)[0];
+    CHECK_NEAR(ctx->frame.y[0], wanted_scale * p * ctx->frame.d[OTHER], 1e-5);
 }
 
 TEST(a_row_leans_on_others_by_its_precision)
@@ -116,4 +105,4 @@ TEST(a_row_leans_on_others_by_its_precision)
     solved(0.5f, 0.0f, 0, EITS_WHITENING_STORED);
 }
 
-RUN_TESTS("rows out")
+RUN_TESTS("rows out", dense_bench_close(&b))
