@@ -1,5 +1,6 @@
 /* A few words to test with: a TEST runs by RUN_TESTS or run_tests(), in the order of the file; each
- * failed CHECK says where (the first MAX_SHOWN of them). */
+ * failed CHECK says where, in which test and, in a table, in which CASE (the first MAX_SHOWN of
+ * them). */
 #ifndef EITSKIN_TEST_CHECK_H
 #define EITSKIN_TEST_CHECK_H
 
@@ -19,37 +20,43 @@
 enum { MAX_SHOWN = 20 };
 static int checks_failed = 0;
 static int checks_made = 0;
+static const char *checks_test = "main", *checks_case = "";
+static long checks_number = -1;
 
-/* An inline function, so that a header may hold it without each test using it. */
-static inline void check_that(int right, const char *file, int line, const char *what)
+/* Counts a check; whether it is to be shown. Inline functions, so that a header may hold them
+ * without each test using them. */
+static inline int check_counts(int right, const char *file, int line)
 {
     ++checks_made;
-    if (right)
-        return;
-    if (++checks_failed <= MAX_SHOWN)
-        printf("%s:%d: not true: %s\n", file, line, what);
+    if (right || ++checks_failed > MAX_SHOWN)
+        return 0;
+    printf("%s:%d: %s", file, line, checks_test);
+    if (checks_case[0] != 0)
+        printf(", %s", checks_case);
+    if (checks_number >= 0)
+        printf(", case %ld", checks_number);
+    return 1;
+}
+
+static inline void check_that(int right, const char *file, int line, const char *what)
+{
+    if (check_counts(right, file, line))
+        printf(": not true: %s\n", what);
 }
 
 static inline void check_near(double got, double want, double tolerance, const char *file, int line,
                               const char *what)
 {
     const double off = got > want ? got - want : want - got;
-    ++checks_made;
-    if (off <= tolerance) /* false for NaN */
-        return;
-    if (++checks_failed <= MAX_SHOWN)
-        printf("%s:%d: %s = %.9g, expected %.9g within %.3g\n", file, line, what, got, want,
-               tolerance);
+    if (check_counts(off <= tolerance, file, line)) /* false for NaN */
+        printf(": %s = %.9g, expected %.9g within %.3g\n", what, got, want, tolerance);
 }
 
 static inline void check_equal(long long got, long long want, const char *file, int line,
                                const char *what)
 {
-    ++checks_made;
-    if (got == want)
-        return;
-    if (++checks_failed <= MAX_SHOWN)
-        printf("%s:%d: %s = %lld, expected %lld\n", file, line, what, got, want);
+    if (check_counts(got == want, file, line))
+        printf(": %s = %lld, expected %lld\n", what, got, want);
 }
 
 #define CHECK(condition) check_that((condition) != 0, __FILE__, __LINE__, #condition)
@@ -58,6 +65,14 @@ static inline void check_equal(long long got, long long want, const char *file, 
 /* Of whole numbers, statuses, enums. */
 #define CHECK_EQUAL(value, expected) \
     check_equal((long long)(value), (long long)(expected), __FILE__, __LINE__, #value)
+#define CHECK_OK(call)      CHECK_EQUAL(call, EITS_OK)
+#define CHECK_REFUSED(call) CHECK_EQUAL(call, EITS_E_ARGUMENT)
+
+/* From here on failures say this of their case, until another or the test's end. A loop over a
+ * table, for (size_t k = 0; IN_TABLE(k, cases); ++k), says the row's number. */
+#define CASE(name)        (checks_case = (name))
+#define COUNT_OF(list)    (sizeof(list) / sizeof(list)[0])
+#define IN_TABLE(k, list) ((checks_number = (k) < COUNT_OF(list) ? (long)(k) : -1) >= 0)
 
 static inline int checks_report(const char *name)
 {
@@ -67,22 +82,30 @@ static inline int checks_report(const char *name)
 }
 
 enum { MAX_TESTS = 64 };
-static void (*checks_tests[MAX_TESTS])(void);
+static struct {
+    const char *name;
+    void (*run)(void);
+} checks_tests[MAX_TESTS];
 static int checks_tests_known = 0;
 
 /* A test: the body follows. It puts itself on the list before main. */
-#define TEST(name)                                              \
-    static void name(void);                                     \
-    __attribute__((constructor)) static void name##_known(void) \
+#define TEST(body)                                              \
+    static void body(void);                                     \
+    __attribute__((constructor)) static void body##_known(void) \
     {                                                           \
-        checks_tests[checks_tests_known++] = name;              \
+        checks_tests[checks_tests_known].name = #body;          \
+        checks_tests[checks_tests_known++].run = body;          \
     }                                                           \
-    static void name(void)
+    static void body(void)
 
 static inline void run_tests(void)
 {
-    for (int k = 0; k < checks_tests_known; ++k)
-        checks_tests[k]();
+    for (int k = 0; k < checks_tests_known; ++k) {
+        checks_test = checks_tests[k].name;
+        CASE(""), checks_number = -1;
+        checks_tests[k].run();
+    }
+    checks_test = "main";
 }
 
 /* A main that runs the tests, then what is given as a last step. */

@@ -236,11 +236,17 @@ void dense_bench_close(dense_bench *bench)
     small_model_free(&bench->made);
 }
 
-eits_context *dense_bench_open(dense_bench *bench, small_spec spec, int prepared)
+eits_context *dense_bench_take(dense_bench *bench, small_model made, int prepared)
 {
     dense_bench_close(bench);
-    bench->made = small_model_make(spec);
+    bench->made = made;
+    small_model_seal(&bench->made);
     small_context_open(&bench->c, &bench->made, prepared);
     bench->d = dense_of(&bench->c.model);
     return bench->c.ctx;
+}
+
+eits_context *dense_bench_open(dense_bench *bench, small_spec spec, int prepared)
+{
+    return dense_bench_take(bench, small_model_make(spec), prepared);
 }

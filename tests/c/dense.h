@@ -58,6 +58,8 @@ typedef struct dense_bench {
     dense d;
 } dense_bench;
 eits_context *dense_bench_open(dense_bench *bench, small_spec spec, int prepared);
+/* On a model that was made already, and perhaps changed: it is sealed, and freed at the end. */
+eits_context *dense_bench_take(dense_bench *bench, small_model made, int prepared);
 void dense_bench_close(dense_bench *bench);
 
 #endif

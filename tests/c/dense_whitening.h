@@ -2,19 +2,10 @@
  * and of the regularisation. */
 #ifndef EITSKIN_TEST_DENSE_WHITENING_H
 #define EITSKIN_TEST_DENSE_WHITENING_H
+#include "steps.h"
 
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/solve.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { RANK = 13, STRIDE = 16, SIDE = 6, N = SIDE * SIDE };
 
@@ -35,26 +26,19 @@ static inline eits_context *set_up(bench *b, small_spec spec, int project)
     memset(b, 0, sizeof *b);
     eits_context *ctx = dense_bench_open(&b->b, spec, 0);
     small_reference(ctx->model, 1, b->reference);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
-    eits_options o = *eits_get_options(ctx);
-    o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_outliers.c */
-    o.project_reference = (uint32_t)project;
-    o.max_masked = SMALL_ROWS;
-    o.iterations = 40;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_reference_set(ctx, b->reference, SMALL_ROWS), EITS_OK);
+    vary(b->frame, b->reference, 0.2, &state);
+    /* arbitrary frames: what is found wrong with them is for test_outliers.c */
+    CHANGE_OPTIONS(ctx, o.diagnostics = 0, o.project_reference = (uint32_t)project,
+                   o.max_masked = SMALL_ROWS, o.iterations = 40);
+    CHECK_OK(eits_reference_set(ctx, b->reference, SMALL_ROWS));
     return ctx;
 }
 
 /* Leave folded row k out. */
 static inline void leave_out(bench *b, uint32_t k)
 {
-    const eits_fold fold = b->b.c.model.fold[k];
     b->out[k] = 1;
-    b->frame[fold.first] = R(NAN);
-    if (fold.second != EITS_FOLD_NONE)
-        b->frame[fold.second] = R(NAN);
+    lose_fold(&b->b.c.model, k, b->frame);
 }
 
 /* As though so much noise had been learned, over the reference's rms. */
@@ -68,7 +52,7 @@ static inline uint32_t stage(bench *b)
 {
     uint32_t masked = 0;
     uint64_t macs = 0;
-    CHECK_EQUAL(eits_frame_stage(b->b.c.ctx, b->frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_OK(eits_frame_stage(b->b.c.ctx, b->frame, SMALL_ROWS, &masked, &macs));
     return masked;
 }
 
@@ -148,9 +132,9 @@ static inline void solve_what_is_seen(bench *b, int sign)
         o.solver = (eits_solver)solver;
         o.iterations = 4000;
         o.gap_rel = R(BOTH_WIDTHS(1e-5, 1e-9));
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_OK(eits_set_options(ctx, &o));
         eits_forget(ctx);
-        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+        CHECK_OK(eits_solve(ctx, NULL));
         const eits_info info = *eits_get_info(ctx);
         CHECK(info.gap >= 0 && info.nonzeros > 0 && info.step_halvings == 0);
         double *got = dense_copy(eits_get_coefficients(ctx), N);

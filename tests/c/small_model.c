@@ -356,6 +356,36 @@ static int fill_sections(const small_spec *spec, uint32_t stride,
     return says;
 }
 
+small_model small_model_lay_out(uint32_t count, const char (*tags)[5], const uint32_t *sizes,
+                                uint32_t required, uint8_t **at)
+{
+    uint32_t total = 64 + 16 * count, offset = total;
+    for (uint32_t p = 0; p < count; ++p)
+        total += (sizes[p] + 15u) & ~15u;
+    small_model made = {.size = total};
+    made.blob = small_aligned(&made.memory, total);
+    for (uint32_t p = 0; p < count; ++p) {
+        uint8_t *entry = made.blob + 64 + 16 * p;
+        memcpy(entry, tags[p], 4);
+        small_put_u32(entry + 4, offset);
+        small_put_u32(entry + 8, sizes[p]);
+        small_put_u32(entry + 12, p < required);
+        at[p] = made.blob + offset;
+        offset += (sizes[p] + 15u) & ~15u;
+    }
+    memcpy(made.blob, "EITM", 4);
+    small_put_u16(made.blob + 4, 1);
+    small_put_u32(made.blob + 8, total);
+    small_put_u32(made.blob + 16, count);
+    return made;
+}
+
+void small_model_hash(small_model *model, uint32_t electrodes, uint32_t rows, const uint8_t *table)
+{
+    const uint64_t hash = eits_protocol_hash(electrodes, rows, table);
+    memcpy(model->blob + 24, &hash, sizeof hash);
+}
+
 small_model small_model_make(small_spec spec)
 {
     static const uint32_t item[] = {4, 2, 2, 1};
@@ -363,8 +393,7 @@ small_model small_model_make(small_spec spec)
     if (spec.side > 64)
         abort();
     const uint32_t sections = SMALL_SECTIONS + (spec.fields != 0);
-    const uint32_t n = kept_cells(&spec, cells), stride = (spec.rank + 7u) & ~7u,
-                   table = 64 + 16 * sections;
+    const uint32_t n = kept_cells(&spec, cells), stride = (spec.rank + 7u) & ~7u;
     const uint32_t sizes[SMALL_SECTIONS + 1] = {64,
                                                 SMALL_ROWS * 4,
                                                 SMALL_FOLDED * 8,
@@ -380,30 +409,13 @@ small_model small_model_make(small_spec spec)
                                                 2,
                                                 16 + n * SMALL_FIELDS_STRIDE * 2};
     const int integer = spec.storage == EITS_STORAGE_I16 || spec.storage == EITS_STORAGE_I8;
-    uint32_t total = table, offset = table;
-    for (uint32_t p = 0; p < sections; ++p)
-        total += (sizes[p] + 15u) & ~15u;
-    small_model made = {.size = total};
-    made.blob = small_aligned(&made.memory, total);
     uint8_t *at[SMALL_SECTIONS + 1] = {NULL};
-    for (uint32_t p = 0; p < sections; ++p) {
-        uint8_t *entry = made.blob + 64 + 16 * p;
-        /* an absent scale is written under a tag that readers skip */
-        memcpy(entry, p == SCAL && !integer ? "XTRA" : TAGS[p], 4);
-        small_put_u32(entry + 4, offset);
-        small_put_u32(entry + 8, sizes[p]);
-        small_put_u32(entry + 12, p < SCAL || (p == SCAL && integer));
-        at[p] = made.blob + offset;
-        offset += (sizes[p] + 15u) & ~15u;
-    }
+    small_model made = small_model_lay_out(sections, TAGS, sizes, SCAL + (integer != 0), at);
+    if (!integer) /* an absent scale is written under a tag that readers skip */
+        memcpy(small_model_entry(&made, "SCAL"), "XTRA", 4);
     if (!fill_sections(&spec, stride, at))
-        memcpy(made.blob + 64 + 16 * WHIT, "XTRW", 4); /* readers skip it */
-    memcpy(made.blob, "EITM", 4);
-    small_put_u16(made.blob + 4, 1);
-    small_put_u32(made.blob + 8, total);
-    small_put_u32(made.blob + 16, sections);
-    const uint64_t hash = eits_protocol_hash(SMALL_ELECTRODES, SMALL_ROWS, at[PROT]);
-    memcpy(made.blob + 24, &hash, sizeof hash);
+        memcpy(small_model_entry(&made, "WHIT"), "XTRW", 4); /* readers skip it */
+    small_model_hash(&made, SMALL_ELECTRODES, SMALL_ROWS, at[PROT]);
     small_model_seal(&made);
     return made;
 }
@@ -426,10 +438,42 @@ small_model small_model_with_section(const small_model *model, const char *tag, 
     return made;
 }
 
+small_model small_model_with(small_spec spec, const char *tag, const void *section, uint32_t size)
+{
+    small_model bare = small_model_make(spec);
+    const small_model made = small_model_with_section(&bare, tag, section, size);
+    small_model_free(&bare);
+    return made;
+}
+
+eits_status small_model_try(small_model model)
+{
+    eits_model opened;
+    small_model_seal(&model);
+    const eits_status status = eits_model_open(&opened, model.blob, model.size);
+    small_model_free(&model);
+    return status;
+}
+
 void small_model_free(small_model *model)
 {
     free(model->memory);
     model->memory = NULL;
+}
+
+void small_model_depend(small_model *model, uint32_t pixels, uint32_t rank, double off)
+{
+    uint32_t size;
+    uint8_t *sens = small_model_section(model, "SENS", &size);
+    const size_t column = size / pixels;
+    for (size_t j = 0; j < pixels; ++j) {
+        float *values = (float *)(void *)(sens + column * j);
+        if (j % 7 == 0)
+            memset(values, 0, column);
+        else if (j % 3 != 0)
+            memcpy(values, values - column / sizeof *values, column);
+        values[j % rank] *= (float)(1 + off);
+    }
 }
 
 void small_model_seal(small_model *model)

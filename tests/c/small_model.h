@@ -60,6 +60,24 @@ void small_model_free(small_model *model);
 small_model small_model_with_section(const small_model *model, const char *tag, const void *section,
                                      uint32_t size);
 
+/* A model of this spec with such a section. */
+small_model small_model_with(small_spec spec, const char *tag, const void *section, uint32_t size);
+
+/* Seals, tries to open and frees it. */
+eits_status small_model_try(small_model model);
+
+/* Columns of S in groups of three that are alike but for `off` of one number each, every seventh
+ * zero; `model` has float storage. */
+void small_model_depend(small_model *model, uint32_t pixels, uint32_t rank, double off);
+
+/* Room for `count` sections of these tags and sizes, the first `required` of them required; the
+ * table and the header but for checksum and hash. `at` gets where each section is. */
+small_model small_model_lay_out(uint32_t count, const char (*tags)[5], const uint32_t *sizes,
+                                uint32_t required, uint8_t **at);
+
+/* Write the protocol's hash again. */
+void small_model_hash(small_model *model, uint32_t electrodes, uint32_t rows, const uint8_t *table);
+
 /* Write the checksum again after bytes were changed. */
 void small_model_seal(small_model *model);
 

@@ -2,21 +2,14 @@
  * a frame. */
 #ifndef EITSKIN_TEST_SPOILED_FRAME_H
 #define EITSKIN_TEST_SPOILED_FRAME_H
+#include "steps.h"
 
-#include "check.h"
-#include "small_model.h"
-
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
-
-#include <math.h>
-#include <string.h>
 
 enum { UNTOUCHED = 16 };
 
 typedef struct bench {
-    small_model made;
-    small_context c;
+    dense_bench on;
     eits_real untouched[UNTOUCHED][SMALL_ROWS], frame[SMALL_ROWS];
     uint64_t state;
 } bench;
@@ -29,21 +22,13 @@ static inline void add_noise(bench *b, eits_real *frame)
         frame[i] += (eits_real)(1e-3 * small_random(&b->state));
 }
 
-static inline void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 /* 8 electrodes: with 40 rows each electrode has 20 of them, each pair 5 or 6 that drive or measure
  * across it. */
 static inline eits_context *set_up(bench *b, int noise_known)
 {
-    tear_down(b);
-    b->made = small_model_make((small_spec){.rank = 12, .side = 4});
-    small_context_open(&b->c, &b->made, 0);
+    eits_context *ctx = dense_bench_open(&b->on, (small_spec){.rank = 12, .side = 4}, 0);
     b->state = 7;
-    small_reference(&b->c.model, 1, b->frame);
+    small_reference(ctx->model, 1, b->frame);
     /* all rows of a like size, so that all are significant */
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b->frame[i] = b->frame[i] < 0 ? R(-1) : R(1);
@@ -51,16 +36,12 @@ static inline eits_context *set_up(bench *b, int noise_known)
         memcpy(b->untouched[k], b->frame, sizeof b->frame);
         add_noise(b, b->untouched[k]);
     }
-    if (noise_known) {
-        CHECK_EQUAL(eits_reference_begin(b->c.ctx, UNTOUCHED), EITS_OK);
-        for (int k = 0; k < UNTOUCHED; ++k)
-            CHECK_EQUAL(eits_reference_add(b->c.ctx, b->untouched[k], SMALL_ROWS), EITS_OK);
-        CHECK_EQUAL(eits_reference_finish(b->c.ctx), EITS_OK);
-    } else {
-        CHECK_EQUAL(eits_reference_set(b->c.ctx, b->frame, SMALL_ROWS), EITS_OK);
-    }
+    if (noise_known)
+        LEARN(ctx, UNTOUCHED, b->untouched);
+    else
+        CHECK_OK(eits_reference_set(ctx, b->frame, SMALL_ROWS));
     add_noise(b, b->frame);
-    return b->c.ctx;
+    return ctx;
 }
 
 static inline int row_uses(const eits_context *ctx, uint32_t i, uint32_t e)
@@ -89,7 +70,7 @@ static inline void look_for(eits_context *ctx, uint32_t diagnostics)
 
 static inline void reconstruct(bench *b)
 {
-    CHECK_EQUAL(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(b->on.c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
 }
 
 #endif

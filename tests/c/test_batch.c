@@ -1,52 +1,35 @@
 /* Many frames in one call: each as if it were alone, refused ones among them. */
-#include "check.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "eitskin/batch.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { SIDE = 8, N = SIDE * SIDE, FRAMES = 5, SHORT = 1, REFUSED = 3 };
 
 typedef struct bench {
-    small_model made;
-    small_context c;
+    dense_bench on;
     eits_real frames[FRAMES][SMALL_ROWS];
 } bench;
 
 static bench b;
 
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 /* Frames of noise on the reference; one has nothing but NaN. */
 static eits_context *set_up(bench *b)
 {
-    tear_down(b);
-    b->made = small_model_make((small_spec){.rank = 12, .side = SIDE, .shape = SMALL_WAVES});
-    small_context_open(&b->c, &b->made, 0);
+    const small_spec spec = {.rank = 12, .side = SIDE, .shape = SMALL_WAVES};
+    eits_context *ctx = dense_bench_open(&b->on, spec, 0);
     uint64_t state = 12;
     eits_real reference[SMALL_ROWS];
-    small_reference(&b->c.model, 1, reference);
-    CHECK_EQUAL(eits_reference_set(b->c.ctx, reference, SMALL_ROWS), EITS_OK);
+    small_reference(ctx->model, 1, reference);
+    CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
     for (int k = 0; k < FRAMES; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
             b->frames[k][i] =
                 k == REFUSED ? R(NAN) : reference[i] * (eits_real)(1 + 0.1 * small_random(&state));
     }
-    return b->c.ctx;
+    return ctx;
 }
 
-static void each_as_if_alone(void)
+TEST(each_as_if_alone)
 {
     bench b = {0}, alone = {0};
     eits_context *ctx = set_up(&b), *other = set_up(&alone);
@@ -54,9 +37,8 @@ static void each_as_if_alone(void)
     eits_touch touches[FRAMES][EITS_MAX_TOUCHES], found[EITS_MAX_TOUCHES];
     eits_result results[FRAMES];
     uint32_t touches_seen = 0;
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, FRAMES, images[0],
-                                       coefficients[0], touches[0], results),
-                EITS_OK);
+    CHECK_OK(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, FRAMES, images[0],
+                                    coefficients[0], touches[0], results));
     for (int k = 0; k < FRAMES; ++k) {
         eits_forget(other);
         const eits_status status =
@@ -65,7 +47,7 @@ static void each_as_if_alone(void)
         CHECK_EQUAL(status, k == REFUSED ? EITS_E_FRAME_CHANNELS : EITS_OK);
         uint32_t count = 0;
         if (status == EITS_OK)
-            CHECK_EQUAL(eits_find_touches(other, found, EITS_MAX_TOUCHES, &count), EITS_OK);
+            CHECK_OK(eits_find_touches(other, found, EITS_MAX_TOUCHES, &count));
         CHECK_EQUAL(results[k].count, count);
         for (uint32_t t = 0; t < count; ++t)
             CHECK(small_same_touch(&touches[k][t], &found[t]));
@@ -77,38 +59,27 @@ static void each_as_if_alone(void)
     CHECK(touches_seen >= FRAMES - 1);
     for (int j = 0; j < N; ++j)
         CHECK(images[REFUSED][j] == 0 && coefficients[REFUSED][j] == 0);
-    tear_down(&b);
-    tear_down(&alone);
+    dense_bench_close(&b.on);
+    dense_bench_close(&alone.on);
 }
 
 /* What is not wanted is not looked for; a frame of another length is refused by itself. */
-static void without_outputs(void)
+TEST(without_outputs)
 {
     eits_context *ctx = set_up(&b);
     eits_result results[FRAMES];
-    CHECK_EQUAL(
-        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, SHORT, NULL, NULL, NULL, results),
-        EITS_OK);
+    CHECK_OK(
+        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, SHORT, NULL, NULL, NULL, results));
     CHECK(results[0].status == EITS_OK && results[0].count == 0 &&
           results[0].info.touch_macs == 0 && results[0].info.macs > 0);
-    CHECK_EQUAL(
-        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS - 1, SHORT, NULL, NULL, NULL, results),
-        EITS_OK);
+    CHECK_OK(
+        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS - 1, SHORT, NULL, NULL, NULL, results));
     CHECK_EQUAL(results[0].status, EITS_E_FRAME_LENGTH);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 0, NULL, NULL, NULL, results),
-                EITS_OK);
-    CHECK_EQUAL(eits_reconstruct_batch(NULL, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, results),
-                EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, NULL, SMALL_ROWS, 1, NULL, NULL, NULL, results),
-                EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, NULL),
-                EITS_E_ARGUMENT);
+    CHECK_OK(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 0, NULL, NULL, NULL, results));
+    CHECK_REFUSED(
+        eits_reconstruct_batch(NULL, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, results));
+    CHECK_REFUSED(eits_reconstruct_batch(ctx, NULL, SMALL_ROWS, 1, NULL, NULL, NULL, results));
+    CHECK_REFUSED(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, NULL));
 }
 
-int main(void)
-{
-    each_as_if_alone();
-    without_outputs();
-    tear_down(&b);
-    return checks_report("batch");
-}
+RUN_TESTS("batch", dense_bench_close(&b.on))

@@ -1,15 +1,11 @@
 /* Columns held in the workspace: the right numbers wherever they stand, each unpacked once while it
  * is cached, products with the same bits as from S itself. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
 #include "context/column_cache.h"
 #include "context/products.h"
 #include "kernels/kernels.h"
 #include "solve/solve.h"
-
-#include <string.h>
 
 enum { SIDE = 20, N = SIDE * SIDE, RANK = 13, ROOM = 256 };
 
@@ -23,31 +19,22 @@ static void count_and_unpack(const eits_matrix *matrix, size_t first, size_t cou
 }
 
 typedef struct bench {
-    small_model made;
-    small_context c;
+    dense_bench on;
     eits_kernels kernels;
 } bench;
 
 static bench b;
 
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 static eits_context *set_up(bench *b, eits_storage storage, int prepared)
 {
-    tear_down(b);
-    memset(b, 0, sizeof *b);
-    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .storage = storage});
-    small_context_open(&b->c, &b->made, prepared);
-    real_kernels = b->c.ctx->kernels;
+    const small_spec spec = {.rank = RANK, .side = SIDE, .storage = storage};
+    eits_context *ctx = dense_bench_open(&b->on, spec, prepared);
+    real_kernels = ctx->kernels;
     b->kernels = *real_kernels;
     b->kernels.unpack = count_and_unpack;
-    b->c.ctx->kernels = &b->kernels;
+    ctx->kernels = &b->kernels;
     unpacked = 0;
-    return b->c.ctx;
+    return ctx;
 }
 
 /* `count` columns from `first`, every `step`-th. */
@@ -146,6 +133,6 @@ int main(void)
         same_products((eits_storage)storage, 0);
         same_products((eits_storage)storage, 1);
     }
-    tear_down(&b);
+    dense_bench_close(&b.on);
     return checks_report("columns");
 }

@@ -1,54 +1,26 @@
 /* The exact solvers where columns depend on each other and MACs run out, at whatever place: the
  * image is finite, and never worse than zero. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 static dense_bench b;
 
 enum { SIDE = 7, N = SIDE * SIDE, RANK = 6 };
 
-/* Columns in groups of three that are alike but for `off` of one number each, every seventh zero.
- */
 static eits_context *set_up(dense_bench *b, double off)
 {
-    dense_bench_close(b);
-    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
-    uint32_t size;
-    uint8_t *sens = small_model_section(&b->made, "SENS", &size);
-    const size_t column = size / N;
-    for (size_t j = 0; j < N; ++j) {
-        float *values = (float *)(void *)(sens + column * j);
-        if (j % 7 == 0)
-            memset(values, 0, column);
-        else if (j % 3 != 0)
-            memcpy(values, values - column / sizeof *values, column);
-        values[j % RANK] *= (float)(1 + off);
-    }
-    small_model_seal(&b->made);
-    small_context_open(&b->c, &b->made, 0);
-    b->d = dense_of(&b->c.model);
-    return b->c.ctx;
+    small_model made =
+        small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
+    small_model_depend(&made, N, RANK, off);
+    return dense_bench_take(b, made, 0);
 }
 
 static void check_result(const dense_bench *b, double max)
 {
     const eits_context *ctx = b->c.ctx;
     double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
-    uint32_t nonzeros = 0;
-    for (int j = 0; j < N; ++j) {
-        CHECK(isfinite((double)eits_get_image(ctx)[j]) && isfinite(x[j]));
-        nonzeros += x[j] != 0;
-    }
-    CHECK_EQUAL(eits_get_info(ctx)->nonzeros, nonzeros);
-    CHECK(dense_objective(&b->d, y, x, (double)eits_get_info(ctx)->lambda) <= max);
+    CHECK(is_finite(ctx));
+    CHECK_EQUAL(ctx->info.nonzeros, count_nonzeros(ctx));
+    CHECK(dense_objective(&b->d, y, x, (double)ctx->info.lambda) <= max);
     free(x), free(y);
 }
 
@@ -68,20 +40,19 @@ TEST(every_limit_beside_columns_that_depend)
             o.mac_limit = 0;
             o.solver = EITS_SOLVER_FISTA;
             o.warm_start = way >= 8;
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            CHECK_OK(eits_set_options(ctx, &o));
+            CHECK_OK(eits_solve(ctx, NULL));
             ctx->frame.y[limit % RANK] += R(0.4);
             double *y = dense_copy(ctx->frame.y, RANK);
             const double at_zero = 0.5 * dense_dot(y, y, RANK);
             free(y);
             o.mac_limit = limit;
             o.solver = EITS_SOLVER_ACTIVE_SET;
-            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
-            CHECK(eits_get_info(ctx)->macs <= limit);
-            CHECK(eits_get_info(ctx)->stop == EITS_STOP_MACS ||
-                  eits_get_info(ctx)->stop == EITS_STOP_OPTIMUM ||
-                  eits_get_info(ctx)->stop == EITS_STOP_ITERATIONS);
+            CHECK_OK(eits_set_options(ctx, &o));
+            CHECK_OK(eits_solve(ctx, NULL));
+            CHECK(ctx->info.macs <= limit);
+            CHECK(ctx->info.stop == EITS_STOP_MACS || ctx->info.stop == EITS_STOP_OPTIMUM ||
+                  ctx->info.stop == EITS_STOP_ITERATIONS);
             check_result(&b, at_zero * (1 + 1e-3));
         }
     }
@@ -109,10 +80,10 @@ TEST(starts_that_cancel)
     }
     ctx->solver.warm = 1;
     double *y = dense_copy(ctx->frame.y, RANK);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
-    CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
+    CHECK_OK(eits_solve(ctx, NULL));
+    CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
     check_result(&b, 0.5 * dense_dot(y, y, RANK));
-    CHECK(eits_get_info(ctx)->gap_rel < R(1e-3));
+    CHECK(ctx->info.gap_rel < R(1e-3));
     free(y);
 }
 
@@ -182,9 +153,9 @@ TEST(sweeps_as_written_apart)
             }
             CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_COORDINATE, o.sign = EITS_SIGN_BOTH,
                            o.iterations = SWEEPS, o.lambda_rel = R(0.02));
-            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
-            CHECK_EQUAL(eits_get_info(ctx)->iterations, SWEEPS);
-            dense_sweeps(&b.d, square, r, (double)eits_get_info(ctx)->lambda, SWEEPS, x);
+            CHECK_OK(eits_solve(ctx, NULL));
+            CHECK_EQUAL(ctx->info.iterations, SWEEPS);
+            dense_sweeps(&b.d, square, r, (double)ctx->info.lambda, SWEEPS, x);
             CHECK(dense_greatest_difference(x, eits_get_coefficients(ctx), N) < 3000 * EPS);
             free(r), free(x);
         }
@@ -201,18 +172,14 @@ TEST(the_active_set_ends_soon)
             &b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)},
             way % 2);
         small_new_data(ctx, 85 + (uint64_t)way);
-        eits_options o = *eits_get_options(ctx);
-        o.solver = EITS_SOLVER_ACTIVE_SET;
-        o.sign = (eits_sign)(way / 3 % 3);
-        o.iterations = ROUNDS;
-        o.lambda_rel = (eits_real)lambdas[way % 3];
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
-        CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
-        CHECK(eits_get_info(ctx)->iterations < ROUNDS && eits_get_info(ctx)->nonzeros <= RANK_HERE);
+        CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.sign = (eits_sign)(way / 3 % 3),
+                       o.iterations = ROUNDS, o.lambda_rel = (eits_real)lambdas[way % 3]);
+        CHECK_OK(eits_solve(ctx, NULL));
+        CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+        CHECK(ctx->info.iterations < ROUNDS && ctx->info.nonzeros <= RANK_HERE);
         double *x = dense_copy(eits_get_coefficients(ctx), 81),
                *y = dense_copy(ctx->frame.y, RANK_HERE);
-        const double gap = dense_gap(&b.d, y, x, (double)eits_get_info(ctx)->lambda, o.sign);
+        const double gap = dense_gap(&b.d, y, x, (double)ctx->info.lambda, ctx->options.sign);
         CHECK(gap <= BOTH_WIDTHS(3e-6, 1e-14) * 0.5 * dense_dot(y, y, RANK_HERE));
         free(x), free(y);
     }
@@ -222,37 +189,30 @@ TEST(the_active_set_ends_soon)
  * for ever. */
 TEST(hidden_columns)
 {
-    dense_bench b = {0};
-    b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
+    small_model made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
     uint32_t size, k = 3;
-    uint8_t *sens = small_model_section(&b.made, "SENS", &size);
+    uint8_t *sens = small_model_section(&made, "SENS", &size);
     uint64_t state = 3;
     for (size_t j = 0; j < N; ++j) {
         const float *hidden =
-            (const float *)(const void *)small_model_section(&b.made, "REDU", NULL) +
+            (const float *)(const void *)small_model_section(&made, "REDU", NULL) +
             EITS_STRIDE(RANK) * k;
         for (size_t i = 0; i < RANK; ++i)
             small_put_f32(sens + size / N * j + 4 * i,
                           hidden[i] * (float)(1 + BOTH_WIDTHS(1e-3, 2e-6) * small_random(&state)));
     }
-    small_model_seal(&b.made);
-    small_context_open(&b.c, &b.made, 0);
-    eits_context *ctx = b.c.ctx;
+    eits_context *ctx = dense_bench_take(&b, made, 0);
     CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.diagnostics = o.project_reference = 0,
                    o.max_masked = SMALL_ROWS, o.detection_factor = o.gap_rel = 0);
     eits_real frame[SMALL_ROWS];
     small_reference(ctx->model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] *= (eits_real)(1 + 0.2 * small_random(&state));
-    CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].first, 1), EITS_OK);
-    CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].second, 1), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK(ctx->projection.count == 1 && eits_get_info(ctx)->lambda > 0);
-    CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 0);
-    CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
-    small_context_close(&b.c);
-    small_model_free(&b.made);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
+    vary(frame, frame, 0.2, &state);
+    mask_fold(ctx, k);
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
+    CHECK(ctx->projection.count == 1 && ctx->info.lambda > 0);
+    CHECK_EQUAL(ctx->info.nonzeros, 0);
+    CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
 }
 
 RUN_TESTS("exact solvers at their edges", dense_bench_close(&b))

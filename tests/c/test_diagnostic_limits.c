@@ -1,17 +1,10 @@
 /* What is said of a frame that is imaged as it is - mismatch, a stale reference, crowds - and which
  * readings of reference frames are odd: from numbers set by hand, on both sides of each limit. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
-#include "eitskin/solve.h"
 #include "kernels/kernels.h"
 #include "touch/disc_fit.h"
-
-#include <math.h>
-#include <string.h>
 
 static dense_bench b;
 
@@ -23,7 +16,7 @@ static eits_context *set_up(dense_bench *b, eits_data_kind kind)
         b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind}, 0);
     eits_real reference[SMALL_ROWS];
     small_reference(ctx->model, 1, reference);
-    CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
     ctx->info.diagnostics = 0;
     return ctx;
 }
@@ -35,7 +28,7 @@ static int crowded(eits_context *ctx, const eits_touch *touches, uint32_t count)
     const eits_fit fit = eits_fit_none(ctx, &ctx->scratch); /* the residual is what a test wrote */
     ctx->info.unexplained = fit.total > 0 ? eits_fit_left(ctx, &fit) / fit.total : 0;
     eits_check_crowd(ctx, touches, count);
-    return (eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_CROWDED) != 0;
+    return (ctx->info.diagnostics & EITS_DIAGNOSTIC_CROWDED) != 0;
 }
 
 /* The score of crowded.c, in double, from its features. */
@@ -70,7 +63,7 @@ TEST(crowds_on_both_sides_of_the_limit)
     eits_touch t[4] = {{.radius_mm = 9, .explained = 1},
                        {.x_mm = 18, .y_mm = 24, .radius_mm = 9, .explained = R(0.04)}};
     said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.01, 2, 2), 0);
-    CHECK_NEAR(eits_get_info(ctx)->unexplained, 0.01, 1e-6);
+    CHECK_NEAR(ctx->info.unexplained, 0.01, 1e-6);
     t[1].x_mm = 12, t[1].y_mm = 16; /* nearer */
     said_as(ctx, t, 2, score_of(2, 8, 20.0 / 18, 1, 0.01, 2, 2), 1);
     t[1].x_mm = 0, t[1].y_mm = 30; /* no matter which way */
@@ -110,9 +103,7 @@ TEST(crowds_on_both_sides_of_the_limit)
 
 TEST(a_reference_unlike_the_model_is_named_where_that_is_asked_for)
 {
-    static dense_bench bench;
-    eits_context *ctx =
-        dense_bench_open(&bench, (small_spec){.rank = 13, .side = 6, .shape = SMALL_WHITENED}, 0);
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     for (uint32_t k = 0; k < 4; ++k) {
         ctx->reference.far = k & 1u;
         ctx->options.diagnostics = k & 2u ? EITS_DIAGNOSTICS_ALL : EITS_DIAGNOSTIC_CROWDED;
@@ -120,7 +111,6 @@ TEST(a_reference_unlike_the_model_is_named_where_that_is_asked_for)
         eits_check_unlike_model(ctx);
         CHECK_EQUAL(ctx->info.diagnostics, k == 3 ? EITS_DIAGNOSTIC_UNLIKE_MODEL : 0);
     }
-    dense_bench_close(&bench);
 }
 
 /* ---- a stale reference ---- */
@@ -138,20 +128,17 @@ TEST(stale_references_on_both_sides_of_the_limit)
         {EITS_SIGN_INCREASE, 1, 9, 0, 0},     {EITS_SIGN_BOTH, 1, 9, 0.1, 0},
     };
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
-    for (size_t k = 0; k < sizeof CASES / sizeof *CASES; ++k) {
-        eits_options o = *eits_get_options(ctx);
-        o.sign = CASES[k].sign;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    for (size_t k = 0; IN_TABLE(k, CASES); ++k) {
+        CHANGE_OPTIONS(ctx, o.sign = CASES[k].sign);
         eits_zero(ctx->solver.gradient, N);
         ctx->solver.gradient[5] = (eits_real)CASES[k].up;
         ctx->solver.gradient[N - 1] = (eits_real)-CASES[k].down;
         ctx->info.lambda_max =
-            (eits_real)(o.sign == EITS_SIGN_DECREASE ? CASES[k].down : CASES[k].up);
+            (eits_real)(ctx->options.sign == EITS_SIGN_DECREASE ? CASES[k].down : CASES[k].up);
         ctx->info.lambda_noise = (eits_real)CASES[k].noise;
         ctx->info.diagnostics = 0;
         eits_check_stale_reference(ctx, ctx->solver.gradient);
-        CHECK_EQUAL(eits_get_info(ctx)->diagnostics,
-                    CASES[k].stale ? EITS_DIAGNOSTIC_STALE_REFERENCE : 0);
+        CHECK_EQUAL(ctx->info.diagnostics, CASES[k].stale ? EITS_DIAGNOSTIC_STALE_REFERENCE : 0);
     }
 }
 
@@ -185,23 +172,21 @@ TEST(mismatches_on_both_sides_of_the_limits)
         CHECK_NEAR(ctx->range.shrink[i], s2 / (s2 + 1e-4) * inverse, 1e-4 * inverse);
         CHECK_NEAR(ctx->range.inverse[i], inverse, 1e-5);
     }
-    CHECK(!model_mismatch(ctx, 0.5) &&
-          eits_get_info(ctx)->model_mismatch == 0); /* the noise is not known */
+    CHECK(!model_mismatch(ctx, 0.5) && ctx->info.model_mismatch == 0); /* the noise is not known */
     ctx->reference.noise_v = R(1e-4);
     CHECK(model_mismatch(ctx, 0.06));
-    CHECK_NEAR(eits_get_info(ctx)->model_mismatch, 0.06, 2e-4);
+    CHECK_NEAR(ctx->info.model_mismatch, 0.06, 2e-4);
     CHECK(!model_mismatch(ctx, 0.045));
-    CHECK_NEAR(eits_get_info(ctx)->model_mismatch, 0.045, 2e-4);
+    CHECK_NEAR(ctx->info.model_mismatch, 0.045, 2e-4);
     /* of |d|^2 = (1 + off^2) 21/2; noise leaves 8 times noise_v^2 outside */
     const double off = 0.4, outside = off * off * SMALL_FOLDED / 2.0;
     ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 8.5));
     CHECK(!model_mismatch(ctx, off));
-    CHECK_NEAR(eits_get_info(ctx)->model_mismatch, sqrt(off * off * 7.5 / 8.5 / (1 + off * off)),
-               1e-3);
+    CHECK_NEAR(ctx->info.model_mismatch, sqrt(off * off * 7.5 / 8.5 / (1 + off * off)), 1e-3);
     ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 9.5));
     CHECK(model_mismatch(ctx, off));
     ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 0.9));
-    CHECK(!model_mismatch(ctx, off) && eits_get_info(ctx)->model_mismatch == 0);
+    CHECK(!model_mismatch(ctx, off) && ctx->info.model_mismatch == 0);
 }
 
 /* Two norms of the folds' data and one of the reduced: where the gain is not ignored nothing is
@@ -277,7 +262,7 @@ TEST(odd_readings_on_both_sides_of_the_limit)
         int odd;
     } CASES[] = {{4, 0.022, 1}, {4, 0.015, 0}, {5, 0.03, 1},
                  {5, 0.022, 0}, {6, 0.06, 1},  {6, 0.045, 0}};
-    for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
+    for (size_t n = 0; IN_TABLE(n, CASES); ++n) {
         memcpy(spoilt, newer, sizeof spoilt);
         spoilt[ctx->model->fold[CASES[n].fold].first] += (eits_real)CASES[n].off;
         CHECK_EQUAL(odd_folds(ctx, spoilt, older, marked), CASES[n].odd);
@@ -324,7 +309,7 @@ TEST(noise_of_any_size)
         eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
         double mean[SMALL_ROWS] = {0}, squares[SMALL_ROWS] = {0}, sum = 0;
         small_reference(ctx->model, 1, reference);
-        CHECK_EQUAL(eits_reference_begin(ctx, FRAMES), EITS_OK);
+        CHECK_OK(eits_reference_begin(ctx, FRAMES));
         for (int k = 0; k < FRAMES; ++k) {
             for (int i = 0; i < SMALL_ROWS; ++i) {
                 const double off = 0.01 * small_random(&state);
@@ -332,15 +317,15 @@ TEST(noise_of_any_size)
                 mean[i] += off / FRAMES;
                 squares[i] += off * off;
             }
-            CHECK_EQUAL(eits_reference_add(ctx, frame, SMALL_ROWS), EITS_OK);
+            CHECK_OK(eits_reference_add(ctx, frame, SMALL_ROWS));
         }
-        CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+        CHECK_OK(eits_reference_finish(ctx));
         for (int i = 0; i < SMALL_ROWS; ++i)
             sum += (squares[i] - FRAMES * mean[i] * mean[i]) / (FRAMES - 1) / SMALL_ROWS;
         CHECK_NEAR((double)ctx->reference.noise_v / sizes[n], sqrt(sum), 1e-4);
         CHECK_EQUAL(ctx->reference.outliers, 0);
         memset(frame, 0, sizeof frame); /* a dead front end is no reference frame */
-        CHECK_EQUAL(eits_reference_begin(ctx, FRAMES), EITS_OK);
+        CHECK_OK(eits_reference_begin(ctx, FRAMES));
         for (int k = 0; k < FRAMES; ++k) {
             for (int i = 0; i < SMALL_ROWS; ++i)
                 frame[i] = k < FRAMES / 2 ? reference[i] : 0;
@@ -353,8 +338,8 @@ TEST(noise_of_any_size)
     ctx->reference.lambda_noise = R(0.25);
     CHANGE_OPTIONS(ctx, o.lambda_rel = R(1e-3), o.lambda_noise_factor = R(0.5),
                    o.detection_factor = 0);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
-    CHECK(eits_get_info(ctx)->lambda == R(0.125) && eits_get_info(ctx)->lambda_noise == R(0.25));
+    CHECK_OK(eits_solve(ctx, NULL));
+    CHECK(ctx->info.lambda == R(0.125) && ctx->info.lambda_noise == R(0.25));
 }
 
 RUN_TESTS("diagnostic limits", dense_bench_close(&b))

@@ -1,16 +1,6 @@
 /* Coordinate descent and active set: the optimum as a duality gap written apart from the core sees
  * it, whatever the columns are like; the same bits in every layout; whatever they start from. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 enum { SIDE = 9, N = SIDE * SIDE, RANK = 12, MANY = 200000 };
 
@@ -33,47 +23,36 @@ static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iteration
     CHANGE_OPTIONS(ctx, o.solver = solver, o.iterations = iterations, o.sign = sign,
                    o.lambda_abs = 0, o.lambda_rel = (eits_real)lambda, o.lambda_noise_factor = 0,
                    o.gap_rel = (eits_real)gap);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     return *eits_get_info(ctx);
 }
 
 /* The gap at the result, in double. */
 static void check_gap(const eits_context *ctx, double max_rel)
 {
-    dense d = dense_of(ctx->model);
     const uint32_t n = ctx->model->n_pixels, rank = ctx->model->rank;
     double *x = dense_copy(eits_get_coefficients(ctx), n), *y = dense_copy(ctx->frame.y, rank);
-    const double gap = dense_gap(&d, y, x, (double)eits_get_info(ctx)->lambda,
-                                 eits_get_options(ctx)->sign),
+    const double gap = dense_gap(&b.d, y, x, (double)ctx->info.lambda, eits_get_options(ctx)->sign),
                  scale = 0.5 * dense_dot(y, y, rank);
-    CHECK_NEAR(gap, eits_get_info(ctx)->gap, 300 * EPS * scale);
+    CHECK_NEAR(gap, ctx->info.gap, 300 * EPS * scale);
     CHECK(gap <= max_rel * scale);
     for (uint32_t j = 0; j < n; ++j)
         CHECK(eits_get_options(ctx)->sign == EITS_SIGN_BOTH ||
               (eits_get_options(ctx)->sign == EITS_SIGN_INCREASE ? x[j] >= 0 : x[j] <= 0));
-    dense_free(&d);
     free(x), free(y);
 }
 
 TEST(both_solvers_reach_the_optimum)
 {
     static const double lambdas[] = {1e-3, 0.03, 0.5, 0.999};
-    for (int s = 0; s < 2; ++s) {
-        for (int storage = 0; storage < 4; ++storage) {
-            for (int sign = 0; sign < 3; ++sign) {
-                for (int l = 0; l < 4; ++l) {
-                    eits_context *ctx = set_up(
-                        &b,
-                        (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
-                        l % 2);
-                    const eits_info info =
-                        solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, lambdas[l], 0);
-                    CHECK_EQUAL(info.stop, EITS_STOP_OPTIMUM);
-                    CHECK(info.nonzeros >= 1 && info.nonzeros <= RANK);
-                    check_gap(ctx, s == 1 ? BOTH_WIDTHS(2e-6, 1e-14) : BOTH_WIDTHS(2e-4, 1e-10));
-                }
-            }
-        }
+    for (int way = 0; way < 2 * 4 * 3 * 4; ++way) {
+        const int s = way / 48, storage = way / 12 % 4, sign = way / 4 % 3, l = way % 4;
+        eits_context *ctx = set_up(
+            &b, (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, l % 2);
+        const eits_info info = solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, lambdas[l], 0);
+        CHECK_EQUAL(info.stop, EITS_STOP_OPTIMUM);
+        CHECK(info.nonzeros >= 1 && info.nonzeros <= RANK);
+        check_gap(ctx, s == 1 ? BOTH_WIDTHS(2e-6, 1e-14) : BOTH_WIDTHS(2e-4, 1e-10));
     }
 }
 
@@ -100,8 +79,7 @@ TEST(the_support_reaches_the_rank)
             CHECK(s == 0 || info.nonzeros <= RANK);
             if (sign == EITS_SIGN_BOTH)
                 CHECK(info.residual <= R(BOTH_WIDTHS(1e-3, 1e-6)) * info.data_norm);
-            for (int j = 0; j < N; ++j)
-                CHECK(isfinite((double)eits_get_coefficients(ctx)[j]));
+            CHECK(is_finite(ctx));
         }
     }
 }
@@ -110,40 +88,18 @@ TEST(the_support_reaches_the_rank)
  * neighbours. */
 TEST(columns_that_depend)
 {
-    for (int s = 0; s < 2; ++s) {
-        for (int near = 0; near < 2; ++near) {
-            for (int sign = 0; sign < 3; ++sign) {
-                for (int l = 0; l < 3; ++l) {
-                    dense_bench_close(&b);
-                    b.made = small_model_make(
-                        (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
-                    uint32_t size;
-                    uint8_t *sens = small_model_section(&b.made, "SENS", &size);
-                    const size_t column = size / N;
-                    for (size_t j = 0; j < N; ++j) {
-                        float *values = (float *)(void *)(sens + column * j);
-                        if (j % 7 == 0)
-                            memset(values, 0, column);
-                        else if (j % 3 != 0)
-                            memcpy(values, values - column / sizeof *values, column);
-                        values[j % RANK] *= near ? 1.0001f : 1.0f;
-                    }
-                    small_model_seal(&b.made);
-                    small_context_open(&b.c, &b.made, l % 2);
-                    eits_context *ctx = b.c.ctx;
-                    small_new_data(ctx, 61);
-                    const eits_info info = solve(ctx, SOLVERS[s], 50000, (eits_sign)sign,
-                                                 l == 0   ? 1e-4
-                                                 : l == 1 ? 0.02
-                                                          : 0.3,
-                                                 0);
-                    CHECK(info.stop != EITS_STOP_DIVERGED && info.nonzeros >= 1);
-                    /* descent by single coordinates hardly moves along what nearly cancels */
-                    check_gap(ctx,
-                              s == 0 && near ? BOTH_WIDTHS(0.5, 0.05) : BOTH_WIDTHS(1e-3, 1e-4));
-                }
-            }
-        }
+    static const double lambdas[] = {1e-4, 0.02, 0.3};
+    for (int way = 0; way < 2 * 2 * 3 * 3; ++way) {
+        const int s = way / 18, near = way / 9 % 2, sign = way / 3 % 3, l = way % 3;
+        small_model made =
+            small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
+        small_model_depend(&made, N, RANK, near ? 1e-4 : 0);
+        eits_context *ctx = dense_bench_take(&b, made, l % 2);
+        small_new_data(ctx, 61);
+        const eits_info info = solve(ctx, SOLVERS[s], 50000, (eits_sign)sign, lambdas[l], 0);
+        CHECK(info.stop != EITS_STOP_DIVERGED && info.nonzeros >= 1);
+        /* descent by single coordinates hardly moves along what nearly cancels */
+        check_gap(ctx, s == 0 && near ? BOTH_WIDTHS(0.5, 0.05) : BOTH_WIDTHS(1e-3, 1e-4));
     }
 }
 
@@ -160,26 +116,26 @@ TEST(few_pixels)
     }
 }
 
+/* Of all four solvers: panels or none, portable and fastest kernels. */
 TEST(same_bits_in_every_layout)
 {
-    for (int s = 0; s < 2; ++s) {
-        for (int storage = 0; storage < 4; ++storage) {
-            dense_bench b[4] = {0};
-            for (int way = 0; way < 4; ++way) {
-                eits_context *ctx = set_up(
-                    &b[way],
-                    (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
-                    way % 2);
-                CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
-                (void)solve(ctx, SOLVERS[s], 30, EITS_SIGN_BOTH, 0.005, 0);
-                CHECK(memcmp(eits_get_coefficients(ctx), eits_get_coefficients(b[0].c.ctx),
-                             N * sizeof(eits_real)) == 0);
-                CHECK(memcmp(eits_get_info(ctx), eits_get_info(b[0].c.ctx),
-                             sizeof *eits_get_info(ctx)) == 0);
-            }
-            for (int way = 0; way < 4; ++way)
-                dense_bench_close(&b[way]);
-        }
+    for (int way = 0; way < 4 * 4 * 4; ++way) {
+        static dense_bench first, other;
+        const int layout = way % 4, storage = way / 4 % 4, solver = way / 16;
+        const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
+        dense_bench *on = layout == 0 ? &first : &other;
+        eits_context *ctx = set_up(on, spec, layout % 2);
+        CHECK_EQUAL(ctx->columns.panels != NULL, layout % 2);
+        CHECK_OK(eits_use_portable_kernels(ctx, layout / 2));
+        (void)solve(ctx, (eits_solver)solver, 60, EITS_SIGN_BOTH, 0.005, 0);
+        CHECK(ctx->info.nonzeros > 0);
+        CHECK(memcmp(ctx->solver.x, first.c.ctx->solver.x, N * sizeof(eits_real)) == 0);
+        CHECK(memcmp(ctx->solver.image, first.c.ctx->solver.image, N * sizeof(eits_real)) == 0);
+        CHECK(memcmp(&ctx->info, &first.c.ctx->info, sizeof ctx->info) == 0);
+        if (layout != 0)
+            dense_bench_close(&other);
+        if (layout == 3)
+            dense_bench_close(&first);
     }
 }
 
@@ -192,7 +148,7 @@ TEST(warm_starts)
             eits_context *ctx = set_up(&b, RANDOM, sign % 2);
             ctx->options.warm_start = 1;
             (void)solve(ctx, EITS_SOLVER_FISTA, 2, (eits_sign)sign, 0.001, 0);
-            const uint32_t many = eits_get_info(ctx)->nonzeros;
+            const uint32_t many = ctx->info.nonzeros;
             CHECK(many > RANK);
             CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop,
                         EITS_STOP_OPTIMUM);
@@ -229,10 +185,8 @@ TEST(from_the_optimum)
 
 static double objective(const eits_context *ctx)
 {
-    dense d = dense_of(ctx->model);
     double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
-    const double value = dense_objective(&d, y, x, (double)eits_get_info(ctx)->lambda);
-    dense_free(&d);
+    const double value = dense_objective(&b.d, y, x, (double)ctx->info.lambda);
     free(x), free(y);
     return value;
 }
@@ -263,23 +217,21 @@ TEST(beside_a_basis)
             eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
             uint64_t state = 63;
             small_reference(&b.c.model, 1, reference);
-            for (int i = 0; i < SMALL_ROWS; ++i)
-                frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
+            vary(frame, reference, 0.3, &state);
             for (int i = 0; i < lost[k]; ++i)
                 frame[b.c.model.fold[i].first] =
                     frame[b.c.model.fold[i].second > SMALL_ROWS ? b.c.model.fold[i].first
                                                                 : b.c.model.fold[i].second] =
                         R(NAN);
-            CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
+            CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
             CHANGE_OPTIONS(ctx, o.solver = SOLVERS[s], o.iterations = MANY,
                            o.max_masked = SMALL_ROWS, o.sign = EITS_SIGN_BOTH,
                            o.lambda_rel = R(0.01));
-            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
             CHECK_EQUAL(ctx->projection.count, lost[k] + 1);
-            CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
-            CHECK(eits_get_info(ctx)->nonzeros >= 1 &&
-                  eits_get_info(ctx)->gap_rel <= R(BOTH_WIDTHS(1e-4, 1e-10)));
-            CHECK(s == 0 || eits_get_info(ctx)->nonzeros <= (uint32_t)(RANK - 1 - lost[k]));
+            CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+            CHECK(ctx->info.nonzeros >= 1 && ctx->info.gap_rel <= R(BOTH_WIDTHS(1e-4, 1e-10)));
+            CHECK(s == 0 || ctx->info.nonzeros <= (uint32_t)(RANK - 1 - lost[k]));
         }
     }
 }
@@ -289,7 +241,7 @@ TEST(numbers_that_cannot_be)
     static const double wild[] = {NAN, INFINITY, BOTH_WIDTHS(1e25, 1e200),
                                   BOTH_WIDTHS(1e-25, 1e-200), 0};
     for (int s = 0; s < 2; ++s) {
-        for (size_t k = 0; k < sizeof wild / sizeof wild[0]; ++k) {
+        for (size_t k = 0; IN_TABLE(k, wild); ++k) {
             for (int whole = 0; whole < 2; ++whole) {
                 eits_context *ctx = set_up(&b, RANDOM, 0);
                 for (uint32_t i = 0; i < (whole ? RANK : 1u); ++i)
@@ -301,9 +253,8 @@ TEST(numbers_that_cannot_be)
                     CHECK(isfinite((double)eits_get_image(ctx)[j]) &&
                           isfinite((double)eits_get_coefficients(ctx)[j]) &&
                           (k > 1 || eits_get_image(ctx)[j] == 0));
-                CHECK(isfinite((double)eits_get_info(ctx)->gap) &&
-                      isfinite((double)eits_get_info(ctx)->gap_rel) &&
-                      isfinite((double)eits_get_info(ctx)->residual));
+                CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.gap_rel) &&
+                      isfinite((double)ctx->info.residual));
             }
         }
     }

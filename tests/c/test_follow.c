@@ -1,27 +1,19 @@
 /* A reference that follows the untouched skin: when it moves and how far, what it never follows,
  * and what is known of a gain that could not be followed. */
-#include "check.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
 #include "eitskin/batch.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
 #include "frame/reference.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { RANK = 4, FRAMES = 32, APART = 2, PACKED = SMALL_FOLDED * (SMALL_FOLDED + 1) / 2 };
 
 typedef struct bench {
-    small_model made;
-    small_context c;
+    dense_bench on;
     eits_real quiet[SMALL_ROWS], frame[SMALL_ROWS];
 } bench;
+
+static bench b;
 
 /* Tared with one frame. Datum k of the first RANK folds is pixel k's alone. */
 static eits_context *set_up_as(bench *b, uint32_t reference_frames, small_spec spec)
@@ -29,18 +21,14 @@ static eits_context *set_up_as(bench *b, uint32_t reference_frames, small_spec s
     spec.rank = RANK;
     spec.side = 5;
     spec.shape = SMALL_IDENTITY;
-    b->made = small_model_make(spec);
-    small_context_open(&b->c, &b->made, 0);
-    eits_options o = *eits_get_options(b->c.ctx);
-    CHECK_EQUAL(o.reference_frames, 0); /* a model has to ask for it */
-    o.project_reference = 0;
-    o.reference_frames = reference_frames;
-    o.diagnostics = EITS_DIAGNOSTIC_STALE_REFERENCE;
-    CHECK_EQUAL(eits_set_options(b->c.ctx, &o), EITS_OK);
-    small_reference(&b->c.model, 1, b->quiet);
+    eits_context *ctx = dense_bench_open(&b->on, spec, 0);
+    CHECK_EQUAL(ctx->options.reference_frames, 0); /* a model has to ask for it */
+    CHANGE_OPTIONS(ctx, o.project_reference = 0, o.reference_frames = reference_frames,
+                   o.diagnostics = EITS_DIAGNOSTIC_STALE_REFERENCE);
+    small_reference(ctx->model, 1, b->quiet);
     eits_copy(b->frame, b->quiet, SMALL_ROWS);
-    CHECK_EQUAL(eits_reference_set(b->c.ctx, b->quiet, SMALL_ROWS), EITS_OK);
-    return b->c.ctx;
+    CHECK_OK(eits_reference_set(ctx, b->quiet, SMALL_ROWS));
+    return ctx;
 }
 
 static eits_context *set_up(bench *b, uint32_t reference_frames)
@@ -48,16 +36,10 @@ static eits_context *set_up(bench *b, uint32_t reference_frames)
     return set_up_as(b, reference_frames, (small_spec){.storage = EITS_STORAGE_F32});
 }
 
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
 /* The frame is changed by `change` of its own value in each row of fold k. */
 static void change_fold(bench *b, uint32_t k, double change)
 {
-    const eits_fold fold = b->c.model.fold[k];
+    const eits_fold fold = b->on.c.model.fold[k];
     b->frame[fold.first] = (eits_real)(1 + change) * b->quiet[fold.first];
     if (fold.second != EITS_FOLD_NONE)
         b->frame[fold.second] = (eits_real)(1 + change) * b->quiet[fold.second];
@@ -72,15 +54,16 @@ static void change_all(bench *b, double change)
 /* `count` frames, untouched or with a touch on pixel 0; how often the reference moved. */
 static int pass(bench *b, int count, int untouched)
 {
-    const eits_model *m = &b->c.model;
+    const eits_model *m = &b->on.c.model;
     const eits_touch touch = {.x_mm = (eits_real)(m->origin_x_mm + 0.5f * m->pixel_mm),
                               .y_mm = (eits_real)(m->origin_y_mm + 0.5f * m->pixel_mm)};
     const uint32_t touches = untouched ? 0 : 1;
     uint64_t macs = 0;
     int moved = 0;
     for (int k = 0; k < count; ++k) {
-        CHECK_EQUAL(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        moved += eits_follow_end(b->c.ctx, &b->c.ctx->scratch, &touch, touches, touches, &macs);
+        CHECK_OK(eits_reconstruct(b->on.c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
+        moved +=
+            eits_follow_end(b->on.c.ctx, &b->on.c.ctx->scratch, &touch, touches, touches, &macs);
     }
     CHECK((macs > 0 || moved == 0) && macs < 10000);
     return moved;
@@ -89,7 +72,7 @@ static int pass(bench *b, int count, int untouched)
 /* How far row i's reference went of the way to the frame. */
 static double gone(const bench *b, uint32_t i)
 {
-    return (double)((b->c.ctx->reference.v0[i] - b->quiet[i]) / (b->frame[i] - b->quiet[i]));
+    return (double)((b->on.c.ctx->reference.v0[i] - b->quiet[i]) / (b->frame[i] - b->quiet[i]));
 }
 
 TEST(it_goes_a_part_of_the_way_after_as_large_a_part_of_its_time)
@@ -106,8 +89,7 @@ TEST(it_goes_a_part_of_the_way_after_as_large_a_part_of_its_time)
                  {FRAMES, APART - 1, 0, 0},
                  {FRAMES, APART, 1, 0.0625},
                  {FRAMES, 5, 2, 0.12109375}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
-        bench b;
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         eits_context *ctx = set_up(&b, cases[k].frames);
         const eits_real gain = ctx->reference.gain;
         change_all(&b, 0.01);
@@ -116,13 +98,11 @@ TEST(it_goes_a_part_of_the_way_after_as_large_a_part_of_its_time)
             CHECK_NEAR(gone(&b, i), cases[k].goes, 3e4 * EPS);
         /* fitted again: a larger reference asks for less gain */
         CHECK_NEAR(ctx->reference.gain * (1 + 0.01 * cases[k].goes), gain, 20 * EPS * gain);
-        tear_down(&b);
     }
 }
 
 TEST(a_touch_lets_go_what_came_before_and_as_much_behind_it)
 {
-    bench b;
     (void)set_up(&b, FRAMES);
     change_all(&b, 0.01);
     CHECK_EQUAL(pass(&b, APART - 1, 1), 0);
@@ -130,26 +110,26 @@ TEST(a_touch_lets_go_what_came_before_and_as_much_behind_it)
     CHECK_EQUAL(pass(&b, APART + APART - 1, 1), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     CHECK_EQUAL(pass(&b, 1, 1), 0);
-    eits_forget(b.c.ctx); /* frames that have nothing to do with those before */
+    eits_forget(b.on.c.ctx); /* frames that have nothing to do with those before */
     CHECK_EQUAL(pass(&b, 2 * APART - 1, 1), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     /* nobody looked for touches in one of them, or one was of no use */
-    CHECK_EQUAL(eits_reconstruct(b.c.ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(b.on.c.ctx, b.frame, SMALL_ROWS, NULL, NULL));
     CHECK_EQUAL(pass(&b, 2 * APART - 1, 1), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = R(NAN);
-    CHECK_EQUAL(eits_reconstruct(b.c.ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reconstruct(b.on.c.ctx, b.frame, SMALL_ROWS, NULL, NULL),
+                EITS_E_FRAME_CHANNELS);
     change_all(&b, 0.01);
     CHECK_EQUAL(pass(&b, 2 * APART - 1, 1), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
-    tear_down(&b);
 }
 
 /* A change that gives fold k the same datum as fold 0. */
 static double as_much(const bench *b, uint32_t k)
 {
-    return 0.01 * (double)(b->c.model.v_ref[0] / b->c.model.v_ref[k]);
+    return 0.01 * (double)(b->on.c.model.v_ref[0] / b->on.c.model.v_ref[k]);
 }
 
 /* One pixel's data alone, or two pixels': the best column gives all, or half. */
@@ -157,7 +137,6 @@ TEST(what_looks_like_a_touch_is_not_followed)
 {
     for (int k = 0; k < 4; ++k) {
         const uint32_t folds = 1 + (uint32_t)k % 2;
-        bench b;
         eits_context *ctx =
             set_up_as(&b, 1, (small_spec){.storage = k < 2 ? EITS_STORAGE_F32 : EITS_STORAGE_I8});
         for (uint32_t fold = 0; fold < folds; ++fold)
@@ -165,7 +144,6 @@ TEST(what_looks_like_a_touch_is_not_followed)
         CHECK_EQUAL(pass(&b, 3, 1), folds == 1 ? 0 : 3);
         if (folds == 2)
             CHECK_NEAR(gone(&b, ctx->model->fold[1].first), 1, 3e4 * EPS);
-        tear_down(&b);
     }
 }
 
@@ -173,7 +151,6 @@ TEST(what_looks_like_a_touch_is_not_followed)
  * from the first. */
 TEST(frames_are_averaged_before_they_are_compared)
 {
-    bench b;
     eits_context *ctx = set_up(&b, FRAMES);
     change_fold(&b, 0, as_much(&b, 0));
     CHECK_EQUAL(pass(&b, 1, 1), 0);
@@ -186,12 +163,10 @@ TEST(frames_are_averaged_before_they_are_compared)
     change_all(&b, 0.02);
     CHECK_EQUAL(pass(&b, APART, 1), 1);
     CHECK(ctx->reference.follow.level == level && ctx->info.lambda_max > level);
-    tear_down(&b);
 }
 
 TEST(a_row_that_one_frame_lacks_stays)
 {
-    bench b;
     eits_context *ctx = set_up(&b, FRAMES);
     change_all(&b, 0.01);
     const eits_real kept = b.frame[7];
@@ -201,7 +176,6 @@ TEST(a_row_that_one_frame_lacks_stays)
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     CHECK(ctx->reference.v0[7] == b.quiet[7]);
     CHECK_NEAR(gone(&b, 8), 0.0625, 3e4 * EPS);
-    tear_down(&b);
 }
 
 /* After N / 4 frames the reference is as large as the frame beside the touch, which may press as it
@@ -213,8 +187,7 @@ TEST(under_a_touch_only_its_size_follows)
         double beside; /* and of pixel 1's, which no touch gives */
         double goes;   /* so far goes the reference, relative */
     } cases[] = {{0.01, 0, 0.01}, {0, 0.03, 0.01}, {-0.01, 0, -0.01}, {0.03, 0, 0}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
-        bench b;
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         eits_context *ctx = set_up(&b, FRAMES);
         change_fold(&b, 0, 0.2);
         CHECK_EQUAL(pass(&b, 2 * APART, 0), 0); /* it lands; the first mean */
@@ -235,7 +208,6 @@ TEST(under_a_touch_only_its_size_follows)
         (void)pass(&b, APART, 0); /* on, from where it is */
         if (cases[k].beside == 0)
             CHECK_NEAR(ctx->reference.v0[9] / b.quiet[9], 1 + cases[k].goes, 200 * EPS);
-        tear_down(&b);
     }
 }
 
@@ -243,9 +215,8 @@ TEST(under_a_touch_only_its_size_follows)
  * places beyond the skin's edge are, there is. */
 TEST(where_touches_may_give_all_it_stays)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
-    const eits_model *m = &b.c.model;
+    const eits_model *m = &b.on.c.model;
     for (int k = 0; k < 2; ++k) {
         eits_touch touches[2 * RANK];
         for (int t = 0; t < 2 * RANK; ++t)
@@ -255,14 +226,13 @@ TEST(where_touches_may_give_all_it_stays)
         for (int frame = 0; frame < 3; ++frame) {
             uint64_t macs = 0;
             change_all(&b, 0.001 * frame);
-            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
             CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, touches, 2 * RANK, 2 * RANK, &macs),
                         k == 1 && frame > 0);
         }
         CHECK_NEAR(ctx->reference.v0[9] / b.quiet[9], k == 0 ? 1 : 1.002, 100 * EPS);
         eits_forget(ctx);
     }
-    tear_down(&b);
 }
 
 /* A touch on the edge of two pixels is of both: rounding does not choose one. */
@@ -270,20 +240,18 @@ TEST(on_the_edge_of_pixels_rounding_decides_nothing)
 {
     double goes[2];
     for (int side = 0; side < 2; ++side) {
-        bench b;
         eits_context *ctx = set_up(&b, 2);
-        const eits_model *m = &b.c.model;
+        const eits_model *m = &b.on.c.model;
         const double edge = (double)m->origin_x_mm + (double)m->pixel_mm;
         const eits_touch touch = {.x_mm = (eits_real)(edge * (1 + (side == 0 ? -4 : 4) * EPS)),
                                   .y_mm = (eits_real)(m->origin_y_mm + 0.5f * m->pixel_mm)};
         for (int frame = 0; frame < 2; ++frame) {
             uint64_t macs = 0;
             change_fold(&b, 0, 0.01 * frame);
-            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
             CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, &touch, 1, 1, &macs), frame);
         }
         goes[side] = (double)(ctx->reference.v0[9] / b.quiet[9]) - 1;
-        tear_down(&b);
     }
     CHECK(fabs(goes[0]) > 1e-4);
     CHECK_NEAR(goes[0], goes[1], 100 * EPS);
@@ -296,13 +264,11 @@ TEST(the_size_of_differences_follows_on_any_outline)
         small_spec spec;
         int moves;
     } cases[] = {{{.round = 1}, 1}, {{.kind = EITS_DATA_LOG_RATIO}, 0}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
-        bench b;
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         (void)set_up_as(&b, 2, cases[k].spec);
         CHECK_EQUAL(pass(&b, 1, 0), 0);
         change_all(&b, 0.01);
         CHECK_EQUAL(pass(&b, 1, 0), cases[k].moves);
-        tear_down(&b);
     }
 }
 
@@ -310,38 +276,32 @@ TEST(the_size_of_differences_follows_on_any_outline)
 TEST(the_size_follows_under_the_same_touches_alone)
 {
     for (uint32_t apart = 0; apart <= 3; apart += 3) {
-        bench b;
         eits_context *ctx = set_up(&b, 2);
         eits_touch touches[EITS_MAX_TOUCHES];
         uint32_t count = 0, ids = 0;
-        eits_options o = *eits_get_options(ctx);
-        o.follow_mm = b.c.model.pixel_mm;
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHANGE_OPTIONS(ctx, o.follow_mm = b.on.c.model.pixel_mm);
         for (uint32_t k = 0; k < 8; ++k) {
             const uint32_t pixel = k % 2 * apart;
             change_all(&b, 0.001 * k);
-            change_fold(&b, pixel, b.c.model.v_ref[pixel] < 0 ? -0.5 : 0.5);
-            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-            CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+            change_fold(&b, pixel, b.on.c.model.v_ref[pixel] < 0 ? -0.5 : 0.5);
+            CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
+            CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
             CHECK_EQUAL(count, 1);
             ids = touches[0].id > ids ? touches[0].id : ids;
         }
         CHECK_EQUAL(ids, apart == 0 ? 1 : 8);
         CHECK_EQUAL(ctx->reference.v0[9] != b.quiet[9], apart == 0);
-        tear_down(&b);
     }
 }
 
 TEST(a_frame_of_no_use_is_not_followed)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     uint64_t macs = 0;
     change_all(&b, 0.01);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
     CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, NULL, 0, EITS_FOLLOW_UNKNOWN, &macs), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
-    tear_down(&b);
 }
 
 /* Section PREC makes it a taught one. */
@@ -377,12 +337,9 @@ TEST(touches_that_explain_little_are_drift)
         {0.4, 5, 0, 1, 32, 3, EITS_DIAGNOSTICS_ALL, 0},
     };
     for (int physics = 0; physics < 2; ++physics) {
-        bench b = {.made = physics ? small_model_make((small_spec){
-                                         .rank = RANK, .side = 5, .shape = SMALL_IDENTITY})
-                                   : taught()};
-        small_context_open(&b.c, &b.made, 0);
-        eits_context *ctx = b.c.ctx;
-        for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+        const small_spec spec = {.rank = RANK, .side = 5, .shape = SMALL_IDENTITY};
+        eits_context *ctx = dense_bench_take(&b.on, physics ? small_model_make(spec) : taught(), 0);
+        for (size_t k = 0; IN_TABLE(k, cases); ++k) {
             ctx->options.reference_frames = cases[k].frames;
             ctx->options.diagnostics = cases[k].diagnostics;
             ctx->options.detection_factor = 1;
@@ -396,49 +353,45 @@ TEST(touches_that_explain_little_are_drift)
             CHECK_EQUAL(eits_check_drift(ctx), drift);
             CHECK_EQUAL(ctx->info.diagnostics, drift ? EITS_DIAGNOSTIC_STALE_REFERENCE : 0);
         }
-        tear_down(&b);
     }
 }
 
 /* By the public functions: drift while nothing is touched, a touch, a batch, and put by. */
 TEST(as_a_caller_sees_it)
 {
-    bench b;
     eits_context *ctx = set_up(&b, 1);
     eits_touch touches[EITS_MAX_TOUCHES];
     eits_result results[2];
     uint32_t count = 0;
     void *memory = NULL;
-    const size_t size = eits_saved_size(&b.c.model);
+    const size_t size = eits_saved_size(&b.on.c.model);
     void *saved = small_aligned(&memory, size);
     change_all(&b, -0.01); /* less data than nothing: no touch by its sign */
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
+    CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     CHECK_EQUAL(count, 0);
     CHECK_NEAR(gone(&b, 5), 1, 3e4 * EPS);
-    CHECK_EQUAL(eits_save(ctx, saved, size), EITS_OK);
+    CHECK_OK(eits_save(ctx, saved, size));
     eits_real kept[SMALL_ROWS];
     eits_copy(kept, ctx->reference.v0, SMALL_ROWS);
     eits_copy(b.quiet, kept, SMALL_ROWS);
     change_all(&b, 0);
-    change_fold(&b, 1, b.c.model.v_ref[1] < 0 ? -0.5 : 0.5);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    change_fold(&b, 1, b.on.c.model.v_ref[1] < 0 ? -0.5 : 0.5);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
+    CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     CHECK_EQUAL(count, 1);
     CHECK(memcmp(kept, ctx->reference.v0, sizeof kept) == 0);
     change_all(&b, -0.01);
     const eits_real *frames = b.frame;
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, frames, SMALL_ROWS, 1, NULL, NULL, touches, results),
-                EITS_OK);
+    CHECK_OK(eits_reconstruct_batch(ctx, frames, SMALL_ROWS, 1, NULL, NULL, touches, results));
     CHECK_EQUAL(eits_get_options(ctx)->reference_frames, 1);
     CHECK(memcmp(kept, ctx->reference.v0, sizeof kept) == 0);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
+    CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     CHECK_NEAR(gone(&b, 5), 1, 3e4 * EPS);
-    CHECK_EQUAL(eits_restore(ctx, saved, size), EITS_OK);
+    CHECK_OK(eits_restore(ctx, saved, size));
     CHECK(memcmp(kept, ctx->reference.v0, sizeof kept) == 0);
     free(memory);
-    tear_down(&b);
 }
 
-RUN_TESTS("follow")
+RUN_TESTS("follow", dense_bench_close(&b.on))

@@ -1,11 +1,6 @@
 /* The section LOAD: what it says of a touch, by hand in double, and everything that a reader
  * refuses. */
-#include "base/vec.h"
-#include "check.h"
-#include "small_model.h"
-
-#include <math.h>
-#include <string.h>
+#include "steps.h"
 
 static const small_spec TINY = {.rank = 3, .side = 3};
 enum { HEAD = 32, MAX = 1024 };
@@ -31,19 +26,13 @@ static uint32_t section_of(uint8_t *bytes, uint32_t order)
 static eits_status open_with(const uint8_t *bytes, uint32_t size, eits_model *model,
                              small_model *kept)
 {
-    small_model bare = small_model_make(TINY);
-    *kept = small_model_with_section(&bare, "LOAD", bytes, size);
-    small_model_free(&bare);
+    *kept = small_model_with(TINY, "LOAD", bytes, size);
     return eits_model_open(model, kept->blob, kept->size);
 }
 
 static eits_status refused(const uint8_t *bytes, uint32_t size)
 {
-    eits_model model;
-    small_model kept;
-    const eits_status status = open_with(bytes, size, &model, &kept);
-    small_model_free(&kept);
-    return status;
+    return small_model_try(small_model_with(TINY, "LOAD", bytes, size));
 }
 
 static eits_status with_word(uint32_t order, uint32_t at, uint32_t word)
@@ -77,7 +66,7 @@ TEST(forces_are_those_of_the_table)
         uint8_t bytes[MAX];
         eits_model model;
         small_model kept;
-        CHECK_EQUAL(open_with(bytes, section_of(bytes, order), &model, &kept), EITS_OK);
+        CHECK_OK(open_with(bytes, section_of(bytes, order), &model, &kept));
         for (int i = 0; i < 500; ++i) {
             /* of either sign */
             const double x = -16 + 0.064 * i, y = 12 * sin(i), strength = 6 * cos(0.37 * i);
@@ -104,7 +93,7 @@ TEST(no_calibration_no_force)
 {
     small_model made = small_model_make(TINY);
     eits_model model;
-    CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_OK);
+    CHECK_OK(eits_model_open(&model, made.blob, made.size));
     CHECK(model.force.head == NULL && eits_force_n(&model, 1, 2, 3) == 0);
     small_model_free(&made);
 }
@@ -114,7 +103,7 @@ TEST(sections_of_another_size)
     uint8_t bytes[MAX];
     for (uint32_t order = 0; order <= EITS_MAX_FORCE_ORDER; ++order) {
         const uint32_t size = section_of(bytes, order);
-        CHECK_EQUAL(refused(bytes, size), EITS_OK);
+        CHECK_OK(refused(bytes, size));
         CHECK_EQUAL(refused(bytes, size - 4), EITS_E_MODEL_SECTION);
         CHECK_EQUAL(refused(bytes, size + 4), EITS_E_MODEL_SECTION);
     }
@@ -126,7 +115,7 @@ TEST(sections_of_another_size)
 TEST(numbers_out_of_range)
 {
     const uint32_t counts[] = {0, 1, 65, 0x40000003u, 0xFFFFFFFFu};
-    for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k)
+    for (size_t k = 0; IN_TABLE(k, counts); ++k)
         CHECK_EQUAL(with_word(1, 0, counts[k]), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_word(1, 4, 5), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_word(1, 4, 0xFFFFFFFFu), EITS_E_MODEL_VALUE);
@@ -142,7 +131,7 @@ TEST(numbers_out_of_range)
         for (uint32_t list = 0; list < 2; ++list) {
             const uint32_t at = HEAD + 12 * list + 4 * k;
             const float wrong[] = {-1.0f, NAN, INFINITY, 2e30f, k == 0 ? 0.5f : 0.0f};
-            for (size_t w = 0; w < sizeof wrong / sizeof wrong[0]; ++w)
+            for (size_t w = 0; IN_TABLE(w, wrong); ++w)
                 CHECK_EQUAL(with_number(at, wrong[w]), EITS_E_MODEL_VALUE);
         }
     }
@@ -150,7 +139,7 @@ TEST(numbers_out_of_range)
     CHECK_EQUAL(with_number(HEAD + 4, 3.0f), EITS_E_MODEL_VALUE);
     for (uint32_t k = 0; k < 3; ++k) {
         const float wrong[] = {NAN, -INFINITY, 2e6f, -2e6f};
-        for (size_t w = 0; w < sizeof wrong / sizeof wrong[0]; ++w)
+        for (size_t w = 0; IN_TABLE(w, wrong); ++w)
             CHECK_EQUAL(with_number(HEAD + 24 + 4 * k, wrong[w]), EITS_E_MODEL_VALUE);
     }
 }
@@ -160,32 +149,26 @@ TEST(touches_have_forces)
 {
     uint8_t bytes[MAX];
     const small_spec spec = {.rank = 24, .side = 12, .shape = SMALL_WAVES};
-    small_model bare = small_model_make(spec),
-                made = small_model_with_section(&bare, "LOAD", bytes, section_of(bytes, 2));
-    small_context c;
+    dense_bench b = {0};
+    eits_context *ctx =
+        dense_bench_take(&b, small_model_with(spec, "LOAD", bytes, section_of(bytes, 2)), 0);
     eits_touch touches[EITS_MAX_TOUCHES];
     eits_real frame[SMALL_ROWS];
     uint32_t count = 0;
-    small_context_open(&c, &made, 0);
-    eits_options options = *eits_get_options(c.ctx);
-    options.sign = EITS_SIGN_BOTH;
-    options.detection_factor = 0;
-    CHECK_EQUAL(eits_set_options(c.ctx, &options), EITS_OK);
-    small_reference(&c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_BOTH, o.detection_factor = 0);
+    small_reference(ctx->model, 1, frame);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)(1 + 0.05 * sin(1.7 * i));
-    CHECK_EQUAL(eits_reconstruct(c.ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(c.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
+    CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     CHECK(count > 0);
     for (uint32_t k = 0; k < count; ++k) {
         const eits_touch *t = &touches[k];
         CHECK(t->force_n > 0 &&
-              t->force_n == eits_force_n(&c.model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2));
+              t->force_n == eits_force_n(ctx->model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2));
     }
-    small_context_close(&c);
-    small_model_free(&made);
-    small_model_free(&bare);
+    dense_bench_close(&b);
 }
 
 RUN_TESTS("force")

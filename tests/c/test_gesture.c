@@ -4,6 +4,7 @@
 #include "eitskin/gesture.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { FRAME_US = 20833, ROOM = EITS_MAX_EVENTS, KEPT = 4096 };
@@ -17,32 +18,31 @@ typedef struct bench {
 
 static bench b;
 
-static void begin(bench *b)
+static void begin(void)
 {
-    b->now_us = 0xFFFF0000u; /* the clock wraps on the way */
-    b->count = b->moves = 0;
-    CHECK_EQUAL(eits_gestures_init(&b->g, NULL), EITS_OK);
+    b.now_us = 0xFFFF0000u; /* the clock wraps on the way */
+    b.count = b.moves = 0;
+    CHECK_OK(eits_gestures_init(&b.g, NULL));
 }
 
-static void keep(bench *b, const eits_event *events, uint32_t count)
+static void keep(const eits_event *events, uint32_t count)
 {
     for (uint32_t k = 0; k < count; ++k) {
         CHECK(isfinite((double)events[k].x_mm) && isfinite((double)events[k].y_mm) &&
               isfinite((double)events[k].direction_deg) && isfinite((double)events[k].value));
-        b->moves += events[k].kind == EITS_EVENT_MOVE;
-        if (events[k].kind != EITS_EVENT_MOVE && b->count < KEPT)
-            b->told[b->count++] = events[k];
+        b.moves += events[k].kind == EITS_EVENT_MOVE;
+        if (events[k].kind != EITS_EVENT_MOVE && b.count < KEPT)
+            b.told[b.count++] = events[k];
     }
 }
 
-static void frame(bench *b, const eits_touch *touches, uint32_t count)
+static void frame(const eits_touch *touches, uint32_t count)
 {
     eits_event events[ROOM];
     uint32_t told = 99;
-    CHECK_EQUAL(eits_gestures_update(&b->g, touches, count, b->now_us, events, ROOM, &told),
-                EITS_OK);
-    b->now_us += FRAME_US;
-    keep(b, events, told);
+    CHECK_OK(eits_gestures_update(&b.g, touches, count, b.now_us, events, ROOM, &told));
+    b.now_us += FRAME_US;
+    keep(events, told);
 }
 
 static eits_touch touch(uint32_t id, double x, double y)
@@ -55,60 +55,83 @@ static eits_touch touch(uint32_t id, double x, double y)
                         .explained = (eits_real)0.9};
 }
 
-static void none(bench *b, int frames)
+static void none(int frames)
 {
     for (int k = 0; k < frames; ++k)
-        frame(b, NULL, 0);
+        frame(NULL, 0);
 }
 
 /* One finger from (x, y) by so much a frame. */
-static void finger(bench *b, uint32_t id, double x, double y, double dx, double dy, int frames)
+static void finger(uint32_t id, double x, double y, double dx, double dy, int frames)
 {
     for (int k = 0; k < frames; ++k) {
         const eits_touch t = touch(id, x + dx * k, y + dy * k);
-        frame(b, &t, 1);
+        frame(&t, 1);
     }
 }
 
 /* Two fingers, each along a straight line. */
-static void fingers(bench *b, const double from[4], const double by[4], int frames)
+static void fingers(const double from[4], const double by[4], int frames)
 {
     for (int k = 0; k < frames; ++k) {
         const eits_touch two[] = {touch(1, from[0] + by[0] * k, from[1] + by[1] * k),
                                   touch(2, from[2] + by[2] * k, from[3] + by[3] * k)};
-        frame(b, two, 2);
+        frame(two, 2);
     }
 }
 
 /* How often a kind was told, in a phase. */
-static int count_of(const bench *b, eits_event_kind kind, eits_event_phase phase)
+static int count_of(eits_event_kind kind, eits_event_phase phase)
 {
     int count = 0;
-    for (uint32_t k = 0; k < b->count; ++k)
-        count += b->told[k].kind == (uint32_t)kind && b->told[k].phase == (uint32_t)phase;
+    for (uint32_t k = 0; k < b.count; ++k)
+        count += b.told[k].kind == (uint32_t)kind && b.told[k].phase == (uint32_t)phase;
     return count;
 }
 
-static int once(const bench *b, eits_event_kind kind)
+/* All that was told, moves and changes left out: "2 down, up, pinch begins". */
+static const char *story(void)
 {
-    return count_of(b, kind, EITS_PHASE_ONCE);
+    static const char *const kinds[] = {
+        [EITS_EVENT_DOWN] = "down",    [EITS_EVENT_UP] = "up",
+        [EITS_EVENT_TAP] = "tap",      [EITS_EVENT_DOUBLE_TAP] = "double tap",
+        [EITS_EVENT_HOLD] = "hold",    [EITS_EVENT_SWIPE] = "swipe",
+        [EITS_EVENT_PINCH] = "pinch",  [EITS_EVENT_SPREAD] = "spread",
+        [EITS_EVENT_ROTATE] = "rotate"};
+    static const eits_event_phase phases[] = {EITS_PHASE_ONCE, EITS_PHASE_BEGIN, EITS_PHASE_END};
+    static const char *const ends[] = {"", " begins", " ends"};
+    static char text[400];
+    size_t at = 0;
+    text[0] = 0;
+    for (uint32_t k = 0; k < 3 * COUNT_OF(kinds); ++k) {
+        const int count = count_of((eits_event_kind)(k / 3), phases[k % 3]);
+        char times[16] = "";
+        if (count == 0 || kinds[k / 3] == NULL)
+            continue;
+        if (count > 1)
+            (void)snprintf(times, sizeof times, "%d ", count);
+        at += (size_t)snprintf(text + at, sizeof text - at, "%s%s%s%s", at > 0 ? ", " : "", times,
+                               kinds[k / 3], ends[k % 3]);
+    }
+    return text;
 }
 
-/* Gestures of every kind, changes left out. */
-static int gestures(const bench *b)
+static void check_story(const char *expected, const char *file, int line)
 {
-    int count = 0;
-    for (uint32_t k = 0; k < b->count; ++k)
-        count += b->told[k].kind > EITS_EVENT_UP && b->told[k].phase <= EITS_PHASE_BEGIN;
-    return count;
+    const char *got = story();
+    if (check_counts(strcmp(got, expected) == 0, file, line))
+        printf(": told \"%s\", expected \"%s\"\n", got, expected);
 }
+/* So far; and once the fingers have gone for a while. */
+#define TOLD(expected) check_story(expected, __FILE__, __LINE__)
+#define ENDS(expected) (none(3), check_story(expected, __FILE__, __LINE__))
 
-static const eits_event *last(const bench *b, eits_event_kind kind)
+static const eits_event *last(eits_event_kind kind)
 {
     static const eits_event nothing;
-    for (uint32_t k = b->count; k-- > 0;) {
-        if (b->told[k].kind == (uint32_t)kind)
-            return &b->told[k];
+    for (uint32_t k = b.count; k-- > 0;) {
+        if (b.told[k].kind == (uint32_t)kind)
+            return &b.told[k];
     }
     return &nothing;
 }
@@ -117,109 +140,102 @@ static const eits_event *last(const bench *b, eits_event_kind kind)
 
 TEST(a_tap_is_told_in_the_first_frame_without_it)
 {
-    begin(&b);
-    none(&b, 2);
-    finger(&b, 7, 10, -20, 0, 0, 5);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 1);
+    begin();
+    none(2);
+    finger(7, 10, -20, 0, 0, 5);
+    TOLD("down");
     CHECK_EQUAL(b.told[0].time_us, 0xFFFF0000u + 3 * FRAME_US); /* once it has lasted a frame */
-    none(&b, 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 1);
-    CHECK_EQUAL(last(&b, EITS_EVENT_TAP)->first_id, 7);
-    CHECK_NEAR(last(&b, EITS_EVENT_TAP)->x_mm, 10, 1e-6);
-    CHECK_NEAR(last(&b, EITS_EVENT_TAP)->y_mm, -20, 1e-6);
-    none(&b, 20);
-    CHECK_EQUAL(gestures(&b), 1);
+    none(1);
+    TOLD("down, up, tap");
+    CHECK_EQUAL(last(EITS_EVENT_TAP)->first_id, 7);
+    CHECK_NEAR(last(EITS_EVENT_TAP)->x_mm, 10, 1e-6);
+    CHECK_NEAR(last(EITS_EVENT_TAP)->y_mm, -20, 1e-6);
+    none(17);
+    ENDS("down, up, tap");
 }
 
 TEST(two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first)
 {
-    begin(&b);
+    begin();
     b.now_us = 10000000; /* what counts is the time between them */
     for (uint32_t k = 1; k <= 3; ++k) {
-        finger(&b, k, 10 + k, 0, 0, 0, 4);
-        none(&b, 6);
+        finger(k, 10 + k, 0, 0, 0, 4);
+        none(6);
     }
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 2);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOUBLE_TAP), 1);
-    CHECK_EQUAL(last(&b, EITS_EVENT_DOUBLE_TAP)->first_id, 2);
-    begin(&b);
-    finger(&b, 1, 0, 0, 0, 0, 4);
-    none(&b, 6);
-    finger(&b, 2, 40, 0, 0, 0, 4); /* elsewhere */
-    none(&b, 16);
-    finger(&b, 3, 40, 0, 0, 0, 4); /* too late */
-    none(&b, 2);
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOUBLE_TAP), 0);
+    TOLD("3 down, 3 up, 2 tap, double tap");
+    CHECK_EQUAL(last(EITS_EVENT_DOUBLE_TAP)->first_id, 2);
+    begin();
+    finger(1, 0, 0, 0, 0, 4);
+    none(6);
+    finger(2, 40, 0, 0, 0, 4); /* elsewhere */
+    none(16);
+    finger(3, 40, 0, 0, 0, 4); /* too late */
+    ENDS("3 down, 3 up, 3 tap");
 }
 
 TEST(a_long_press_is_a_hold_once_and_no_tap)
 {
-    begin(&b);
-    finger(&b, 1, 5, 5, 0, 0, 24);
-    CHECK_EQUAL(once(&b, EITS_EVENT_HOLD), 0);
-    finger(&b, 1, 5, 5, 0, 0, 2); /* the 25th frame is 0.5 s after the first */
-    CHECK_EQUAL(once(&b, EITS_EVENT_HOLD), 1);
-    CHECK_NEAR(last(&b, EITS_EVENT_HOLD)->value, 0.5, 0.03);
-    finger(&b, 1, 5, 5, 0, 0, 30);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
-    begin(&b);
-    finger(&b, 1, 5, 5, 0, 0, 18); /* too long for a tap, too short for a hold */
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 0);
+    begin();
+    finger(1, 5, 5, 0, 0, 24);
+    TOLD("down");
+    finger(1, 5, 5, 0, 0, 2); /* the 25th frame is 0.5 s after the first */
+    TOLD("down, hold");
+    CHECK_NEAR(last(EITS_EVENT_HOLD)->value, 0.5, 0.03);
+    finger(1, 5, 5, 0, 0, 30);
+    ENDS("down, up, hold");
+    begin();
+    finger(1, 5, 5, 0, 0, 18); /* too long for a tap, too short for a hold */
+    ENDS("down, up");
 }
 
 TEST(a_swipe_says_where_it_goes)
 {
     for (int side = 0; side < 8; ++side) {
         const double angle = 3.14159265358979 * side / 4;
-        begin(&b);
-        finger(&b, 1, 0, 0, 6 * cos(angle), 6 * sin(angle), 10);
-        none(&b, 3);
-        CHECK_EQUAL(gestures(&b), 1);
-        CHECK_NEAR(last(&b, EITS_EVENT_SWIPE)->direction_deg, 45 * side, 0.01);
-        CHECK_NEAR(last(&b, EITS_EVENT_SWIPE)->value, 48, 0.01); /* from its second frame on */
+        begin();
+        finger(1, 0, 0, 6 * cos(angle), 6 * sin(angle), 10);
+        ENDS("down, up, swipe");
+        CHECK_NEAR(last(EITS_EVENT_SWIPE)->direction_deg, 45 * side, 0.01);
+        CHECK_NEAR(last(EITS_EVENT_SWIPE)->value, 48, 0.01); /* from its second frame on */
         CHECK(b.moves >= 8);
     }
 }
 
 TEST(what_ends_at_rest_or_comes_back_is_no_swipe)
 {
-    begin(&b);
-    finger(&b, 1, 0, 0, 6, 0, 10);
-    finger(&b, 1, 54, 0, 0, 0, 6);
-    none(&b, 3);
-    begin(&b);
-    finger(&b, 1, 0, 0, 6, 0, 12);
-    finger(&b, 1, 66, 0, -6, 0, 8);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 0);
-    begin(&b);
-    finger(&b, 1, 0, 0, 2.5, 0, 7); /* 12.5 mm: more than a tap, less than a swipe */
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 0);
-    begin(&b);
-    finger(&b, 1, 0, 0, 2, 0, 60); /* too long */
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 0);
+    static const struct {
+        double dx, then_from, then_dx;
+        int frames, then_frames;
+    } cases[] = {{6, 54, 0, 10, 6},
+                 {6, 66, -6, 12, 8},
+                 {2.5, 0, 0, 7, 0}, /* 12.5 mm: more than a tap, less than a swipe */
+                 {2, 0, 0, 60, 0}}; /* too long */
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        begin();
+        finger(1, 0, 0, cases[k].dx, 0, cases[k].frames);
+        finger(1, cases[k].then_from, 0, cases[k].then_dx, 0, cases[k].then_frames);
+        ENDS("down, up");
+    }
 }
 
 /* ---- two fingers ---- */
 
+/* Along the x axis, each so far from the middle at first, by so much a frame. */
+static void pair(double from, double by, int frames)
+{
+    fingers((double[]){-from, 0, from, 0}, (double[]){by, 0, -by, 0}, frames);
+}
+
 TEST(two_fingers_pinch_and_the_end_says_by_how_much)
 {
-    begin(&b);
-    fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 20);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_BEGIN), 1);
-    CHECK(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_CHANGE) > 5);
-    none(&b, 1);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_END), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), 2);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
-    const eits_event *end = last(&b, EITS_EVENT_PINCH);
+    begin();
+    pair(50, 2, 20);
+    TOLD("2 down, pinch begins");
+    CHECK(count_of(EITS_EVENT_PINCH, EITS_PHASE_CHANGE) > 5);
+    none(1);
+    TOLD("2 down, 2 up, pinch begins, pinch ends");
+    ENDS("2 down, 2 up, pinch begins, pinch ends");
+    const eits_event *end = last(EITS_EVENT_PINCH);
     CHECK_EQUAL(end->first_id, 1);
     CHECK_EQUAL(end->second_id, 2);
     CHECK_NEAR(end->value, 24.0 / 96.0, 1e-5); /* of the second frame's distance */
@@ -228,378 +244,335 @@ TEST(two_fingers_pinch_and_the_end_says_by_how_much)
 
 TEST(a_pinch_that_opens_again_becomes_a_spread)
 {
-    begin(&b);
-    fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 16);
-    fingers(&b, (double[]){-20, 0, 20, 0}, (double[]){-2, 0, 2, 0}, 16);
-    none(&b, 3);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_BEGIN), 1);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_END), 1);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_SPREAD, EITS_PHASE_BEGIN), 1);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_SPREAD, EITS_PHASE_END), 1);
-    CHECK_NEAR(last(&b, EITS_EVENT_SPREAD)->value, 100.0 / 40.0, 1e-5);
-    begin(&b);
-    fingers(&b, (double[]){-20, 0, 20, 0}, (double[]){-2, 0, 2, 0}, 16);
-    fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 16);
-    none(&b, 3);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_SPREAD, EITS_PHASE_END), 1);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_END), 1);
+    begin();
+    pair(50, 2, 16);
+    pair(20, -2, 16);
+    ENDS("2 down, 2 up, pinch begins, pinch ends, spread begins, spread ends");
+    CHECK_NEAR(last(EITS_EVENT_SPREAD)->value, 100.0 / 40.0, 1e-5);
+    begin();
+    pair(20, -2, 16);
+    pair(50, 2, 16);
+    ENDS("2 down, 2 up, pinch begins, pinch ends, spread begins, spread ends");
+}
+
+/* Two fingers around the middle, by so much a frame. */
+static void turn(double by, int frames)
+{
+    begin();
+    for (int k = 0; k < frames; ++k) {
+        const double x = 30 * cos(3.0 + by * k), y = 30 * sin(3.0 + by * k);
+        const eits_touch two[] = {touch(1, x, y), touch(2, -x, -y)};
+        frame(two, 2);
+    }
 }
 
 TEST(two_fingers_turn_either_way)
 {
     for (int way = -1; way <= 1; way += 2) {
-        begin(&b);
-        for (int k = 0; k < 40; ++k) {
-            const double angle = 3.0 + way * 0.08 * k;
-            const eits_touch two[] = {touch(1, 30 * cos(angle), 30 * sin(angle)),
-                                      touch(2, -30 * cos(angle), -30 * sin(angle))};
-            frame(&b, two, 2);
-        }
-        none(&b, 3);
-        CHECK_EQUAL(gestures(&b), 1);
-        CHECK(count_of(&b, EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) > 5);
-        CHECK_EQUAL(count_of(&b, EITS_EVENT_ROTATE, EITS_PHASE_END), 1);
-        CHECK_NEAR(last(&b, EITS_EVENT_ROTATE)->value, way * 0.08 * 38 * 57.29578, 0.05);
+        turn(way * 0.08, 40);
+        ENDS("2 down, 2 up, rotate begins, rotate ends");
+        CHECK(count_of(EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) > 5);
+        CHECK_NEAR(last(EITS_EVENT_ROTATE)->value, way * 0.08 * 38 * 57.29578, 0.05);
     }
 }
 
 /* A change is told for each so much of way, not for each frame: 0.6 mm here, of 72. */
 TEST(a_slow_turn_is_told_by_its_way)
 {
-    begin(&b);
-    for (int k = 0; k < 120; ++k) {
-        const double angle = 3.0 + 0.01 * k;
-        const eits_touch two[] = {touch(1, 30 * cos(angle), 30 * sin(angle)),
-                                  touch(2, -30 * cos(angle), -30 * sin(angle))};
-        frame(&b, two, 2);
-    }
-    CHECK(count_of(&b, EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) > 8);
-    CHECK(count_of(&b, EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) < 80);
+    turn(0.01, 120);
+    CHECK(count_of(EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) > 8);
+    CHECK(count_of(EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) < 80);
 }
 
 TEST(fingers_that_rest_or_are_three_do_nothing_together)
 {
-    begin(&b);
-    fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){0, 0, 0, 0}, 40);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 0);
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), 2);
-    begin(&b);
+    begin();
+    pair(50, 0, 40);
+    ENDS("2 down, 2 up");
+    begin();
     for (int k = 0; k < 20; ++k) {
         const eits_touch three[] = {touch(1, -50 + 2 * k, 0), touch(2, 50 - 2 * k, 0),
                                     touch(3, 0, 70)};
-        frame(&b, three, 3);
+        frame(three, 3);
     }
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 0);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 3);
+    ENDS("3 down, 3 up");
 }
 
 /* ---- real frames ---- */
 
+/* A touch of another strength or one that is held by the tracker (explained 0). */
+static eits_touch faint(uint32_t id, double x, double y, double strength, double explained)
+{
+    eits_touch t = touch(id, x, y);
+    t.strength_s_per_m_mm2 = (eits_real)strength;
+    t.explained = (eits_real)explained;
+    return t;
+}
+
 TEST(a_scan_that_a_finger_lands_in_invents_nothing)
 {
-    begin(&b);
+    begin();
     const eits_touch two[] = {touch(1, -8, 3), touch(2, -37, -9)};
-    frame(&b, two, 2);
-    finger(&b, 2, -30, -4, 0, 0, 6);
-    none(&b, 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 1);
-    CHECK_NEAR(last(&b, EITS_EVENT_TAP)->x_mm, -30, 1e-6);
+    frame(two, 2);
+    finger(2, -30, -4, 0, 0, 6);
+    ENDS("down, up, tap");
+    CHECK_NEAR(last(EITS_EVENT_TAP)->x_mm, -30, 1e-6);
 }
 
 TEST(a_scan_that_a_finger_lifts_in_does_not_move_it)
 {
-    begin(&b);
-    finger(&b, 1, 40, 59, 0, 0, 12);
-    eits_touch going = touch(1, 28, 50);
-    going.strength_s_per_m_mm2 = (eits_real)1.8;
-    frame(&b, &going, 1);
+    const eits_touch going = faint(1, 28, 50, 1.8, 0.9), held = faint(1, 28, 50, 1.8, 0);
+    begin();
+    finger(1, 40, 59, 0, 0, 12);
+    frame(&going, 1);
     CHECK_EQUAL(b.moves, 0);
-    none(&b, 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 1);
-    CHECK_NEAR(last(&b, EITS_EVENT_UP)->x_mm, 40, 1e-6);
-    begin(&b);
-    finger(&b, 1, 40, 59, 0, 0, 6);
-    frame(&b, &going, 1);
-    going.explained = 0; /* held by the tracker: it has lifted */
-    frame(&b, &going, 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 1);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
+    ENDS("down, up, tap");
+    CHECK_NEAR(last(EITS_EVENT_UP)->x_mm, 40, 1e-6);
+    begin();
+    finger(1, 40, 59, 0, 0, 6);
+    frame(&going, 1);
+    frame(&held, 1); /* it has lifted */
+    TOLD("down, up, tap");
+    ENDS("down, up, tap");
 }
 
 TEST(a_lighter_press_is_followed_on)
 {
-    begin(&b);
-    finger(&b, 1, 0, 0, 0, 0, 4);
+    begin();
+    finger(1, 0, 0, 0, 0, 4);
     for (int k = 0; k < 12; ++k) {
-        eits_touch light = touch(1, 4 * k, 0);
-        light.strength_s_per_m_mm2 = (eits_real)1.5;
-        frame(&b, &light, 1);
+        const eits_touch light = faint(1, 4 * k, 0, 1.5, 0.9);
+        frame(&light, 1);
     }
     CHECK(b.moves > 4);
-    none(&b, 2);
-    CHECK_EQUAL(once(&b, EITS_EVENT_SWIPE), 1);
+    ENDS("down, up, swipe");
 }
 
 TEST(a_held_touch_and_a_lost_frame_do_not_end_a_hold)
 {
-    begin(&b);
-    finger(&b, 1, 5, 5, 0, 0, 8);
-    eits_touch held = touch(1, 9, 9);
-    held.explained = 0;
-    frame(&b, &held, 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), 0);
+    const eits_touch held = faint(1, 9, 9, 3, 0);
+    begin();
+    finger(1, 5, 5, 0, 0, 8);
+    frame(&held, 1);
+    TOLD("down");
     CHECK_EQUAL(b.moves, 0); /* where the tracker holds it says nothing of where it is */
-    finger(&b, 1, 5, 5, 0, 0, 7);
-    none(&b, 1); /* more than a tap was: nothing is told of the false lift but up */
-    finger(&b, 1, 5, 5, 0, 0, 12);
-    CHECK_EQUAL(once(&b, EITS_EVENT_HOLD), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 2);
+    finger(1, 5, 5, 0, 0, 7);
+    none(1); /* more than a tap was: nothing is told of the false lift but up */
+    finger(1, 5, 5, 0, 0, 12);
+    TOLD("2 down, up, hold");
     CHECK_EQUAL(b.told[b.count - 1].first_id, 1);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
+    ENDS("2 down, 2 up, hold");
 }
 
 TEST(a_tap_that_is_found_again_is_told_once)
 {
-    begin(&b);
-    finger(&b, 1, 5, 5, 0, 0, 4);
-    none(&b, 1);
-    finger(&b, 1, 5, 5, 0, 0, 4);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
-    begin(&b); /* and so is a swipe whose tail the tracker calls by another id */
-    finger(&b, 1, 0, 0, 8, 0, 8);
-    none(&b, 1);
-    finger(&b, 2, 72, 0, 8, 0, 3);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_SWIPE), 1);
+    begin();
+    finger(1, 5, 5, 0, 0, 4);
+    none(1);
+    finger(1, 5, 5, 0, 0, 4);
+    ENDS("2 down, 2 up, tap");
+    begin(); /* and so is a swipe whose tail the tracker calls by another id */
+    finger(1, 0, 0, 8, 0, 8);
+    none(1);
+    finger(2, 72, 0, 8, 0, 3);
+    ENDS("2 down, 2 up, swipe");
 }
 
 TEST(another_id_is_the_same_finger)
 {
-    begin(&b);
-    finger(&b, 1, 0, 0, 6, 0, 5);
-    finger(&b, 9, 30, 0, 6, 0, 5);
-    none(&b, 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_SWIPE), 1);
-    CHECK_EQUAL(last(&b, EITS_EVENT_SWIPE)->first_id, 1);
-    begin(&b); /* both ids in one frame */
-    finger(&b, 1, 0, 0, 6, 0, 5);
+    begin();
+    finger(1, 0, 0, 6, 0, 5);
+    finger(9, 30, 0, 6, 0, 5);
+    ENDS("down, up, swipe");
+    CHECK_EQUAL(last(EITS_EVENT_SWIPE)->first_id, 1);
+    begin(); /* both ids in one frame */
+    finger(1, 0, 0, 6, 0, 5);
     const eits_touch both[] = {touch(1, 24, 0), touch(9, 36, 0)};
-    frame(&b, both, 2);
-    finger(&b, 9, 42, 0, 6, 0, 4);
-    none(&b, 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 1);
-    CHECK_EQUAL(gestures(&b), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_SWIPE), 1);
+    frame(both, 2);
+    finger(9, 42, 0, 6, 0, 4);
+    ENDS("down, up, swipe");
 }
 
 TEST(half_of_a_touch_is_no_finger_until_it_has_lasted)
 {
-    begin(&b);
-    finger(&b, 1, 0, 0, 0, 0, 6);
+    begin();
+    finger(1, 0, 0, 0, 0, 6);
     const eits_touch split[] = {touch(1, -6, 0), touch(2, 8, 0)};
-    frame(&b, split, 2);
-    frame(&b, split, 2);
-    finger(&b, 1, 0, 0, 0, 0, 2);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 1);
-    none(&b, 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 1);
-    begin(&b);
-    finger(&b, 1, 0, 0, 0, 0, 6);
-    eits_touch two[] = {touch(1, 0, 0), touch(2, 60, 0)};
-    two[1].strength_s_per_m_mm2 = (eits_real)0.1; /* a ghost of the strong one */
-    frame(&b, two, 2);
-    frame(&b, two, 2);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 1);
-    frame(&b, two, 2);
-    frame(&b, two, 2);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 2);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 0);
+    frame(split, 2);
+    frame(split, 2);
+    finger(1, 0, 0, 0, 0, 2);
+    TOLD("down");
+    ENDS("down, up, tap");
+    begin();
+    finger(1, 0, 0, 0, 0, 6);
+    /* a ghost of the strong one */
+    const eits_touch two[] = {touch(1, 0, 0), faint(2, 60, 0, 0.1, 0.9)};
+    for (int k = 0; k < 4; ++k) {
+        frame(two, 2);
+        if (k % 2)
+            TOLD(k == 1 ? "down" : "2 down");
+    }
+    ENDS("2 down, 2 up");
 }
 
 /* The tracker calls what it lands as by another id, a while later. */
 TEST(a_landing_that_is_renamed_holds_where_it_rests)
 {
-    begin(&b);
-    finger(&b, 1, 20, 57, 0, 0, 1);
     const eits_touch both[] = {touch(1, 14, 62), touch(2, 12, 44)};
-    frame(&b, both, 2);
-    finger(&b, 2, 11, 51, 0, 0, 30);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_HOLD), 1);
-    CHECK_NEAR(last(&b, EITS_EVENT_HOLD)->x_mm, 11, 1e-6);
-    for (int moved = 0; moved < 2; ++moved) { /* how still it is counts from there on */
-        begin(&b);
-        b.g.options.still_mm = (eits_real)0.5;
-        finger(&b, 1, 20, 57, 0, 0, 1);
-        frame(&b, both, 2);
-        finger(&b, 2, 11, 51, moved ? 0.1 : 0, 0, 30);
-        CHECK_EQUAL(once(&b, EITS_EVENT_HOLD), !moved);
+    static const struct {
+        double still_mm, dx; /* how still it is counts from there on; 0: as usual */
+        const char *told;
+    } cases[] = {{0, 0, "down, hold"}, {0.5, 0, "down, hold"}, {0.5, 0.1, "down"}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        begin();
+        if (cases[k].still_mm > 0)
+            b.g.options.still_mm = (eits_real)cases[k].still_mm;
+        finger(1, 20, 57, 0, 0, 1);
+        frame(both, 2);
+        finger(2, 11, 51, cases[k].dx, 0, 30);
+        TOLD(cases[k].told);
+        if (k == 0)
+            CHECK_NEAR(last(EITS_EVENT_HOLD)->x_mm, 11, 1e-6);
     }
-    begin(&b); /* of two fingers one: they begin where it is then */
+    begin(); /* of two fingers one: they begin where it is then */
     for (int k = 0; k < 12; ++k) {
         const eits_touch two[] = {touch(k < 4 ? 2 : 3, 60, 0), touch(1, k < 4 ? 15 : 0, 0)};
         const eits_touch three[] = {touch(3, 55, 10), touch(2, 65, 0), touch(1, 15, 0)};
-        frame(&b, k == 3 ? three : two, k == 3 ? 3 : 2);
+        frame(k == 3 ? three : two, k == 3 ? 3 : 2);
     }
-    none(&b, 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 2);
-    CHECK_EQUAL(gestures(&b), 0);
+    ENDS("2 down, 2 up");
 }
 
 TEST(a_swipe_of_two_frames_counts_the_one_it_lifts_in)
 {
-    begin(&b);
-    finger(&b, 1, 0, 0, 10, 0, 2);
-    eits_touch going = touch(1, 32, 0);
-    going.strength_s_per_m_mm2 = 2;
-    frame(&b, &going, 1);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
-    CHECK_NEAR(last(&b, EITS_EVENT_SWIPE)->value, 22, 1e-5);
-    begin(&b); /* not believed: it lets go of at once what it landed at */
-    finger(&b, 1, 0, 0, 0, 0, 1);
-    going.x_mm = 0;
-    frame(&b, &going, 1);
-    going.strength_s_per_m_mm2 = 1;
-    frame(&b, &going, 1);
-    none(&b, 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 1);
-    begin(&b);
-    finger(&b, 1, 0, 0, 0, 0, 1);
-    going.x_mm = 60;
-    frame(&b, &going, 1);
-    none(&b, 3);
-    CHECK_EQUAL(once(&b, EITS_EVENT_TAP), 0);
+    begin();
+    finger(1, 0, 0, 10, 0, 2);
+    const eits_touch going = faint(1, 32, 0, 2, 0.9), strong = faint(1, 0, 0, 2, 0.9),
+                     weak = faint(1, 0, 0, 1, 0.9), far = faint(1, 60, 0, 1, 0.9);
+    frame(&going, 1);
+    ENDS("down, up, swipe");
+    CHECK_NEAR(last(EITS_EVENT_SWIPE)->value, 22, 1e-5);
+    begin(); /* not believed: it lets go of at once what it landed at */
+    finger(1, 0, 0, 0, 0, 1);
+    frame(&strong, 1);
+    frame(&weak, 1);
+    ENDS("down, up, tap");
+    begin();
+    finger(1, 0, 0, 0, 0, 1);
+    frame(&far, 1);
+    ENDS("down, up, swipe");
 }
 
 TEST(fingers_that_merge_end_their_pinch)
 {
-    begin(&b);
-    fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 20);
-    finger(&b, 1, 0, 0, 0, 0, 10);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_END), 1);
+    begin();
+    pair(50, 2, 20);
+    finger(1, 0, 0, 0, 0, 10);
+    ENDS("2 down, 2 up, pinch begins, pinch ends");
 }
 
 TEST(a_pair_that_is_not_found_for_a_frame_goes_on)
 {
-    begin(&b);
+    begin();
     b.g.options.lost_us = 30000;
-    fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 12);
-    finger(&b, 1, -26, 0, 0, 0, 1);
-    fingers(&b, (double[]){-24, 0, 24, 0}, (double[]){1, 0, -1, 0}, 8);
-    none(&b, 3);
-    CHECK_EQUAL(gestures(&b), 1);
+    pair(50, 2, 12);
+    finger(1, -26, 0, 0, 0, 1);
+    pair(24, 1, 8);
+    ENDS("2 down, 2 up, pinch begins, pinch ends");
 }
 
 /* ---- limits and hostile numbers ---- */
+
+/* As many touches as may be, of ids and places that no other round has: for two frames. */
+static void crowd(uint32_t round)
+{
+    eits_touch many[EITS_MAX_TOUCHES];
+    for (uint32_t k = 0; k < EITS_MAX_TOUCHES; ++k)
+        many[k] = touch(100 * round + k + 1, 1000.0 * round + 60.0 * k, 0);
+    frame(many, EITS_MAX_TOUCHES);
+    frame(many, EITS_MAX_TOUCHES);
+}
 
 TEST(events_without_room_are_counted)
 {
     eits_event few[2];
     uint32_t told;
     eits_touch many[EITS_MAX_TOUCHES];
-    begin(&b);
+    begin();
     for (uint32_t k = 0; k < EITS_MAX_TOUCHES; ++k)
         many[k] = touch(k + 1, 60.0 * (k % 4), 60.0 * (k / 4));
-    frame(&b, many, EITS_MAX_TOUCHES);
-    CHECK_EQUAL(eits_gestures_update(&b.g, many, EITS_MAX_TOUCHES, b.now_us, few, 2, &told),
-                EITS_OK);
+    frame(many, EITS_MAX_TOUCHES);
+    CHECK_OK(eits_gestures_update(&b.g, many, EITS_MAX_TOUCHES, b.now_us, few, 2, &told));
     CHECK_EQUAL(told, 2);
     CHECK_EQUAL(few[1].kind, EITS_EVENT_DOWN);
     CHECK_EQUAL(b.g.dropped, EITS_MAX_TOUCHES - 2);
-    CHECK_EQUAL(eits_gestures_update(&b.g, NULL, 0, b.now_us + FRAME_US, NULL, 0, &told), EITS_OK);
+    CHECK_OK(eits_gestures_update(&b.g, NULL, 0, b.now_us + FRAME_US, NULL, 0, &told));
     CHECK_EQUAL(told, 0);
     CHECK_EQUAL(b.g.dropped, 2 * EITS_MAX_TOUCHES - 2);
 }
 
 TEST(more_fingers_than_can_be_followed_are_counted)
 {
-    eits_touch many[EITS_MAX_TOUCHES];
-    begin(&b);
+    begin();
     b.g.options.lost_us = 500000;
-    for (uint32_t round = 0; round < 3; ++round) { /* each time others, the old ones waited for */
-        for (uint32_t k = 0; k < EITS_MAX_TOUCHES; ++k)
-            many[k] = touch(100 * round + k + 1, 1000.0 * round + 60.0 * k, 0);
-        frame(&b, many, EITS_MAX_TOUCHES);
-        frame(&b, many, EITS_MAX_TOUCHES);
-    }
+    for (uint32_t round = 0; round < 3; ++round) /* each time others, the old ones waited for */
+        crowd(round);
     CHECK_EQUAL(b.g.dropped, 2 * EITS_MAX_TOUCHES);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), EITS_MAX_CONTACTS);
-    none(&b, 60); /* and all lift in one frame */
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), EITS_MAX_CONTACTS);
+    CHECK_EQUAL(count_of(EITS_EVENT_DOWN, EITS_PHASE_ONCE), EITS_MAX_CONTACTS);
+    none(60); /* and all lift in one frame */
+    CHECK_EQUAL(count_of(EITS_EVENT_UP, EITS_PHASE_ONCE), EITS_MAX_CONTACTS);
     CHECK_EQUAL(b.g.dropped, 2 * EITS_MAX_TOUCHES);
 }
 
 TEST(the_place_of_what_lifted_first_is_taken)
 {
-    eits_touch many[EITS_MAX_TOUCHES];
-    begin(&b);
+    begin();
     b.g.options.rejoin_us = 500000;
     for (uint32_t round = 0; round < 4; ++round) {
-        for (uint32_t k = 0; k < EITS_MAX_TOUCHES; ++k)
-            many[k] = touch(100 * round + k + 1, 1000.0 * round + 60.0 * k, 0);
-        frame(&b, many, EITS_MAX_TOUCHES);
-        frame(&b, many, EITS_MAX_TOUCHES);
-        none(&b, 1);
+        crowd(round);
+        none(1);
     }
     CHECK_EQUAL(b.g.dropped, 0);
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), 4 * EITS_MAX_TOUCHES);
+    CHECK_EQUAL(count_of(EITS_EVENT_UP, EITS_PHASE_ONCE), 4 * EITS_MAX_TOUCHES);
 }
 
 TEST(what_is_no_number_is_passed_over)
 {
-    begin(&b);
+    begin();
     for (int k = 0; k < 6; ++k) {
         eits_touch bad[] = {touch(1, NAN, 0),   touch(2, 0, INFINITY), touch(3, 1e30, 0),
                             touch(4, 0, -1e30), touch(5, 0, 0),        touch(6, 20, 20)};
         bad[4].strength_s_per_m_mm2 = (eits_real)NAN;
         bad[5].explained = (eits_real)NAN;
-        frame(&b, bad, 6);
+        frame(bad, 6);
     }
-    none(&b, 2);
-    CHECK_EQUAL(once(&b, EITS_EVENT_DOWN), 0);
-    begin(&b);
+    ENDS("");
+    begin();
     for (int k = 0; k < 30; ++k) { /* fingers at one place, and at the ends of the world */
         const eits_touch odd[] = {touch(1, k % 2 ? 1e6 : -1e6, 1e6), touch(1, 0, 0),
                                   touch(0, 0, 0)};
-        frame(&b, odd, (uint32_t)(k % 4));
+        frame(odd, (uint32_t)(k % 4));
     }
-    begin(&b);
-    fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){5, 0, -5, 0}, 11); /* to one place */
-    fingers(&b, (double[]){0, 0, 0, 0}, (double[]){-5, 0, 5, 0}, 11);
-    none(&b, 3);
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_SPREAD, EITS_PHASE_END), 1);
+    begin();
+    pair(50, 5, 11); /* to one place */
+    pair(0, -5, 11);
+    ENDS("2 down, 2 up, pinch begins, pinch ends, spread begins, spread ends");
 }
 
 TEST(time_that_stands_goes_back_or_leaps)
 {
-    begin(&b);
-    finger(&b, 1, 0, 0, 0, 0, 4);
+    begin();
+    finger(1, 0, 0, 0, 0, 4);
     b.now_us -= FRAME_US; /* the same frame again */
-    finger(&b, 1, 50, 0, 0, 0, 1);
+    finger(1, 50, 0, 0, 0, 1);
     CHECK_EQUAL(b.moves, 0);
     b.now_us -= 100 * FRAME_US;
-    none(&b, 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), 1);
-    CHECK_EQUAL(gestures(&b), 0);
-    fingers(&b, (double[]){-50, 0, 50, 0}, (double[]){2, 0, -2, 0}, 20);
+    none(1);
+    TOLD("down, up");
+    pair(50, 2, 20);
     b.now_us += 2000000;
-    none(&b, 1);
-    CHECK_EQUAL(once(&b, EITS_EVENT_UP), 3);
-    CHECK_EQUAL(gestures(&b), 1); /* the pinch had begun */
-    CHECK_EQUAL(count_of(&b, EITS_EVENT_PINCH, EITS_PHASE_END), 1);
+    none(1);
+    TOLD("3 down, 3 up, pinch begins, pinch ends"); /* the pinch had begun */
 }
 
 TEST(wrong_arguments_are_refused)
@@ -608,21 +581,20 @@ TEST(wrong_arguments_are_refused)
     eits_gesture_options options;
     uint32_t told;
     const eits_touch t = touch(1, 0, 0);
-    begin(&b);
-    CHECK_EQUAL(eits_gestures_usual(NULL), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_gestures_init(NULL, NULL), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_gestures_usual(&options), EITS_OK);
-    CHECK_EQUAL(eits_gestures_init(&b.g, &options), EITS_OK);
+    begin();
+    CHECK_REFUSED(eits_gestures_usual(NULL));
+    CHECK_REFUSED(eits_gestures_init(NULL, NULL));
+    CHECK_OK(eits_gestures_usual(&options));
+    CHECK_OK(eits_gestures_init(&b.g, &options));
     options.split_mm = (eits_real)NAN;
-    CHECK_EQUAL(eits_gestures_init(&b.g, &options), EITS_E_ARGUMENT);
+    CHECK_REFUSED(eits_gestures_init(&b.g, &options));
     options.split_mm = -1;
-    CHECK_EQUAL(eits_gestures_init(&b.g, &options), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_gestures_update(NULL, &t, 1, 0, events, 1, &told), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_gestures_update(&b.g, NULL, 1, 0, events, 1, &told), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_gestures_update(&b.g, &t, EITS_MAX_TOUCHES + 1, 0, events, 1, &told),
-                EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_gestures_update(&b.g, &t, 1, 0, NULL, 1, &told), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_gestures_update(&b.g, &t, 1, 0, events, 1, NULL), EITS_E_ARGUMENT);
+    CHECK_REFUSED(eits_gestures_init(&b.g, &options));
+    CHECK_REFUSED(eits_gestures_update(NULL, &t, 1, 0, events, 1, &told));
+    CHECK_REFUSED(eits_gestures_update(&b.g, NULL, 1, 0, events, 1, &told));
+    CHECK_REFUSED(eits_gestures_update(&b.g, &t, EITS_MAX_TOUCHES + 1, 0, events, 1, &told));
+    CHECK_REFUSED(eits_gestures_update(&b.g, &t, 1, 0, NULL, 1, &told));
+    CHECK_REFUSED(eits_gestures_update(&b.g, &t, 1, 0, events, 1, NULL));
 }
 
 RUN_TESTS("gesture")

@@ -1,22 +1,15 @@
 /* What touches do to each other, against a dense computation with complex numbers; when it is left
  * alone; and v0 log(v / v0). */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "diagnostics/diagnostics.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
 #include "kernels/kernels.h"
 #include "touch/interaction.h"
 
 #include <complex.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 static dense_bench b;
+static eits_real frame[SMALL_ROWS];
 
 enum { RANK = 16, SIDE = 12, L = SMALL_ELECTRODES };
 static const double PIXEL = 6, PI = 3.14159265358979323846;
@@ -25,22 +18,17 @@ static const eits_disc THREE[] = {
     {-14, 3, 8, R(0.02), 1, 0}, {9, 11, 6, R(-0.01), -1, 0}, {5, -17, 10, R(0.03), 1, 0}};
 
 /* A context with a frame's data, where rows of fold `left_out` (below 0: none) are not in use. */
-static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out, eits_real *frame)
+static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out)
 {
     eits_context *ctx = dense_bench_open(b, spec, 0);
     CHANGE_OPTIONS(ctx, o.project_reference = 0, o.max_masked = SMALL_ROWS);
     uint64_t state = 3;
-    uint32_t masked;
-    uint64_t macs;
     small_reference(&b->c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] *= (eits_real)(1 + 0.05 * small_random(&state));
-    for (int side = 0; left_out >= 0 && side < 2; ++side) {
-        const eits_fold fold = b->c.model.fold[left_out];
-        CHECK_EQUAL(eits_mask_row(ctx, side ? fold.second : fold.first, 1), EITS_OK);
-    }
-    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
+    vary(frame, frame, 0.05, &state);
+    if (left_out >= 0)
+        mask_fold(ctx, (uint32_t)left_out);
+    STAGE(ctx, frame);
     return ctx;
 }
 
@@ -148,10 +136,9 @@ static double size_of(const double *a)
 TEST(as_computed_densely)
 {
     for (int left_out = -1; left_out < 12; left_out += 4) {
-        eits_real frame[SMALL_ROWS];
         double added[RANK], expected[RANK];
         uint64_t macs;
-        eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out, frame);
+        eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out);
         for (uint32_t count = 2; count <= 3; ++count) {
             dense_interaction(ctx, &b.d, THREE, count, expected);
             interplay(ctx, THREE, count, added, &macs);
@@ -169,10 +156,10 @@ TEST(as_computed_densely)
  * use, two norms. */
 TEST(work_is_counted)
 {
-    eits_real frame[SMALL_ROWS], field[SMALL_FIELDS_STRIDE];
+    eits_real field[SMALL_FIELDS_STRIDE];
     double added[RANK];
     uint64_t macs, expected = 0;
-    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1);
     for (int k = 0; k < 3; ++k)
         expected += eits_disc_field(ctx, &ctx->scratch, &THREE[k], field);
     CHECK_EQUAL(expected % (2 * L + 4), 0);
@@ -185,10 +172,9 @@ TEST(work_is_counted)
 TEST(reciprocals_give_the_same)
 {
     dense_bench b = {0}, turned = {0};
-    eits_real frame[SMALL_ROWS];
     double added[RANK], other[RANK];
     uint64_t macs;
-    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1);
     interplay(ctx, THREE, 3, added, &macs);
     small_model made = small_model_make(WITH_FIELDS);
     uint8_t *fold = small_model_section(&made, "FOLD", NULL);
@@ -202,8 +188,8 @@ TEST(reciprocals_give_the_same)
     }
     small_model_seal(&made);
     CHECK(exchanged > 10);
-    eits_context *now = open_bench(&turned, WITH_FIELDS, -1, frame);
-    CHECK_EQUAL(eits_model_open(&turned.c.model, made.blob, made.size), EITS_OK);
+    eits_context *now = open_bench(&turned, WITH_FIELDS, -1);
+    CHECK_OK(eits_model_open(&turned.c.model, made.blob, made.size));
     interplay(now, THREE, 3, other, &macs);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(other[i], added[i], 2e-3 * size_of(added));
@@ -216,10 +202,9 @@ TEST(reciprocals_give_the_same)
  * nothing at all in one place. */
 TEST(distance_and_overlap)
 {
-    eits_real frame[SMALL_ROWS];
     double near[RANK], added[RANK];
     uint64_t macs;
-    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1);
     uint8_t *halves = small_model_section(&b.made, "FLDS", NULL) + 16;
     for (uint32_t j = 0; j < b.c.model.n_pixels; ++j, halves += 2 * SMALL_FIELDS_STRIDE) {
         for (uint32_t r = 0; r < 2 * L + 4; ++r)
@@ -261,8 +246,7 @@ static int left_alone(eits_context *ctx, const eits_disc *disc, uint32_t count)
 
 TEST(when_it_is_left_alone)
 {
-    eits_real frame[SMALL_ROWS];
-    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1);
     CHECK(eits_has_interaction(ctx) && !left_alone(ctx, THREE, 2));
     CHECK(left_alone(ctx, THREE, 1) && left_alone(ctx, THREE, 0));
     eits_disc strong[2] = {THREE[0], THREE[2]};
@@ -285,7 +269,7 @@ TEST(when_it_is_left_alone)
         {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO},
         {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_NORMALISED}};
     for (int k = 0; k < 3; ++k) {
-        ctx = open_bench(&b, others[k], -1, frame);
+        ctx = open_bench(&b, others[k], -1);
         /* differences need no fields */
         CHECK(!eits_has_interaction(ctx) && left_alone(ctx, THREE, 3) &&
               ctx->frame.has_y_log == (k == 0));
@@ -299,7 +283,7 @@ TEST(when_it_is_left_alone)
                          {-20, -20, 5, R(0.01), 1, 0},
                          {20, 20, 5, R(0.01), 1, 0},
                          {20, -4, 5, R(0.01), 1, 0}};
-    ctx = open_bench(&b, low, -1, frame);
+    ctx = open_bench(&b, low, -1);
     CHECK(!left_alone(ctx, many, 5));
     CHECK(left_alone(ctx, many, 6));
 }
@@ -310,19 +294,18 @@ TEST(log_data)
 {
     for (int left_out = -1; left_out < 9; left_out += 3) {
         dense_bench b = {0}, log_bench = {0};
-        eits_real frame[SMALL_ROWS];
-        eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out, frame);
+        eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out);
         const small_spec spec = {
             .rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO};
-        eits_context *log_ctx = open_bench(&log_bench, spec, left_out, frame);
+        eits_context *log_ctx = open_bench(&log_bench, spec, left_out);
         CHECK_EQUAL(ctx->frame.has_y_log, 1);
         CHECK(memcmp(ctx->frame.y_log, log_ctx->frame.y, RANK * sizeof *ctx->frame.y) == 0);
         CHECK(memcmp(ctx->frame.y, log_ctx->frame.y, RANK * sizeof *ctx->frame.y) != 0);
         uint32_t masked;
         uint64_t with = 0, without = 0;
-        CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &with), EITS_OK);
+        CHECK_OK(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &with));
         CHANGE_OPTIONS(ctx, o.touch_fit = EITS_TOUCH_FIT_SPLIT_MERGE | EITS_TOUCH_FIT_INTERACTION);
-        CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &without), EITS_OK);
+        CHECK_OK(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &without));
         CHECK_EQUAL(ctx->frame.has_y_log, 0);
         const uint32_t folds = SMALL_FOLDED - (left_out >= 0);
         CHECK(with - without >= folds * RANK && with - without <= (folds + 2) * RANK);
@@ -335,17 +318,15 @@ TEST(log_data)
  */
 TEST(log_data_without_a_ratio)
 {
-    eits_real frame[SMALL_ROWS], y[RANK];
-    uint32_t masked;
-    uint64_t macs;
-    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    eits_real y[RANK];
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1);
     for (int i = 0; i < SMALL_ROWS; ++i)
         frame[i] = ctx->reference.v0[i];
     const eits_fold fold = b.c.model.fold[3];
     ctx->reference.v0[fold.first] = ctx->reference.v0[fold.second] = 0;
     frame[fold.first] = frame[fold.second] = R(0.01);
     CHANGE_OPTIONS(ctx, o.diagnostics = 0);
-    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    STAGE(ctx, frame);
     eits_copy(y, ctx->frame.y, RANK);
     CHECK(eits_dot(ctx->kernels, y, y, RANK) > 0);
     for (int i = 0; i < RANK; ++i)

@@ -1,15 +1,8 @@
 /* The matrix products: against naive sums within a bound, and to the bit between builds and
  * layouts. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
 #include "kernels/kernels.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #ifdef EITS_BUILD_AVX2
 extern const eits_kernels eits_kernels_avx2;
@@ -263,8 +256,8 @@ TEST(products_of_all_storages_and_sizes)
                           cols[] = {1, 2, 3, 4, 5, 7, 31, 32, 33, 64, 99};
     uint64_t state = 11;
     for (int storage = 0; storage < 4; ++storage) {
-        for (size_t r = 0; r < sizeof rows / sizeof rows[0]; ++r) {
-            for (size_t c = 0; c < sizeof cols / sizeof cols[0]; ++c) {
+        for (size_t r = 0; IN_TABLE(r, rows); ++r) {
+            for (size_t c = 0; IN_TABLE(c, cols); ++c) {
                 sample s = make_sample((eits_storage)storage, rows[r], cols[c], &state);
                 check_mul(&s, &state);
                 check_mul_t(&s, &state);
@@ -467,18 +460,16 @@ TEST(zeros_are_skipped)
 
 TEST(choice_of_kernels)
 {
-    small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
-    small_context c;
-    small_context_open(&c, &made, 0);
-    CHECK(strcmp(eits_kernels_name(c.ctx), eits_kernels_best()->name) == 0);
-    CHECK_EQUAL(eits_use_portable_kernels(c.ctx, 1), EITS_OK);
-    CHECK(strcmp(eits_kernels_name(c.ctx), "portable") == 0);
-    CHECK_EQUAL(eits_use_portable_kernels(c.ctx, 0), EITS_OK);
-    CHECK(strcmp(eits_kernels_name(c.ctx), eits_kernels_best()->name) == 0);
-    CHECK_EQUAL(eits_use_portable_kernels(NULL, 0), EITS_E_ARGUMENT);
+    dense_bench b = {0};
+    eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = 3, .side = 3}, 0);
+    CHECK(strcmp(eits_kernels_name(ctx), eits_kernels_best()->name) == 0);
+    CHECK_OK(eits_use_portable_kernels(ctx, 1));
+    CHECK(strcmp(eits_kernels_name(ctx), "portable") == 0);
+    CHECK_OK(eits_use_portable_kernels(ctx, 0));
+    CHECK(strcmp(eits_kernels_name(ctx), eits_kernels_best()->name) == 0);
+    CHECK_REFUSED(eits_use_portable_kernels(NULL, 0));
     CHECK(strcmp(eits_kernels_name(NULL), "") == 0);
-    small_context_close(&c);
-    small_model_free(&made);
+    dense_bench_close(&b);
 }
 
 RUN_TESTS("kernels")

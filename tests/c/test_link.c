@@ -1,5 +1,6 @@
 /* The link's codec: what is encoded is decoded, and nothing else is ever taken for a packet. */
 #include "check.h"
+#include "small_model.h"
 
 #include "eitskin/link.h"
 #include "eitskin/model.h"
@@ -25,7 +26,7 @@ static uint32_t next_random(void) /* xorshift32 */
 static eits_link_decoder fresh(void)
 {
     eits_link_decoder d;
-    CHECK_EQUAL(eits_link_decoder_init(&d, buffer, sizeof buffer), EITS_OK);
+    CHECK_OK(eits_link_decoder_init(&d, buffer, sizeof buffer));
     return d;
 }
 
@@ -53,25 +54,12 @@ static uint32_t errors(const eits_link_decoder *d)
     return d->crc_errors + d->framing_errors + d->overruns + d->version_errors;
 }
 
-/* The wire's bytes by a second, plain implementation: build the packet, stuff it block by block. */
-static size_t plainly(uint8_t *out, uint8_t version, uint8_t type, uint32_t sequence,
-                      const uint8_t *bytes, size_t size)
+/* The wire's bytes of a packet by a second, plain implementation: its checksum put behind it, then
+ * stuffed block by block. */
+static size_t stuff(uint8_t *out, uint8_t *packet, size_t size)
 {
-    static uint8_t packet[EITS_LINK_MAX_PACKET];
-    const uint8_t head[8] = {version,
-                             type,
-                             (uint8_t)size,
-                             (uint8_t)(size >> 8),
-                             (uint8_t)sequence,
-                             (uint8_t)(sequence >> 8),
-                             (uint8_t)(sequence >> 16),
-                             (uint8_t)(sequence >> 24)};
-    memcpy(packet, head, 8);
-    memcpy(packet + 8, bytes, size);
-    const uint32_t crc = eits_crc32(0, packet, size + 8);
-    for (int k = 0; k < 4; ++k)
-        packet[size + 8 + (size_t)k] = (uint8_t)(crc >> (8 * k));
-    const size_t total = size + 12;
+    small_put_u32(packet + size, eits_crc32(0, packet, size));
+    const size_t total = size + 4;
     size_t at = 0, from = 0;
     out[at++] = 0;
     for (;;) {
@@ -89,6 +77,24 @@ static size_t plainly(uint8_t *out, uint8_t version, uint8_t type, uint32_t sequ
     }
     out[at++] = 0;
     return at;
+}
+
+static size_t plainly(uint8_t *out, uint8_t version, uint8_t type, uint32_t sequence,
+                      const uint8_t *bytes, size_t size)
+{
+    static uint8_t packet[EITS_LINK_MAX_PACKET];
+    packet[0] = version;
+    packet[1] = type;
+    small_put_u16(packet + 2, (uint32_t)size);
+    small_put_u32(packet + 4, sequence);
+    memcpy(packet + 8, bytes, size);
+    return stuff(out, packet, size + 8);
+}
+
+/* Such a packet on the wire, of `payload`. */
+static size_t encode(uint8_t type, uint32_t sequence, size_t size)
+{
+    return eits_link_encode(wire, sizeof wire, type, sequence, payload, size, NULL, 0);
 }
 
 static void fill(size_t size, int kind)
@@ -160,11 +166,11 @@ TEST(limits_of_room)
 TEST(bad_decoders)
 {
     eits_link_decoder d;
-    CHECK_EQUAL(eits_link_decoder_init(NULL, buffer, sizeof buffer), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_link_decoder_init(&d, NULL, sizeof buffer), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_link_decoder_init(&d, buffer + 4, sizeof buffer - 4), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_link_decoder_init(&d, buffer, EITS_LINK_HEAD + 3), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_link_decoder_init(&d, buffer, EITS_LINK_HEAD + 4), EITS_OK);
+    CHECK_REFUSED(eits_link_decoder_init(NULL, buffer, sizeof buffer));
+    CHECK_REFUSED(eits_link_decoder_init(&d, NULL, sizeof buffer));
+    CHECK_REFUSED(eits_link_decoder_init(&d, buffer + 4, sizeof buffer - 4));
+    CHECK_REFUSED(eits_link_decoder_init(&d, buffer, EITS_LINK_HEAD + 3));
+    CHECK_OK(eits_link_decoder_init(&d, buffer, EITS_LINK_HEAD + 4));
 }
 
 /* Whatever happens to one byte of a packet: no packet, one error counted, and the next packet is
@@ -185,10 +191,9 @@ TEST(every_byte_damaged)
     static uint8_t damaged[ROOM], good[64];
     const size_t good_size = eits_link_encode(good, sizeof good, 0x77, 9, "next", 4, NULL, 0);
     static const size_t sizes[] = {0, 4, 36, 253, 300};
-    for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
+    for (size_t s = 0; IN_TABLE(s, sizes); ++s) {
         fill(sizes[s], 3);
-        const size_t made =
-            eits_link_encode(wire, sizeof wire, EITS_PACKET_RAW, 5, payload, sizes[s], NULL, 0);
+        const size_t made = encode(EITS_PACKET_RAW, 5, sizes[s]);
         for (size_t at = 1; at + 1 < made; ++at) { /* the zeros at both ends: see delimiters() */
             for (unsigned value = 0; value < 256; ++value) {
                 if (value == wire[at])
@@ -208,7 +213,7 @@ TEST(every_byte_damaged)
     }
 }
 
-static void delimiters(void)
+TEST(delimiters)
 {
     uint8_t bytes[256];
     eits_link_packet packet = {.type = 0};
@@ -257,11 +262,11 @@ TEST(longer_than_the_buffer)
     static _Alignas(8) uint8_t small[8 + 4 + 32];
     eits_link_decoder d;
     eits_link_packet packet = {.type = 0};
-    CHECK_EQUAL(eits_link_decoder_init(&d, small, sizeof small), EITS_OK);
+    CHECK_OK(eits_link_decoder_init(&d, small, sizeof small));
     for (size_t size = 30; size <= 500; ++size) {
         fill(size, size % 2 ? 3 : 0);
         const uint32_t before = d.overruns, packets = d.packets;
-        const size_t made = eits_link_encode(wire, sizeof wire, 1, 1, payload, size, NULL, 0);
+        const size_t made = encode(1, 1, size);
         CHECK_EQUAL(feed_all(&d, wire, made, &packet), size <= 32);
         CHECK_EQUAL(d.overruns - before, size > 32);
         CHECK_EQUAL(d.packets - packets, size <= 32);
@@ -272,7 +277,7 @@ TEST(longer_than_the_buffer)
     for (int k = 0; k < 10; ++k)
         CHECK_EQUAL(feed_all(&d, other, sizeof other, &packet), 0);
     CHECK_EQUAL(d.overruns - before, 1);
-    const size_t made = eits_link_encode(wire, sizeof wire, 8, 1, payload, 32, NULL, 0);
+    const size_t made = encode(8, 1, 32);
     CHECK_EQUAL(feed_all(&d, wire, made, &packet), 1);
 }
 
@@ -293,21 +298,7 @@ TEST(other_versions)
 TEST(wrong_length_in_the_head)
 {
     uint8_t packet_bytes[16] = {EITS_LINK_VERSION, 1, 5, 0, 0, 0, 0, 0, 1, 2, 3, 4};
-    const uint32_t crc = eits_crc32(0, packet_bytes, 12);
-    for (int k = 0; k < 4; ++k)
-        packet_bytes[12 + k] = (uint8_t)(crc >> (8 * k));
-    size_t at = 0, from = 0;
-    wire[at++] = 0;
-    while (from <= 16) { /* blocks end at zeros, and at the packet's end */
-        size_t run = 0;
-        while (from + run < 16 && packet_bytes[from + run] != 0)
-            ++run;
-        wire[at++] = (uint8_t)(run + 1);
-        memcpy(wire + at, packet_bytes + from, run);
-        at += run;
-        from += run + 1;
-    }
-    wire[at++] = 0;
+    const size_t at = stuff(wire, packet_bytes, 12);
     eits_link_decoder d = fresh();
     eits_link_packet packet = {.type = 0};
     CHECK_EQUAL(feed_all(&d, wire, at, &packet), 0);
@@ -344,7 +335,7 @@ TEST(by_bytes_and_by_blocks)
     }
     static _Alignas(8) uint8_t second[EITS_LINK_MAX_PACKET];
     eits_link_decoder bytes, blocks = fresh();
-    CHECK_EQUAL(eits_link_decoder_init(&bytes, second, sizeof second), EITS_OK);
+    CHECK_OK(eits_link_decoder_init(&bytes, second, sizeof second));
     size_t at = 0, by_bytes = 0;
     while (at < length) {
         eits_link_packet packet, single = {.payload = NULL};
@@ -372,9 +363,4 @@ TEST(by_bytes_and_by_blocks)
     CHECK(packet.payload == NULL);
 }
 
-int main(void)
-{
-    run_tests();
-    delimiters();
-    return checks_report("link");
-}
+RUN_TESTS("link")

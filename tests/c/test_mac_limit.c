@@ -1,24 +1,12 @@
 /* The limit of multiply-accumulates: whatever it is, it holds, and the image is finite and no worse
  * than zero. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 enum { SIDE = 7, N = SIDE * SIDE, RANK = 12, SOLVERS = 4 };
 
-typedef dense_bench bench;
+static dense_bench b;
 
-static bench b;
-
-static eits_context *set_up(bench *b)
+static eits_context *set_up(dense_bench *b)
 {
     return dense_bench_open(b, (small_spec){.rank = RANK, .side = SIDE}, 0);
 }
@@ -43,9 +31,9 @@ static eits_info solve(eits_context *ctx, way w, uint32_t limit)
     o.mac_limit = 0;
     eits_forget(ctx);
     if (w.warm) {
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_OK(eits_set_options(ctx, &o));
         small_new_data(ctx, 71);
-        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+        CHECK_OK(eits_solve(ctx, NULL));
     }
     small_new_data(ctx, 72);
     for (uint32_t i = 0; w.warm && i < RANK; ++i) { /* near what the start is for */
@@ -56,21 +44,17 @@ static eits_info solve(eits_context *ctx, way w, uint32_t limit)
         ctx->frame.y[i] = kept + R(0.2) * ctx->frame.y[i];
     }
     o.mac_limit = limit;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
+    CHECK_OK(eits_solve(ctx, NULL));
     return *eits_get_info(ctx);
 }
 
-static void check_result(const bench *b, const eits_info *info)
+static void check_result(const dense_bench *b, const eits_info *info)
 {
     const eits_context *ctx = b->c.ctx;
     double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
-    uint32_t nonzeros = 0;
-    for (int j = 0; j < N; ++j) {
-        CHECK(isfinite((double)eits_get_image(ctx)[j]) && isfinite(x[j]));
-        nonzeros += x[j] != 0;
-    }
-    CHECK_EQUAL(nonzeros, info->nonzeros);
+    CHECK(is_finite(ctx));
+    CHECK_EQUAL(count_nonzeros(ctx), info->nonzeros);
     if (info->lambda > 0) {
         const double scale = 0.5 * dense_dot(y, y, RANK);
         CHECK_NEAR(dense_gap(&b->d, y, x, (double)info->lambda, eits_get_options(ctx)->sign),
@@ -129,18 +113,14 @@ TEST(to_the_last_mac)
 /* A step that is too long starts over from zero: the limit holds there too. */
 TEST(beside_step_halvings)
 {
-    dense_bench_close(&b);
-    b.made =
-        small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 1.0 / 16});
-    small_context_open(&b.c, &b.made, 0);
-    b.d = dense_of(&b.c.model);
+    (void)dense_bench_open(
+        &b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 1.0 / 16}, 0);
     for (int solver = 0; solver < 2; ++solver) {
         const way w = {(eits_solver)solver, EITS_SIGN_BOTH, 0, 0};
         for (uint32_t limit = 1; limit < 60000; limit += 1 + limit / 53) {
             const eits_info info = solve(b.c.ctx, w, limit);
             CHECK(info.macs <= limit);
-            for (int j = 0; j < N; ++j)
-                CHECK(isfinite((double)eits_get_image(b.c.ctx)[j]));
+            CHECK(is_finite(b.c.ctx));
             CHECK(info.stop == EITS_STOP_DIVERGED || info.stop == EITS_STOP_MACS ||
                   info.stop == EITS_STOP_ITERATIONS);
         }
@@ -158,19 +138,16 @@ static void of_a_whole_frame(int masked)
         eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
         uint64_t state = 63;
         small_reference(&b.c.model, 1, reference);
-        for (int i = 0; i < SMALL_ROWS; ++i)
-            frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
-        CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
+        vary(frame, reference, 0.3, &state);
+        CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
         for (int k = 0; k < 2 * masked; ++k) {
-            const eits_fold fold = ctx->model->fold[2 + 4 * k];
-            CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
-            CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
+            mask_fold(ctx, 2 + 4 * (uint32_t)k);
         }
         uint64_t min = 0;
         for (uint32_t limit = 1; limit < 20000; limit += 1 + limit / 50) {
             CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.mac_limit = limit);
             eits_info info;
-            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, &info), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, &info));
             min = limit == 2 ? info.macs : min; /* the first frame also builds the basis */
             CHECK(limit <= 2 || info.macs <= (limit > min ? limit : min));
         }

@@ -1,50 +1,21 @@
 /* Numbers at the ends of the width: what overflows or vanishes on the way is refused or answered
  * with zero, never NaN. */
-#include "check.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <string.h>
+#include "steps.h"
 
 enum { SIDE = 4, N = SIDE * SIDE, MAX_RANK = 40 };
 static const double GREATEST = BOTH_WIDTHS((double)FLT_MAX, DBL_MAX);
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-    eits_real frame[SMALL_ROWS];
-} bench;
+static dense_bench b;
 
-static bench b;
-
-static void tear_down(bench *b)
+static small_model make(uint32_t rank)
 {
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
-
-static void make(bench *b, uint32_t rank)
-{
-    tear_down(b);
-    memset(b, 0, sizeof *b);
-    b->made = small_model_make((small_spec){.rank = rank, .side = SIDE});
-}
-
-static eits_context *open_made(bench *b)
-{
-    small_model_seal(&b->made);
-    small_context_open(&b->c, &b->made, 0);
-    return b->c.ctx;
+    return small_model_make((small_spec){.rank = rank, .side = SIDE});
 }
 
 /* Every number of VREF. */
-static void set_v_ref(bench *b, float value)
+static void set_v_ref(small_model *made, float value)
 {
-    uint8_t *at = small_model_section(&b->made, "VREF", NULL);
+    uint8_t *at = small_model_section(made, "VREF", NULL);
     for (int k = 0; k < SMALL_FOLDED; ++k)
         small_put_f32(at + 4 * k, value);
 }
@@ -53,12 +24,13 @@ static void set_v_ref(bench *b, float value)
  * `measured` volts. */
 static void reference(float volts, double measured, eits_status expected)
 {
-    make(&b, 12);
-    set_v_ref(&b, volts);
-    eits_context *ctx = open_made(&b);
+    small_model made = make(12);
+    set_v_ref(&made, volts);
+    eits_context *ctx = dense_bench_take(&b, made, 0);
+    eits_real frame[SMALL_ROWS];
     for (int i = 0; i < SMALL_ROWS; ++i)
-        b.frame[i] = (eits_real)measured;
-    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), expected);
+        frame[i] = (eits_real)measured;
+    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), expected);
     CHECK_EQUAL(ctx->reference.ready, expected == EITS_OK);
     CHECK(expected != EITS_OK ||
           (isfinite((double)ctx->reference.gain) && ctx->reference.gain != 0));
@@ -77,10 +49,10 @@ TEST(references_out_of_proportion_never_give_nan)
 }
 
 /* Every column of S: `first` in the first eight rows, `rest` in the others. */
-static void set_columns(bench *b, uint32_t rank, float first, float rest)
+static void set_columns(small_model *made, uint32_t rank, float first, float rest)
 {
     uint32_t size;
-    uint8_t *at = small_model_section(&b->made, "SENS", &size);
+    uint8_t *at = small_model_section(made, "SENS", &size);
     const uint32_t stride = size / 4 / N;
     for (uint32_t j = 0; j < N; ++j) {
         for (uint32_t i = 0; i < rank; ++i)
@@ -90,25 +62,23 @@ static void set_columns(bench *b, uint32_t rank, float first, float rest)
 
 static void check_cleared(const eits_context *ctx)
 {
-    for (int j = 0; j < N; ++j)
-        CHECK(eits_get_image(ctx)[j] == 0 && eits_get_coefficients(ctx)[j] == 0);
-    CHECK(isfinite((double)eits_get_info(ctx)->gap) &&
-          isfinite((double)eits_get_info(ctx)->residual) &&
-          isfinite((double)eits_get_info(ctx)->lambda));
+    CHECK(is_cleared(ctx));
+    CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.residual) &&
+          isfinite((double)ctx->info.lambda));
 }
 
 TEST(correlations_that_overflow_never_give_nan)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        make(&b, 12);
-        set_columns(&b, 12, 1e36f, 1e36f);
-        eits_context *ctx = open_made(&b);
+        small_model made = make(12);
+        set_columns(&made, 12, 1e36f, 1e36f);
+        eits_context *ctx = dense_bench_take(&b, made, 0);
         for (int i = 0; i < 12; ++i)
             ctx->frame.y[i] = R(BOTH_WIDTHS(1e5, 1e150));
         ctx->options.solver = (eits_solver)solver;
         CHECK_EQUAL(eits_solve(ctx, NULL), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
-        CHECK(BOTH_WIDTHS(1, 0) == (eits_get_info(ctx)->stop == EITS_STOP_DIVERGED &&
-                                    eits_get_info(ctx)->lambda_max == 0));
+        CHECK(BOTH_WIDTHS(1, 0) ==
+              (ctx->info.stop == EITS_STOP_DIVERGED && ctx->info.lambda_max == 0));
         if (sizeof(eits_real) == 4)
             check_cleared(ctx);
     }
@@ -120,16 +90,16 @@ TEST(correlations_that_overflow_never_give_nan)
  * factor gives where the data are great. */
 static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_limit)
 {
-    make(&b, MAX_RANK);
-    set_columns(&b, MAX_RANK, 3.75e-23f, 2.6e-23f);
+    small_model made = make(MAX_RANK);
+    set_columns(&made, MAX_RANK, 3.75e-23f, 2.6e-23f);
     /* the least that a model may state */
-    small_put_f32(small_model_section(&b.made, "DIMS", NULL) + 56, 1.2e-38f);
-    eits_context *ctx = open_made(&b);
+    small_put_f32(small_model_section(&made, "DIMS", NULL) + 56, 1.2e-38f);
+    eits_context *ctx = dense_bench_take(&b, made, 0);
     for (int i = 0; i < MAX_RANK; ++i)
         ctx->frame.y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
     CHANGE_OPTIONS(ctx, o.solver = solver, o.sign = EITS_SIGN_BOTH, o.lambda_rel = R(0.01),
                    o.iterations = 50, o.mac_limit = mac_limit);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     const eits_info info = *eits_get_info(ctx);
     if (sizeof(eits_real) == 4)
         check_cleared(ctx);
@@ -154,4 +124,4 @@ TEST(columns_whose_squares_vanish_never_give_nan)
     }
 }
 
-RUN_TESTS("overflow", tear_down(&b))
+RUN_TESTS("overflow", dense_bench_close(&b))

@@ -25,7 +25,7 @@ static double weight(int i, double mu)
 TEST(the_formula)
 {
     const double noises[] = {2.1e-3, 0.01, 0.1, 0.9};
-    for (size_t n = 0; n < sizeof noises / sizeof noises[0]; ++n) {
+    for (size_t n = 0; IN_TABLE(n, noises); ++n) {
         /* P and S are stored as float */
         const double mu = fmin(FACTOR * noises[n], MAX), bound = BOTH_WIDTHS(1e-5, 1e-6);
         eits_context *ctx = set_up(&b, WHITENED, 0);
@@ -98,7 +98,7 @@ TEST(solvers_solve_the_seen_problem)
 
 static void reconstruct(bench *b, eits_real image[N])
 {
-    CHECK_EQUAL(eits_reconstruct(b->b.c.ctx, b->frame, SMALL_ROWS, image, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(b->b.c.ctx, b->frame, SMALL_ROWS, image, NULL));
 }
 
 /* The model's own bits where nothing is known of the noise, or nothing asked for, or hardly more
@@ -109,14 +109,14 @@ TEST(only_where_asked_for)
     eits_real plain[N], image[N], raised[N];
     eits_context *ctx = set_up(&b, WHITENED, 1);
     reconstruct(&b, plain);
-    CHECK(eits_get_info(ctx)->regularisation == ctx->whitening.mu);
+    CHECK(ctx->info.regularisation == ctx->whitening.mu);
     CHECK_NEAR(ctx->whitening.mu, SMALL_REGULARISATION, 1e-5);
     const double little[] = {1e-4, SMALL_REGULARISATION / FACTOR,
                              1.009 * SMALL_REGULARISATION / FACTOR};
-    for (size_t k = 0; k < sizeof little / sizeof little[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, little); ++k) {
         pretend_noise(ctx, little[k]);
         reconstruct(&b, image);
-        CHECK(!ctx->whitening.form && eits_get_info(ctx)->regularisation == ctx->whitening.mu &&
+        CHECK(!ctx->whitening.form && ctx->info.regularisation == ctx->whitening.mu &&
               memcmp(image, plain, sizeof image) == 0);
     }
     pretend_noise(ctx, 1.012 * SMALL_REGULARISATION / FACTOR);
@@ -125,7 +125,7 @@ TEST(only_where_asked_for)
     CHECK(memcmp(image, plain, sizeof image) != 0);
     pretend_noise(ctx, 0.02);
     reconstruct(&b, raised);
-    CHECK_NEAR(eits_get_info(ctx)->regularisation, 0.1, 1e-5);
+    CHECK_NEAR(ctx->info.regularisation, 0.1, 1e-5);
     choose_factor(ctx, 0);
     reconstruct(&b, image);
     CHECK(memcmp(image, plain, sizeof image) == 0);
@@ -134,14 +134,14 @@ TEST(only_where_asked_for)
     CHECK(memcmp(image, raised, sizeof image) == 0);
     choose_factor(ctx, 1e29);
     reconstruct(&b, image);
-    CHECK(eits_get_info(ctx)->regularisation == R(1.0));
+    CHECK(ctx->info.regularisation == R(1.0));
     eits_context *portable = set_up(&other, WHITENED, 1);
     pretend_noise(portable, 0.02);
-    CHECK_EQUAL(eits_use_portable_kernels(portable, 1), EITS_OK);
+    CHECK_OK(eits_use_portable_kernels(portable, 1));
     reconstruct(&other, image);
     CHECK(memcmp(image, raised, sizeof image) == 0);
     /* of one frame nothing is known of the noise */
-    CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, b.reference, SMALL_ROWS));
     reconstruct(&b, image);
     CHECK(memcmp(image, plain, sizeof image) == 0);
     dense_bench_close(&other.b);
@@ -158,22 +158,21 @@ TEST(models_of_other_forms)
     pretend_noise(ctx, 0.1);
     (void)stage(&b);
     reconstruct(&b, NULL);
-    CHECK(!ctx->whitening.form && eits_get_info(ctx)->regularisation == 0);
+    CHECK(!ctx->whitening.form && ctx->info.regularisation == 0);
     spec.shape =
         SMALL_IDENTITY; /* whitened with no regularisation at all; all directions are alike */
     ctx = set_up(&b, spec, 0);
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
     CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_DIAGONAL);
-    CHECK_NEAR(eits_get_info(ctx)->regularisation, 0.5, 1e-6);
+    CHECK_NEAR(ctx->info.regularisation, 0.5, 1e-6);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->frame.y[i], ctx->frame.d[i], 1e-5);
     /* as of a row of P that is far greater than the others */
     ctx->whitening.row_scale[2] = R(BOTH_WIDTHS(1e-20, 1e-160));
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
-    CHECK(!ctx->whitening.form && ctx->whitening.noise_ratio == 1 &&
-          eits_get_info(ctx)->regularisation == 0);
+    CHECK(!ctx->whitening.form && ctx->whitening.noise_ratio == 1 && ctx->info.regularisation == 0);
 }
 
 /* The reference frames' own noise raises the regularisation for the second half of them already,
@@ -195,12 +194,9 @@ TEST(learned_with_it)
         /* says nothing: the third alone tells */
         untouched[3][i] = (mean[i] + mean[i] + untouched[2][i]) / 3;
     }
-    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
-    for (int k = 0; k < UNTOUCHED; ++k)
-        CHECK_EQUAL(eits_reference_add(ctx, untouched[k], SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    LEARN(ctx, UNTOUCHED, untouched);
     const double learned = (double)ctx->reference.lambda_noise, noise = sqrt(square / SMALL_ROWS);
-    CHECK_EQUAL(eits_reference_set(ctx, mean, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, mean, SMALL_ROWS));
     pretend_noise(ctx, noise / (double)ctx->reference.v0_rms);
     memcpy(b.frame, untouched[2], sizeof b.frame);
     (void)stage(&b);

@@ -1,14 +1,12 @@
 /* Rows left out of a taught model: filled in by the rows' precision (section PREC), F beside it;
  * and everything that a reader refuses. */
-#include "base/vec.h"
-#include "check.h"
-#include "frame/whitening.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include <math.h>
+#include "frame/whitening.h"
 
 enum { RANK = 4, PACKED = SMALL_FOLDED * (SMALL_FOLDED + 1) / 2, SIZE = 4 * PACKED, OTHER = 10 };
 
+static dense_bench b;
 static const small_spec TAUGHT = {.rank = RANK, .side = 5, .shape = SMALL_IDENTITY};
 static const small_spec WHITENED = {.rank = RANK, .side = 5, .shape = SMALL_WHITENED};
 
@@ -39,18 +37,14 @@ static small_model with_precision(small_spec spec, int taught, const uint8_t *by
 
 static eits_status opened(int taught, const uint8_t *bytes, uint32_t size)
 {
-    small_model made = with_precision(taught ? TAUGHT : WHITENED, taught, bytes, size);
-    eits_model model;
-    const eits_status status = eits_model_open(&model, made.blob, made.size);
-    small_model_free(&made);
-    return status;
+    return small_model_try(with_precision(taught ? TAUGHT : WHITENED, taught, bytes, size));
 }
 
-static void what_is_no_precision_is_refused(void)
+TEST(what_is_no_precision_is_refused)
 {
     uint8_t bytes[SIZE + 4];
     section_of(bytes, 0.5f);
-    CHECK_EQUAL(opened(1, bytes, SIZE), EITS_OK);
+    CHECK_OK(opened(1, bytes, SIZE));
     CHECK_EQUAL(opened(1, bytes, SIZE - 4), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(opened(1, bytes, SIZE + 4), EITS_E_MODEL_SECTION);
     /* a model that says how it was whitened needs none */
@@ -62,36 +56,25 @@ static void what_is_no_precision_is_refused(void)
 }
 
 /* Of 21 folds 16 directions are made: five may be filled in, of six all would be a guess. */
-static void as_many_are_filled_in_as_are_spare(void)
+TEST(as_many_are_filled_in_as_are_spare)
 {
     enum { MANY = 16 };
     uint8_t bytes[SIZE + 4];
     section_of(bytes, 0.5f);
     const small_spec spec = {.rank = MANY, .side = 5, .shape = SMALL_IDENTITY};
-    small_model made = with_precision(spec, 1, bytes, SIZE);
     for (uint32_t out = 0; out <= SMALL_FOLDED - MANY + 1; ++out) {
         eits_real frame[SMALL_ROWS];
-        uint32_t masked;
-        uint64_t macs;
-        small_context c;
-        small_context_open(&c, &made, 0);
-        CHANGE_OPTIONS(c.ctx, o.project_reference = 0, o.diagnostics = 0,
-                       o.max_masked = SMALL_ROWS);
-        small_reference(&c.model, 1, frame);
-        CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
-        for (uint32_t k = 0; k < out; ++k) {
-            const eits_fold fold = c.model.fold[k];
-            frame[fold.first] = (eits_real)NAN;
-            if (fold.second != EITS_FOLD_NONE)
-                frame[fold.second] = (eits_real)NAN;
-        }
-        CHECK_EQUAL(eits_frame_stage(c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
-        CHECK_EQUAL(c.ctx->whitening.form, out > 0 && out <= SMALL_FOLDED - MANY
-                                               ? EITS_WHITENING_TRIANGLE
-                                               : EITS_WHITENING_STORED);
-        small_context_close(&c);
+        eits_context *ctx = dense_bench_take(&b, with_precision(spec, 1, bytes, SIZE), 0);
+        CHANGE_OPTIONS(ctx, o.project_reference = 0, o.diagnostics = 0, o.max_masked = SMALL_ROWS);
+        small_reference(ctx->model, 1, frame);
+        CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
+        for (uint32_t k = 0; k < out; ++k)
+            lose_fold(ctx->model, k, frame);
+        STAGE(ctx, frame);
+        CHECK_EQUAL(ctx->whitening.form, out > 0 && out <= SMALL_FOLDED - MANY
+                                             ? EITS_WHITENING_TRIANGLE
+                                             : EITS_WHITENING_STORED);
     }
-    small_model_free(&made);
 }
 
 /* A frame without fold 0, `pivot` the precision of that fold. */
@@ -99,39 +82,27 @@ static void solved(float leaning, float pivot, eits_real wanted_scale, eits_whit
 {
     uint8_t bytes[SIZE + 4];
     eits_real frame[SMALL_ROWS];
-    uint32_t masked;
-    uint64_t macs;
     section_of(bytes, leaning);
     small_put_f32(entry(bytes, 0, 0), pivot);
-    small_model made = with_precision(TAUGHT, 1, bytes, SIZE);
-    small_context c;
-    small_context_open(&c, &made, 0);
-    eits_options o = *eits_get_options(c.ctx);
-    o.project_reference = 0;
-    o.diagnostics = 0;
-    CHECK_EQUAL(eits_set_options(c.ctx, &o), EITS_OK);
-    small_reference(&c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
+    eits_context *ctx = dense_bench_take(&b, with_precision(TAUGHT, 1, bytes, SIZE), 0);
+    CHANGE_OPTIONS(ctx, o.project_reference = 0, o.diagnostics = 0);
+    small_reference(ctx->model, 1, frame);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)1.25;
-    frame[c.model.fold[0].first] = (eits_real)NAN;
-    if (c.model.fold[0].second != EITS_FOLD_NONE)
-        frame[c.model.fold[0].second] = (eits_real)NAN;
-    CHECK_EQUAL(eits_frame_stage(c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
-    CHECK_EQUAL(c.ctx->whitening.form, form);
-    const eits_real p = (eits_real)((const float *)c.model.reduction.data)[0];
-    CHECK_NEAR(c.ctx->frame.y[0], wanted_scale * p * c.ctx->frame.d[OTHER], 1e-5);
-    small_context_close(&c);
-    small_model_free(&made);
+    lose_fold(ctx->model, 0, frame);
+    STAGE(ctx, frame);
+    CHECK_EQUAL(ctx->whitening.form, form);
+    const eits_real p = (eits_real)((const float *)ctx->model->reduction.data)[0];
+    CHECK_NEAR(ctx->frame.y[0], wanted_scale * p * ctx->frame.d[OTHER], 1e-5);
 }
 
-int main(void)
+TEST(a_row_leans_on_others_by_its_precision)
 {
-    what_is_no_precision_is_refused();
-    as_many_are_filled_in_as_are_spare();
     /* d_0 = -.5 / 2 d_OTHER, F_00 = sqrt(1 - 1 / 2), y = d_0 / F_00 */
     solved(0.5f, 2.0f, (eits_real)(-0.25 / sqrt(0.5)), EITS_WHITENING_TRIANGLE);
     /* a precision of nothing cannot be divided by: the row is projected out, as without PREC */
     solved(0.5f, 0.0f, 0, EITS_WHITENING_STORED);
-    return checks_report("rows out");
 }
+
+RUN_TESTS("rows out", dense_bench_close(&b))

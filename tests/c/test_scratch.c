@@ -1,22 +1,8 @@
 /* What lies in the scratch, and in the gaps between arrays, makes no difference to a result: it is
  * nobody's. */
-#include "check.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
-
-#include <math.h>
-#include <string.h>
+#include "steps.h"
 
 enum { RANK = 12, SIDE = 12, N = SIDE * SIDE, SOLVERS = 4, FRAMES = 24, KEPT_NOISE = 6 };
-
-typedef struct bench {
-    small_model made;
-    small_context c;
-} bench;
 
 static const small_spec SPECS[] = {
     {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES},
@@ -52,33 +38,21 @@ static void spoil(eits_context *ctx, eits_real with)
     fill(ctx->range.off_range, folds, room, with);
 }
 
-static eits_context *set_up(bench *b, small_spec spec, int noise_known, eits_solver solver)
+static eits_context *set_up(dense_bench *b, small_spec spec, int noise_known, eits_solver solver)
 {
-    b->made = small_model_make(spec);
-    small_context_open(&b->c, &b->made, 0);
-    eits_context *ctx = b->c.ctx;
+    eits_context *ctx = dense_bench_open(b, spec, 0);
     uint64_t state = 5;
-    eits_real frame[SMALL_ROWS], v[SMALL_ROWS];
+    eits_real frame[SMALL_ROWS], v[KEPT_NOISE][SMALL_ROWS];
     CHANGE_OPTIONS(ctx, o.solver = solver, o.warm_start = 1, o.max_masked = SMALL_ROWS);
     small_reference(&b->c.model, 1, frame);
     if (!noise_known) {
-        CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
         return ctx;
     }
-    CHECK_EQUAL(eits_reference_begin(ctx, KEPT_NOISE), EITS_OK);
-    for (int k = 0; k < KEPT_NOISE; ++k) {
-        for (int i = 0; i < SMALL_ROWS; ++i)
-            v[i] = frame[i] * (eits_real)(1 + 1e-3 * small_random(&state));
-        CHECK_EQUAL(eits_reference_add(ctx, v, SMALL_ROWS), EITS_OK);
-    }
-    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    for (int k = 0; k < KEPT_NOISE; ++k)
+        vary(v[k], frame, 1e-3, &state);
+    LEARN(ctx, KEPT_NOISE, v);
     return ctx;
-}
-
-static void tear_down(bench *b)
-{
-    small_context_close(&b->c);
-    small_model_free(&b->made);
 }
 
 /* A change of 5 %, pairs alike but for 0.1 %; in every other frame a reading that may or may not
@@ -100,12 +74,12 @@ static void make_frame(const eits_model *model, int k, uint64_t *state, eits_rea
         frame[i] = model->protocol[4 * (size_t)i] == k % SMALL_ELECTRODES ? R(NAN) : frame[i];
 }
 
-static void what_lies_in_the_scratch_makes_no_difference(void)
+TEST(what_lies_in_the_scratch_makes_no_difference)
 {
     static const double junk[] = {NAN, 1e30, -1e-30};
-    for (size_t spec = 0; spec < sizeof SPECS / sizeof *SPECS; ++spec) {
+    for (size_t spec = 0; IN_TABLE(spec, SPECS); ++spec) {
         for (int way = 0; way < 2 * SOLVERS; ++way) {
-            bench clean, spoilt;
+            dense_bench clean = {0}, spoilt = {0};
             eits_context *ctx = set_up(&clean, SPECS[spec], way % 2, (eits_solver)(way / 2)),
                          *other = set_up(&spoilt, SPECS[spec], way % 2, (eits_solver)(way / 2));
             uint64_t state = 17;
@@ -124,22 +98,16 @@ static void what_lies_in_the_scratch_makes_no_difference(void)
                     continue;
                 CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) ==
                       0);
-                CHECK_EQUAL(eits_find_touches(ctx, touches[0], EITS_MAX_TOUCHES, &count[0]),
-                            EITS_OK);
-                CHECK_EQUAL(eits_find_touches(other, touches[1], EITS_MAX_TOUCHES, &count[1]),
-                            EITS_OK);
+                CHECK_OK(eits_find_touches(ctx, touches[0], EITS_MAX_TOUCHES, &count[0]));
+                CHECK_OK(eits_find_touches(other, touches[1], EITS_MAX_TOUCHES, &count[1]));
                 CHECK_EQUAL(count[1], count[0]);
                 for (uint32_t t = 0; t < count[0] && t < count[1]; ++t)
                     CHECK(small_same_touch(&touches[0][t], &touches[1][t]));
             }
-            tear_down(&clean);
-            tear_down(&spoilt);
+            dense_bench_close(&clean);
+            dense_bench_close(&spoilt);
         }
     }
 }
 
-int main(void)
-{
-    what_lies_in_the_scratch_makes_no_difference();
-    return checks_report("scratch");
-}
+RUN_TESTS("scratch")

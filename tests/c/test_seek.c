@@ -1,12 +1,7 @@
 /* Touches that are sought in the data, whatever the sparse image shows; and the one touch of an
  * instrument that is far from the model. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
 #include "evidence/evidence.h"
 #include "frame/constants.h"
 #include "frame/whitening.h"
@@ -14,17 +9,14 @@
 #include "touch/constants.h"
 #include "touch/disc_fit.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum { SIDE = 20, RANK = 64 };
+static dense_bench b;
 static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
 
 /* The data of these discs, and an image with one peak far from them. */
-static eits_context *pressed(dense_bench *b, const eits_disc *disc, uint32_t count, eits_sign sign)
+static eits_context *pressed(const eits_disc *disc, uint32_t count, eits_sign sign)
 {
-    eits_context *ctx = dense_bench_open(b, WAVES, 0);
+    eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     eits_options o = *eits_get_options(ctx);
     eits_real atom[RANK];
     CHECK_EQUAL(o.touch_seek, 0); /* this model was not taught */
@@ -32,14 +24,14 @@ static eits_context *pressed(dense_bench *b, const eits_disc *disc, uint32_t cou
     o.sign = sign;
     o.touch_min_fraction = R(0.02);
     o.detection_factor = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
     eits_zero(ctx->frame.y, RANK);
     for (uint32_t k = 0; k < count; ++k) {
         (void)eits_disc_atom(ctx, &ctx->scratch, disc + k, atom, NULL);
         eits_axpy(ctx->kernels, ctx->frame.y, disc[k].change, atom, RANK);
     }
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
-    for (uint32_t j = 0; j < b->c.model.n_pixels; ++j)
+    CHECK_OK(eits_solve(ctx, NULL));
+    for (uint32_t j = 0; j < b.c.model.n_pixels; ++j)
         ctx->solver.image[j] = j == 0 ? 1 : 0;
     return ctx;
 }
@@ -47,7 +39,7 @@ static eits_context *pressed(dense_bench *b, const eits_disc *disc, uint32_t cou
 static uint32_t found(eits_context *ctx, eits_touch *touch)
 {
     uint32_t count = 0;
-    CHECK_EQUAL(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_OK(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count));
     return count;
 }
 
@@ -85,44 +77,35 @@ TEST(touches_that_the_image_does_not_show_are_found)
           {0, 0, 9, R(0.04), 1, 0},
           {3, -45, 9, R(0.05), 1, 0}}},
     };
-    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
-        dense_bench b = {0};
+    for (size_t c = 0; IN_TABLE(c, cases); ++c) {
         eits_touch touch[EITS_MAX_TOUCHES];
-        eits_context *ctx = pressed(&b, cases[c].disc, cases[c].count, cases[c].sign);
+        eits_context *ctx = pressed(cases[c].disc, cases[c].count, cases[c].sign);
         const uint32_t count = found(ctx, touch);
         CHECK_EQUAL(count, cases[c].count);
         for (uint32_t k = 0; k < cases[c].count; ++k)
             CHECK(has(touch, count, &cases[c].disc[k]));
-        CHECK(eits_get_info(ctx)->touch_macs > 0);
-        eits_options o = *eits_get_options(ctx);
-        o.touch_seek = 0; /* the image's peak is none of them */
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK(ctx->info.touch_macs > 0);
+        /* the image's peak is none of them */
+        CHANGE_OPTIONS(ctx, o.touch_seek = 0);
         CHECK(found(ctx, touch) < 2u);
-        dense_bench_close(&b);
     }
 }
 
 TEST(what_explains_too_little_is_no_touch)
 {
     const eits_disc disc[2] = {{-21, 9, 9, R(0.05), 1, 0}, {27, -15, 9, R(0.02), 1, 0}};
-    dense_bench b = {0};
     eits_touch touch[EITS_MAX_TOUCHES];
-    eits_context *ctx = pressed(&b, disc, 2, EITS_SIGN_INCREASE);
-    eits_options o = *eits_get_options(ctx);
-    o.touch_min_fraction = R(0.2); /* it explains a seventh */
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    eits_context *ctx = pressed(disc, 2, EITS_SIGN_INCREASE);
+    /* it explains a seventh */
+    CHANGE_OPTIONS(ctx, o.touch_min_fraction = R(0.2));
     CHECK_EQUAL(found(ctx, touch), 1);
     CHECK(has(touch, 1, &disc[0]));
-    o.touch_min_fraction = R(0.02);
-    o.max_touches = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.touch_min_fraction = R(0.02), o.max_touches = 1);
     CHECK_EQUAL(found(ctx, touch), 1);
-    o.max_touches = EITS_MAX_TOUCHES;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.max_touches = EITS_MAX_TOUCHES);
     for (int i = 0; i < RANK; ++i) /* nothing of the sign that is looked for */
         ctx->frame.y[i] = 0;
     CHECK_EQUAL(found(ctx, touch), 0);
-    dense_bench_close(&b);
 }
 
 /* Sought discs go from a pixel's centre by whole pixels: so they come to lie there, and rounding
@@ -133,10 +116,9 @@ TEST(a_disc_a_whole_pixel_beyond_the_rim_is_no_touch)
         eits_real beyond; /* of the rim's pixel, pixels */
         uint32_t count;
     } cases[] = {{R(0.99), 1}, {R(0.9999), 0}, {1, 0}, {R(1.0001), 0}};
-    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
-        dense_bench b = {0};
+    for (size_t c = 0; IN_TABLE(c, cases); ++c) {
         const eits_disc at = {0, 0, 9, R(0.05), 1, 0};
-        eits_context *ctx = pressed(&b, &at, 1, EITS_SIGN_INCREASE);
+        eits_context *ctx = pressed(&at, 1, EITS_SIGN_INCREASE);
         const eits_model *model = ctx->model;
         const eits_real pixel = (eits_real)model->pixel_mm;
         eits_fit f = eits_fit_none(ctx, &ctx->scratch);
@@ -155,7 +137,6 @@ TEST(a_disc_a_whole_pixel_beyond_the_rim_is_no_touch)
         eits_fit_strengths(ctx, &ctx->scratch, &f);
         eits_fit_prune(ctx, &ctx->scratch, &f);
         CHECK_EQUAL(f.count, cases[c].count);
-        dense_bench_close(&b);
     }
 }
 
@@ -177,8 +158,7 @@ TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
     static const eits_disc disc[2] = {{-10, 3, 9, R(0.05), 1, 0}, {14, 3, 9, R(0.05), 1, 0}};
     const double step = sizeof(eits_real) == 4 ? 0.02 : 1e-4, factor = 2.5;
     eits_touch touch[EITS_MAX_TOUCHES];
-    dense_bench b = {0};
-    eits_context *ctx = pressed(&b, disc, 2, EITS_SIGN_INCREASE);
+    eits_context *ctx = pressed(disc, 2, EITS_SIGN_INCREASE);
     for (uint32_t i = 0; i < RANK; i += 3)
         ctx->frame.y[i] *= R(0.98);
     const double total = (double)eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, RANK);
@@ -209,15 +189,13 @@ TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
         CHECK_NEAR((double)touch[k].y_variance_mm2 / (unit * h[0] / det), 1, 0.03);
         CHECK_NEAR((double)touch[k].xy_covariance_mm2 / (unit * h[2] / det), -h[1] / h[2], 0.03);
     }
-    dense_bench_close(&b);
 }
 
 /* A touch that nothing is left beside has no place to be unsure of. */
 TEST(without_a_residual_a_place_is_not_rated)
 {
     static const eits_disc disc = {-21, 9, 9, R(0.05), 1, 0};
-    dense_bench b = {0};
-    eits_context *ctx = pressed(&b, &disc, 1, EITS_SIGN_INCREASE);
+    eits_context *ctx = pressed(&disc, 1, EITS_SIGN_INCREASE);
     eits_fit f = eits_fit_none(ctx, &ctx->scratch);
     b.c.model.place_factor = 1;
     f.count = 1;
@@ -231,7 +209,6 @@ TEST(without_a_residual_a_place_is_not_rated)
     f.tested = 0;
     eits_place_touches(ctx, &ctx->scratch, &f);
     CHECK(f.place_mm2[0][0] == 0);
-    dense_bench_close(&b);
 }
 
 /* ---- an instrument that is far from the model ---- */
@@ -257,7 +234,7 @@ static eits_reference tared(eits_context *ctx, double by, double apart)
         frame[fold.first] += (eits_real)off;
         frame[fold.second] -= (eits_real)(fold.sign * off);
     }
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     return ctx->reference;
 }
 
@@ -265,7 +242,6 @@ static eits_reference tared(eits_context *ctx, double by, double apart)
  * a skin does; only where the model says what it may be wrong by, and never of ratios. */
 TEST(the_tare_says_that_the_instrument_is_far)
 {
-    dense_bench b = {0};
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const double limit = (double)EITS_MAX_DISTANCE;
     b.c.model.uncertainty = (eits_uncertainty){.errors = errors, .drift = errors, .row_gains = 1};
@@ -283,7 +259,6 @@ TEST(the_tare_says_that_the_instrument_is_far)
     b.c.model.data_kind = EITS_DATA_DIFFERENCE;
     b.c.model.uncertainty.errors = NULL;
     CHECK_EQUAL(tared(ctx, 2 * limit, 0).far, 0);
-    dense_bench_close(&b);
 }
 
 /* What the test may have left of a frame: one disc, far from what the data say. */
@@ -323,12 +298,11 @@ static double moment(const eits_context *ctx, const double *image, double peak,
 TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
 {
     const eits_sign signs[] = {EITS_SIGN_INCREASE, EITS_SIGN_DECREASE, EITS_SIGN_BOTH};
-    dense_bench b = {0};
     for (int k = 0; k < 6; ++k) {
         const int down = k % 3 == 1 || k == 5;
         const eits_disc at[2] = {{-21, 9, 11, down ? R(-0.05) : R(0.05), 1, 0},
                                  {18, -14, 8, down ? R(0.01) : R(-0.01), 1, 0}};
-        eits_context *ctx = pressed(&b, at, k < 3 ? 1 : 2, signs[k % 3]);
+        eits_context *ctx = pressed(at, k < 3 ? 1 : 2, signs[k % 3]);
         double *y = dense_copy(ctx->frame.y, RANK), *image = dense_numbers(b.d.n), peak = 0;
         const double origin[2] = {0, 0};
         dense_correlate(&b.d, y, image);
@@ -356,7 +330,6 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
         free(y);
         free(image);
     }
-    dense_bench_close(&b);
 }
 
 /* Where the touch is sure, not tested, one of two, on an instrument that fits, or where the image
@@ -364,9 +337,8 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
 TEST(other_touches_stay)
 {
     static const eits_disc at = {-21, 9, 11, R(0.05), 1, 0};
-    dense_bench b = {0};
     for (int k = 0; k < 6; ++k) {
-        eits_context *ctx = pressed(&b, &at, 1, EITS_SIGN_INCREASE);
+        eits_context *ctx = pressed(&at, 1, EITS_SIGN_INCREASE);
         eits_fit f = one_left(ctx, k == 0 ? (double)EITS_CENTRE_SURE : 0.5);
         f.tested = k != 1;
         f.count = k == 2 ? 2 : k == 3 ? 0 : 1;
@@ -378,7 +350,6 @@ TEST(other_touches_stay)
         CHECK(memcmp(&f.disc, &before.disc, sizeof f.disc) == 0 && f.count == before.count);
         CHECK(f.place_mm2[0][0] == 9 && f.long_mm[0][1] == 9);
     }
-    dense_bench_close(&b);
 }
 
-RUN_TESTS("seek")
+RUN_TESTS("seek", dense_bench_close(&b))

@@ -1,49 +1,20 @@
 /* The solver on given reduced data: against the closed form, a textbook FISTA, and the conditions
  * of an optimum. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 enum { SIDE = 6, N = SIDE * SIDE, RANK = 12 };
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-    dense d;
-    double y[16];
-} bench;
-
-static bench b;
-
-static void tear_down(bench *b)
-{
-    dense_free(&b->d);
-    small_context_close(&b->c);
-    small_model_free(&b->made);
-}
+static dense_bench b;
+static double y[16];
 
 /* A context of this model, with random y in [-1, 1). */
-static eits_context *set_up(bench *b, small_spec spec, int prepared)
+static eits_context *set_up(small_spec spec, int prepared)
 {
-    uint64_t state = 51;
-    tear_down(b);
-    memset(b, 0, sizeof *b);
-    b->made = small_model_make(spec);
-    small_context_open(&b->c, &b->made, prepared);
-    b->d = dense_of(&b->c.model);
-    for (uint32_t i = 0; i < spec.rank; ++i) {
-        b->c.ctx->frame.y[i] = (eits_real)small_random(&state);
-        b->y[i] = (double)b->c.ctx->frame.y[i];
-    }
-    return b->c.ctx;
+    eits_context *ctx = dense_bench_open(&b, spec, prepared);
+    small_new_data(ctx, 51);
+    for (uint32_t i = 0; i < spec.rank; ++i)
+        y[i] = (double)ctx->frame.y[i];
+    return ctx;
 }
 
 static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
@@ -52,7 +23,7 @@ static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
 static eits_info solve(eits_context *ctx, uint32_t iterations, eits_sign sign, double lambda)
 {
     CHANGE_OPTIONS(ctx, o.iterations = iterations, o.sign = sign, o.lambda_abs = (eits_real)lambda);
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     return *eits_get_info(ctx);
 }
 
@@ -61,25 +32,25 @@ TEST(identity_gives_the_soft_threshold)
     const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 1};
     for (int sign = 0; sign < 3; ++sign) {
         for (uint32_t iterations = 1; iterations <= 41; iterations += 40) {
-            eits_context *ctx = set_up(&b, spec, 0);
+            eits_context *ctx = set_up(spec, 0);
             const eits_info info = solve(ctx, iterations, (eits_sign)sign, 0.25);
             uint32_t nonzeros = 0;
             double squares = 0;
             for (int j = 0; j < 16; ++j) {
-                const double size = fabs(b.y[j]) - 0.25;
+                const double size = fabs(y[j]) - 0.25;
                 const int allowed =
-                    b.y[j] > 0 ? sign != EITS_SIGN_DECREASE : sign != EITS_SIGN_INCREASE;
-                const double expected = size > 0 && allowed ? copysign(size, b.y[j]) : 0;
+                    y[j] > 0 ? sign != EITS_SIGN_DECREASE : sign != EITS_SIGN_INCREASE;
+                const double expected = size > 0 && allowed ? copysign(size, y[j]) : 0;
                 /* one step is exact: 1/4 is a round number */
                 CHECK_NEAR(eits_get_coefficients(ctx)[j], expected, iterations == 1 ? 0 : 2 * EPS);
                 CHECK(eits_get_image(ctx)[j] == eits_get_coefficients(ctx)[j]);
                 nonzeros += expected != 0;
-                squares += pow(b.y[j] - expected, 2);
+                squares += pow(y[j] - expected, 2);
             }
             CHECK(nonzeros >= 4);
             CHECK_EQUAL(info.nonzeros, nonzeros);
             CHECK_NEAR(info.residual, sqrt(squares), 8 * EPS);
-            CHECK_NEAR(info.data_norm, sqrt(dense_dot(b.y, b.y, 16)), 8 * EPS);
+            CHECK_NEAR(info.data_norm, sqrt(dense_dot(y, y, 16)), 8 * EPS);
             CHECK_NEAR(info.gap, 0, 8 * EPS);
             CHECK_NEAR(info.lambda, 0.25, 0);
         }
@@ -89,66 +60,37 @@ TEST(identity_gives_the_soft_threshold)
 TEST(same_as_the_textbook)
 {
     static const uint32_t counts[] = {1, 2, 3, 11, 60};
-    for (int storage = 0; storage < 4; ++storage) {
-        for (int sign = 0; sign < 3; ++sign) {
-            for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
-                const small_spec spec = {
-                    .rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
-                eits_context *ctx = set_up(&b, spec, (int)(k % 2));
-                double x[N] = {0}, largest = 0;
-                const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
-                dense_fista(&b.d, b.y, (double)eits_get_info(ctx)->lambda,
-                            (double)b.c.model.lipschitz, counts[k], (eits_sign)sign, x);
-                for (int j = 0; j < N; ++j)
-                    largest = fmax(largest, fabs(x[j]));
-                CHECK(largest > 0.1);
-                CHECK_NEAR(dense_greatest_difference(x, eits_get_coefficients(ctx), N), 0,
-                           400 * EPS * largest);
-                for (int j = 0; j < N; ++j)
-                    CHECK(eits_get_image(ctx)[j] ==
-                          eits_get_coefficients(ctx)[j] * (eits_real)b.c.model.column_weight[j]);
-                CHECK_EQUAL(info.iterations, counts[k]); /* exactly so many */
-                CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
-            }
-        }
-    }
-}
-
-/* Panels, portable and fastest kernels: the same bits of image and info. */
-TEST(same_bits_in_every_layout)
-{
-    for (int storage = 0; storage < 4; ++storage) {
-        eits_real first[N];
-        eits_info first_info = {0};
-        for (int way = 0; way < 4; ++way) {
-            const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
-            eits_context *ctx = set_up(&b, spec, way % 2);
-            CHECK((ctx->columns.panels != NULL) == (way % 2 == 1));
-            CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
-            const eits_info info = solve(ctx, 60, EITS_SIGN_BOTH, 0.02);
-            if (way == 0) {
-                memcpy(first, eits_get_image(ctx), sizeof first);
-                first_info = info;
-            }
-            CHECK(memcmp(first, eits_get_image(ctx), sizeof first) == 0);
-            CHECK(info.gap == first_info.gap && info.residual == first_info.residual &&
-                  info.macs == first_info.macs);
-        }
+    for (int way = 0; way < 4 * 3 * 5; ++way) {
+        const int storage = way / 15, sign = way / 5 % 3, k = way % 5;
+        const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
+        eits_context *ctx = set_up(spec, (int)(k % 2));
+        double x[N] = {0}, largest = 0;
+        const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
+        dense_fista(&b.d, y, (double)ctx->info.lambda, (double)b.c.model.lipschitz, counts[k],
+                    (eits_sign)sign, x);
+        for (int j = 0; j < N; ++j)
+            largest = fmax(largest, fabs(x[j]));
+        CHECK(largest > 0.1);
+        CHECK_NEAR(dense_greatest_difference(x, eits_get_coefficients(ctx), N), 0,
+                   400 * EPS * largest);
+        for (int j = 0; j < N; ++j)
+            CHECK(eits_get_image(ctx)[j] ==
+                  eits_get_coefficients(ctx)[j] * (eits_real)b.c.model.column_weight[j]);
+        CHECK_EQUAL(info.iterations, counts[k]); /* exactly so many */
+        CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
     }
 }
 
 TEST(optimum_has_its_marks)
 {
     for (int sign = 0; sign < 3; ++sign) {
-        eits_context *ctx = set_up(&b, RANDOM, 1);
-        eits_options o = *eits_get_options(ctx);
-        o.gap_rel = R(BOTH_WIDTHS(1e-6, 1e-12));
-        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        eits_context *ctx = set_up(RANDOM, 1);
+        CHANGE_OPTIONS(ctx, o.gap_rel = R(BOTH_WIDTHS(1e-6, 1e-12)));
         const eits_info info = solve(ctx, 50000, (eits_sign)sign, 0.05);
         CHECK_EQUAL(info.stop, EITS_STOP_GAP);
-        CHECK(info.gap_rel <= o.gap_rel && info.gap >= 0);
+        CHECK(info.gap_rel <= ctx->options.gap_rel && info.gap >= 0);
         double *x = dense_copy(eits_get_coefficients(ctx), N), r[RANK], c[N], largest = 0;
-        dense_residual(&b.d, b.y, x, r);
+        dense_residual(&b.d, y, x, r);
         dense_correlate(&b.d, r, c);
         const double lambda = (double)info.lambda;
         /* |S (x - optimum)| sqrt L */
@@ -179,21 +121,21 @@ TEST(gap_bounds_the_suboptimality)
     static const uint32_t counts[] = {1, 2, 4, 8, 16, 32, 64, 128};
     for (int sign = 0; sign < 3; ++sign) {
         double before = 1e9;
-        for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
-            eits_context *ctx = set_up(&b, RANDOM, 0);
+        for (size_t k = 0; IN_TABLE(k, counts); ++k) {
+            eits_context *ctx = set_up(RANDOM, 0);
             const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
             double *x = dense_copy(eits_get_coefficients(ctx), N), best_x[N] = {0}, r[RANK];
             const double lambda = (double)info.lambda, gap = (double)info.gap;
-            dense_fista(&b.d, b.y, lambda, (double)b.c.model.lipschitz, 30000, (eits_sign)sign,
+            dense_fista(&b.d, y, lambda, (double)b.c.model.lipschitz, 30000, (eits_sign)sign,
                         best_x);
-            const double best = dense_objective(&b.d, b.y, best_x, lambda),
-                         own = dense_objective(&b.d, b.y, x, lambda);
-            const double rounding = 40 * EPS * dense_dot(b.y, b.y, RANK);
+            const double best = dense_objective(&b.d, y, best_x, lambda),
+                         own = dense_objective(&b.d, y, x, lambda);
+            const double rounding = 40 * EPS * dense_dot(y, y, RANK);
             CHECK(own - best >= -1e-12);
             CHECK(own - best <= gap + rounding);
-            CHECK_NEAR(gap, dense_gap(&b.d, b.y, x, lambda, (eits_sign)sign), rounding);
-            CHECK_NEAR(info.gap_rel, gap / (0.5 * dense_dot(b.y, b.y, RANK)), 10 * EPS);
-            dense_residual(&b.d, b.y, x, r);
+            CHECK_NEAR(gap, dense_gap(&b.d, y, x, lambda, (eits_sign)sign), rounding);
+            CHECK_NEAR(info.gap_rel, gap / (0.5 * dense_dot(y, y, RANK)), 10 * EPS);
+            dense_residual(&b.d, y, x, r);
             CHECK_NEAR(info.residual, sqrt(dense_dot(r, r, RANK)), 20 * EPS);
             CHECK(counts[k] < 4 || gap < before);
             before = gap;
@@ -204,7 +146,7 @@ TEST(gap_bounds_the_suboptimality)
 
 TEST(stopping_by_the_gap)
 {
-    eits_context *ctx = set_up(&b, RANDOM, 0);
+    eits_context *ctx = set_up(RANDOM, 0);
     CHANGE_OPTIONS(ctx, o.gap_rel = R(1e-3), o.gap_every = 7);
     eits_info info = solve(ctx, 100000, EITS_SIGN_INCREASE, 0.05);
     CHECK_EQUAL(info.stop, EITS_STOP_GAP);
@@ -225,9 +167,9 @@ TEST(stopping_by_the_gap)
 TEST(zero_is_the_optimum)
 {
     for (int sign = 0; sign < 3; ++sign) {
-        eits_context *ctx = set_up(&b, RANDOM, 0);
+        eits_context *ctx = set_up(RANDOM, 0);
         double c[N], greatest = 0;
-        dense_correlate(&b.d, b.y, c);
+        dense_correlate(&b.d, y, c);
         for (int j = 0; j < N; ++j)
             greatest = fmax(greatest, sign == EITS_SIGN_INCREASE
                                           ? c[j]
@@ -237,20 +179,19 @@ TEST(zero_is_the_optimum)
         CHECK_EQUAL(info.stop, EITS_STOP_ZERO);
         CHECK(info.iterations == 0 && info.nonzeros == 0 && info.gap == 0 &&
               info.residual == info.data_norm);
-        for (int j = 0; j < N; ++j)
-            CHECK(eits_get_coefficients(ctx)[j] == 0 && eits_get_image(ctx)[j] == 0);
+        CHECK(is_cleared(ctx));
         info = solve(ctx, 20, (eits_sign)sign, greatest * (1 - 1e-3));
         CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros == 1);
         /* lambda just at lambda_max */
         info = solve(ctx, 20, (eits_sign)sign, (double)info.lambda_max);
         CHECK_EQUAL(info.stop, EITS_STOP_ZERO);
     }
-    eits_context *ctx = set_up(&b, RANDOM, 0);
+    eits_context *ctx = set_up(RANDOM, 0);
     memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
     eits_info info = solve(ctx, 20, EITS_SIGN_BOTH, 0);
     CHECK(info.stop == EITS_STOP_ZERO && info.lambda_max == 0 && info.data_norm == 0);
     const small_spec identity = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
-    ctx = set_up(&b, identity, 0);
+    ctx = set_up(identity, 0);
     for (int i = 0; i < 16; ++i)
         ctx->frame.y[i] = R(-1); /* nothing to be found above zero */
     info = solve(ctx, 20, EITS_SIGN_INCREASE, 0);
@@ -261,20 +202,18 @@ TEST(zero_is_the_optimum)
  */
 TEST(solving_beside_a_basis)
 {
-    eits_context *ctx = set_up(&b, RANDOM, 1);
+    eits_context *ctx = set_up(RANDOM, 1);
     eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
-    uint64_t state = 52, macs;
-    uint32_t masked;
+    uint64_t state = 52;
     small_reference(&b.c.model, 1, reference);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
+    vary(frame, reference, 0.3, &state);
     frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] =
         frame[b.c.model.fold[20].first] = R(NAN);
-    CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, reference, SMALL_ROWS));
+    STAGE(ctx, frame);
     CHECK_EQUAL(ctx->projection.count, 3);
     const eits_info info = solve(ctx, 40, EITS_SIGN_INCREASE, 0.01);
-    double *basis = dense_numbers(3 * RANK), *y = dense_copy(ctx->frame.y, RANK), x[N] = {0},
+    double *basis = dense_numbers(3 * RANK), *seen = dense_copy(ctx->frame.y, RANK), x[N] = {0},
            r[RANK];
     for (uint32_t k = 0; k < 3; ++k) {
         for (uint32_t i = 0; i < RANK; ++i)
@@ -282,15 +221,16 @@ TEST(solving_beside_a_basis)
     }
     for (int j = 0; j < N; ++j)
         dense_project_out(b.d.s + j * RANK, basis, 3, RANK);
-    dense_fista(&b.d, y, (double)info.lambda, (double)b.c.model.lipschitz, 40, EITS_SIGN_INCREASE,
-                x);
+    dense_fista(&b.d, seen, (double)info.lambda, (double)b.c.model.lipschitz, 40,
+                EITS_SIGN_INCREASE, x);
     CHECK(info.nonzeros >= 3);
     CHECK_NEAR(dense_greatest_difference(x, eits_get_coefficients(ctx), N), 0, 400 * EPS);
-    CHECK_NEAR(info.gap, dense_gap(&b.d, y, x, (double)info.lambda, EITS_SIGN_INCREASE), 400 * EPS);
-    dense_residual(&b.d, y, x, r);
+    CHECK_NEAR(info.gap, dense_gap(&b.d, seen, x, (double)info.lambda, EITS_SIGN_INCREASE),
+               400 * EPS);
+    dense_residual(&b.d, seen, x, r);
     CHECK_NEAR(info.residual, sqrt(dense_dot(r, r, RANK)), 100 * EPS);
     free(basis);
-    free(y);
+    free(seen);
 }
 
 /* On the identity with one positive datum each iterate has one non-zero, so that each product can
@@ -298,7 +238,7 @@ TEST(solving_beside_a_basis)
 TEST(work_is_counted)
 {
     const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
-    eits_context *ctx = set_up(&b, spec, 0);
+    eits_context *ctx = set_up(spec, 0);
     const uint64_t whole = 16 * 16, column = 16;
     memset(ctx->frame.y, 0, 16 * sizeof *ctx->frame.y);
     ctx->frame.y[3] = 1;
@@ -308,17 +248,12 @@ TEST(work_is_counted)
          * gap; S x in each */
         CHECK_EQUAL(info.macs, whole + (iterations - 1) * whole + whole + iterations * column);
     }
-    eits_options o = *eits_get_options(ctx);
-    o.gap_rel = R(1e-12); /* the gap is asked for every 5 iterations: another S'r each */
-    o.gap_every = 5;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    /* the gap is asked for every 5 iterations: another S'r each */
+    CHANGE_OPTIONS(ctx, o.gap_rel = R(1e-12), o.gap_every = 5);
     eits_info info = solve(ctx, 4, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + 3 * whole + whole + 4 * column);
     /* from the last coefficients: S x once more, and the first iteration's S'r */
-    o = *eits_get_options(ctx);
-    o.gap_rel = 0;
-    o.warm_start = 1;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHANGE_OPTIONS(ctx, o.gap_rel = 0, o.warm_start = 1);
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + column + 3 * (whole + column) + whole);
     ctx->frame.y[3] = 0;
@@ -328,34 +263,31 @@ TEST(work_is_counted)
      * projections' passes for the drift direction at first */
     eits_real frame[SMALL_ROWS];
     small_reference(&b.c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     const uint64_t reduce = SMALL_FOLDED * 16, project = 2 * 16;
-    CHECK_EQUAL(eits_get_info(ctx)->macs,
+    CHECK_EQUAL(ctx->info.macs,
                 reduce + 2 * 16 /* direction, normalised */ + 2 * (reduce + project) + whole);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_get_info(ctx)->macs, 2 * (reduce + project) + whole); /* the basis is kept */
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
+    CHECK_EQUAL(ctx->info.macs, 2 * (reduce + project) + whole); /* the basis is kept */
     /* one column of P less, and its rows whitened again: the rows left out once into the products,
      * three factors, eight probes of the noise; the data and the drift's direction by three
      * triangles; F' y */
     const uint64_t triangle = 16 * 17 / 2, cubic = 15 * 16 * 17 / 6;
     frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] = R(NAN);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     const uint64_t built =
         triangle + cubic + (2 * cubic + 2 * triangle - triangle) + cubic + 8 * 2 * triangle;
     CHECK(ctx->whitening.form);
     CHECK_EQUAL(ctx->projection.count, 1);
-    CHECK_EQUAL(eits_get_info(ctx)->macs, built + (reduce + 3 * triangle + 2 * 16) +
-                                              2 * (reduce - 16 + 3 * triangle + project) +
-                                              triangle + whole);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_EQUAL(ctx->info.macs, built + (reduce + 3 * triangle + 2 * 16) +
+                                    2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     /* the whitening is kept */
-    CHECK_EQUAL(eits_get_info(ctx)->macs,
-                2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
-    o.project_reference = 0; /* each residual is mapped, there and back */
-    o.warm_start = 0;
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_EQUAL(ctx->info.macs, 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
+    /* each residual is mapped, there and back */
+    CHANGE_OPTIONS(ctx, o.project_reference = 0, o.warm_start = 0);
+    CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
     CHECK_EQUAL(ctx->projection.count, 0);
     ctx->frame.y[7] = 1;
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
@@ -364,4 +296,4 @@ TEST(work_is_counted)
                                (whole + 2 * triangle));
 }
 
-RUN_TESTS("solve", tear_down(&b))
+RUN_TESTS("solve", dense_bench_close(&b))

@@ -1,35 +1,22 @@
 /* Where a solve starts from, and what it may not take over: after a halved step, from a start worse
  * than zero, over another stage's scratch, after a frame that was refused or empty. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
-
-#include "base/vec.h"
-#include "eitskin/frame.h"
-#include "eitskin/solve.h"
-#include "eitskin/touch.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "steps.h"
 
 static dense_bench b;
 
 enum { SIDE = 8, N = SIDE * SIDE, RANK = 16 };
-
-typedef dense_bench bench;
 
 static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
 static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
 
 static void set_options(eits_context *ctx, eits_options o)
 {
-    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_OK(eits_set_options(ctx, &o));
 }
 
 static eits_info solve(eits_context *ctx)
 {
-    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_OK(eits_solve(ctx, NULL));
     return *eits_get_info(ctx);
 }
 
@@ -40,13 +27,9 @@ TEST(a_halved_step_starts_afresh)
     spec.lipschitz_factor = 1.02 / 6;
     eits_context *ctx = dense_bench_open(&b, spec, 0);
     small_new_data(ctx, 91);
-    eits_options o = *eits_get_options(ctx);
-    o.solver = EITS_SOLVER_FISTA;
-    o.lambda_rel = R(0.1);
-    o.gap_rel = R(1e-30); /* so that each check is made */
-    o.iterations = 60;
-    o.gap_every = 10;
-    set_options(ctx, o);
+    /* so that each check is made */
+    CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_FISTA, o.lambda_rel = R(0.1), o.gap_rel = R(1e-30),
+                   o.iterations = 60, o.gap_every = 10);
     const eits_info info = solve(ctx);
     CHECK(info.step_halvings >= 1 && info.step_halvings <= 3);
     const double lipschitz = (double)b.c.model.lipschitz * pow(2, info.step_halvings);
@@ -62,7 +45,7 @@ TEST(a_halved_step_starts_afresh)
 TEST(a_start_worse_than_zero)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        bench warm = {0}, cold = {0};
+        dense_bench warm = {0}, cold = {0};
         eits_context *ctx = dense_bench_open(&warm, RANDOM, 0),
                      *other = dense_bench_open(&cold, RANDOM, 0);
         small_new_data(ctx, 92);
@@ -73,7 +56,7 @@ TEST(a_start_worse_than_zero)
         o.lambda_rel = R(1e-4);
         o.iterations = 3000;
         set_options(ctx, o);
-        CHECK(solve(ctx).residual < R(0.5) * eits_get_info(ctx)->data_norm);
+        CHECK(solve(ctx).residual < R(0.5) * ctx->info.data_norm);
         o.lambda_rel = R(0.8);
         o.iterations = 3;
         set_options(ctx, o);
@@ -88,20 +71,19 @@ TEST(a_start_worse_than_zero)
 }
 
 /* Frame k of a touch that wanders. */
-static void wandering_frame(const bench *b, uint32_t k, eits_real *frame)
+static void wandering_frame(const dense_bench *b, uint32_t k, eits_real *frame)
 {
     uint64_t state = 93 + k / 2;
     small_reference(&b->c.model, 1, frame);
-    for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] *= (eits_real)(1 + 0.05 * small_random(&state));
+    vary(frame, frame, 0.05, &state);
 }
 
-static eits_context *open_warm(bench *b, int solver)
+static eits_context *open_warm(dense_bench *b, int solver)
 {
     eits_context *ctx = dense_bench_open(b, WAVES, 0);
     eits_real frame[SMALL_ROWS];
     small_reference(&b->c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
     CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.warm_start = 1, o.iterations = 4,
                    o.sign = EITS_SIGN_BOTH);
     return ctx;
@@ -111,18 +93,18 @@ static eits_context *open_warm(bench *b, int solver)
 TEST(touches_leave_no_trace)
 {
     for (int solver = 0; solver < 4; ++solver) {
-        bench seen = {0}, unseen = {0};
+        dense_bench seen = {0}, unseen = {0};
         eits_context *ctx = open_warm(&seen, solver), *other = open_warm(&unseen, solver);
         for (uint32_t k = 0; k < 12; ++k) {
             eits_real frame[SMALL_ROWS];
             uint32_t count;
             wandering_frame(&seen, k, frame);
-            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-            CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
+            CHECK_OK(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL));
             CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) == 0);
             CHECK(memcmp(eits_get_info(ctx), eits_get_info(other), sizeof *eits_get_info(ctx)) ==
                   0);
-            CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+            CHECK_OK(eits_find_touches(ctx, NULL, 0, &count));
             CHECK(count > 0);
         }
         dense_bench_close(&seen);
@@ -135,7 +117,7 @@ TEST(touches_leave_no_trace)
 TEST(cold_after_nothing)
 {
     for (int why = 0; why < 3; ++why) {
-        bench b = {0}, fresh = {0};
+        dense_bench b = {0}, fresh = {0};
         eits_context *ctx = open_warm(&b, EITS_SOLVER_WORKING_SET),
                      *other = open_warm(&fresh, EITS_SOLVER_WORKING_SET);
         eits_real frame[SMALL_ROWS], nothing[SMALL_ROWS];
@@ -145,7 +127,7 @@ TEST(cold_after_nothing)
         for (int i = 0; why == 2 && i < SMALL_ROWS; ++i)
             nothing[i] = 0;
         wandering_frame(&b, 0, frame);
-        CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
         CHECK_EQUAL(eits_reconstruct(ctx, nothing, SMALL_ROWS, NULL, NULL),
                     why == 0   ? EITS_OK
                     : why == 1 ? EITS_E_FRAME_CHANNELS
@@ -153,13 +135,12 @@ TEST(cold_after_nothing)
         /* makes the basis */
         CHECK_EQUAL(eits_reconstruct(other, nothing, SMALL_ROWS, NULL, NULL) == EITS_OK, why == 0);
         wandering_frame(&b, 4, frame);
-        CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_OK(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL));
+        CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
         CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) == 0);
-        CHECK(eits_get_info(ctx)->iterations == eits_get_info(other)->iterations &&
-              eits_get_info(ctx)->gap == eits_get_info(other)->gap);
+        CHECK(ctx->info.iterations == other->info.iterations && ctx->info.gap == other->info.gap);
         if (why == 0)
-            CHECK_EQUAL(eits_get_info(ctx)->macs, eits_get_info(other)->macs);
+            CHECK_EQUAL(ctx->info.macs, other->info.macs);
         dense_bench_close(&b);
         dense_bench_close(&fresh);
     }
@@ -217,10 +198,10 @@ TEST(steps_that_end_at_zero)
                 ctx->frame.y[i] = (eits_real)(1 + 0.1 * i);
             CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_FISTA, o.lambda_rel = R(0.1),
                            o.detection_factor = 0, o.gap_every = every, o.iterations = 60);
-            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
-            CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_ITERATIONS);
-            CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 6);
-            CHECK(eits_get_info(ctx)->step_halvings > 0 && eits_get_info(ctx)->gap_rel < R(1e-3));
+            CHECK_OK(eits_solve(ctx, NULL));
+            CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
+            CHECK_EQUAL(ctx->info.nonzeros, 6);
+            CHECK(ctx->info.step_halvings > 0 && ctx->info.gap_rel < R(1e-3));
         }
     }
 }

@@ -1,14 +1,8 @@
 /* Touches followed in time: tracks that start once confirmed and end after the hold, places
  * smoothed. */
-#include "check.h"
-#include "dense.h"
-#include "small_model.h"
+#include "steps.h"
 
-#include "base/vec.h"
-#include "eitskin/touch.h"
 #include "touch/disc.h"
-
-#include <math.h>
 
 static dense_bench b;
 

@@ -30,7 +30,7 @@ TEST(status_texts)
         {EITS_E_NOT_FINITE, "finite"},
         {EITS_E_ARITHMETIC, "-ffp-contract=off"},
     };
-    const int count = (int)(sizeof known / sizeof known[0]);
+    const int count = (int)COUNT_OF(known);
     for (int i = 0; i < count; ++i) {
         const char *text = eits_status_text(known[i].status);
         /* the numbers are part of the interface: errors are negative */
@@ -48,7 +48,7 @@ TEST(arithmetic_is_as_written)
 {
     eits_real left[EITS_ARITHMETIC_TRIALS];
     eits_try_arithmetic(left);
-    CHECK_EQUAL(eits_judge_arithmetic(left), EITS_OK);
+    CHECK_OK(eits_judge_arithmetic(left));
     for (int k = 0; k < EITS_ARITHMETIC_TRIALS; ++k) {
         CHECK_NEAR(left[k], 0, 0);
         left[k] = (eits_real)1e-8;

@@ -11,6 +11,7 @@ double bench_sheet(void *user, const uint8_t electrodes[4], uint64_t at_ns)
 
 void bench_start(bench *b, const skin_spec *spec)
 {
+    bench_stop(b);
     fake_init(&b->board, 4294000000u); /* the clock wraps within a second */
     sheet_init(&b->sheet);
     b->board.volts = bench_sheet;

@@ -13,7 +13,8 @@ typedef struct bench {
     eits_model open; /* a view of it */
 } bench;
 
-/* With `spec` NULL: no model. The application has started. */
+/* With `spec` NULL: no model. The application has started; what was there before is stopped. `b` is
+ * static, or zero before the first time. */
 void bench_start(bench *b, const skin_spec *spec);
 void bench_stop(bench *b);
 

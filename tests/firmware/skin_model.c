@@ -213,8 +213,7 @@ skin_model skin_model_make(const skin_spec *spec)
     memset(&d, 0, sizeof d);
     draft_rows(&d, spec);
     draft_volts(&d);
-    const uint32_t n = spec->side * spec->side, stride = (spec->rank + 7u) & ~7u,
-                   table = 64 + 16 * SECTIONS;
+    const uint32_t n = spec->side * spec->side, stride = (spec->rank + 7u) & ~7u;
     const uint32_t sizes[SECTIONS] = {64,
                                       4 * d.n_rows,
                                       8 * d.n_folded,
@@ -228,28 +227,13 @@ skin_model skin_model_make(const skin_spec *spec)
                                       2,
                                       4 * d.n_rows,
                                       spec->fields ? 16 + 2 * n * fields_stride(spec) : 16};
-    skin_model made = {.size = table};
-    for (uint32_t p = 0; p < SECTIONS; ++p)
-        made.size += (sizes[p] + 15u) & ~15u;
-    made.blob = small_aligned(&made.memory, made.size);
     uint8_t *at[SECTIONS];
-    uint32_t offset = table;
-    for (uint32_t p = 0; p < SECTIONS; ++p) {
-        uint8_t *entry = made.blob + 64 + 16 * p;
-        memcpy(entry, p == FLDS && !spec->fields ? "NONE" : TAGS[p], 4);
-        small_put_u32(entry + 4, offset);
-        small_put_u32(entry + 8, sizes[p]);
-        small_put_u32(entry + 12, p < META);
-        at[p] = made.blob + offset;
-        offset += (sizes[p] + 15u) & ~15u;
-    }
+    small_model laid_out = small_model_lay_out(SECTIONS, TAGS, sizes, META, at);
+    if (!spec->fields)
+        memcpy(small_model_entry(&laid_out, "FLDS"), "NONE", 4);
     fill(spec, &d, stride, at);
-    memcpy(made.blob, "EITM", 4);
-    small_put_u16(made.blob + 4, 1);
-    small_put_u32(made.blob + 8, (uint32_t)made.size);
-    small_put_u32(made.blob + 16, SECTIONS);
-    const uint64_t hash = eits_protocol_hash(spec->electrodes, d.n_rows, at[PROT]);
-    memcpy(made.blob + 24, &hash, sizeof hash);
+    small_model_hash(&laid_out, spec->electrodes, d.n_rows, at[PROT]);
+    skin_model made = {laid_out.memory, laid_out.blob, laid_out.size, 0};
     seal(&made);
     make_golden(&made, at[GOLD] + 8 * (size_t)d.n_rows, spec->wrong_golden);
     seal(&made);

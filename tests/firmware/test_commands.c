@@ -1,13 +1,8 @@
 /* Commands: each status can be had, ranges and lengths hold, what is sent again is answered again
  * and not run again. */
-#include "bench.h"
-#include "check.h"
+#include "steps.h"
+
 #include "small_model.h"
-
-#include <math.h>
-#include <string.h>
-
-static bench b;
 
 static void check_reply(eits_packet_reply reply, eits_reply_status status, int32_t a, int32_t c,
                         int line)
@@ -17,11 +12,6 @@ static void check_reply(eits_packet_reply reply, eits_reply_status status, int32
     check_equal(reply.detail[1], c, __FILE__, line, "detail[1]");
 }
 #define REPLY(reply, status, a, c) check_reply(reply, status, a, c, __LINE__)
-
-static eits_packet_reply scan_with(eits_command_scan scan)
-{
-    return host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
-}
 
 TEST(test_lengths)
 {
@@ -33,7 +23,7 @@ TEST(test_lengths)
         {EITS_PACKET_SCAN, 24},        {EITS_PACKET_SOLVER, 44},   {EITS_PACKET_MODEL_BEGIN, 12},
         {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8}, {EITS_PACKET_MASK_ROW, 8},
         {EITS_PACKET_RESET, 4},        {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
-    for (size_t k = 0; k < sizeof expected / sizeof expected[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, expected); ++k) {
         uint8_t payload[64] = {0};
         for (uint32_t size = 4; size <= 44; ++size) {
             if (size != expected[k].size)
@@ -107,55 +97,39 @@ TEST(test_tare_ranges)
     CHECK_EQUAL(host_info(&b.host).tared, 0);
 }
 
+/* The reply to the default settings with `change` of them, said as `s.field = value`. */
+#define SCAN(change, status, a, c)                      \
+    do {                                                \
+        eits_command_scan s = host_default_scan();      \
+        change;                                         \
+        REPLY(scan_with(s), EITS_REPLY_##status, a, c); \
+    } while (0)
+
 TEST(test_scan_ranges)
 {
-    eits_command_scan s = host_default_scan();
-    s.excitation_millihz = 3499999; /* at 350 uA rms */
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 3500000);
+    SCAN(s.excitation_millihz = 3499999, RANGE, 4, 3500000); /* at 350 uA rms */
     b.board.board.source_ua_rms = 100;
-    s.excitation_millihz = 999;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 1000);
+    SCAN(s.excitation_millihz = 999, RANGE, 4, 1000);
     b.board.board.source_ua_rms = 101;
-    s.excitation_millihz = 1009999;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 1010000);
+    SCAN(s.excitation_millihz = 1009999, RANGE, 4, 1010000);
     b.board.board.source_ua_rms = 350;
-    s.excitation_millihz = 250000001;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 250000000);
-    s = host_default_scan();
-    s.sample_rate_hz = 999;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 8, 1000);
-    s.sample_rate_hz = 5000001;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 8, 5000000);
-    s.sample_rate_hz = 5000000; /* in range, but more than this board's converter does */
-    s.samples = 400;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 8, 0);
-    s = host_default_scan();
-    s.sample_rate_hz = 100000; /* two samples a period: not enough */
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 49999999);
-    s = host_default_scan();
-    s.samples = 3;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 12, 4);
-    s.samples = 1025;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 12, 1024);
-    s.samples = 90;
-    REPLY(scan_with(s), EITS_REPLY_PERIODS, 100, 0);
-    s.samples = 89;
-    REPLY(scan_with(s), EITS_REPLY_PERIODS, 80, 0);
-    s = host_default_scan();
-    s.settle_us = 50001;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 14, 50000);
-    s = host_default_scan();
-    s.reserved = 1;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 18, 0);
-    s = host_default_scan();
-    s.frame_period_us = 600000001;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 20, 600000000);
-    s.frame_period_us = 1;
-    REPLY(scan_with(s), EITS_REPLY_TOO_FAST, 20800, 0);
-    s.check_every = 0; /* half the rows only */
-    REPLY(scan_with(s), EITS_REPLY_TOO_FAST, 10400, 0);
-    s.frame_period_us = 10400;
-    REPLY(scan_with(s), EITS_REPLY_OK, 0, 0);
+    SCAN(s.excitation_millihz = 250000001, RANGE, 4, 250000000);
+    SCAN(s.sample_rate_hz = 999, RANGE, 8, 1000);
+    SCAN(s.sample_rate_hz = 5000001, RANGE, 8, 5000000);
+    /* in range, but more than this board's converter does; two samples a period: not enough */
+    SCAN((s.sample_rate_hz = 5000000, s.samples = 400), RANGE, 8, 0);
+    SCAN(s.sample_rate_hz = 100000, RANGE, 4, 49999999);
+    SCAN(s.samples = 3, RANGE, 12, 4);
+    SCAN(s.samples = 1025, RANGE, 12, 1024);
+    SCAN(s.samples = 90, PERIODS, 100, 0);
+    SCAN(s.samples = 89, PERIODS, 80, 0);
+    SCAN(s.settle_us = 50001, RANGE, 14, 50000);
+    SCAN(s.reserved = 1, RANGE, 18, 0);
+    SCAN(s.frame_period_us = 600000001, RANGE, 20, 600000000);
+    SCAN(s.frame_period_us = 1, TOO_FAST, 20800, 0);
+    /* half the rows only */
+    SCAN((s.frame_period_us = 1, s.check_every = 0), TOO_FAST, 10400, 0);
+    SCAN((s.frame_period_us = 10400, s.check_every = 0), OK, 0, 0);
     const eits_packet_info info = host_info(&b.host);
     CHECK_EQUAL(info.check_every, 0);
     CHECK_EQUAL(info.frame_period_us, 10400);
@@ -168,18 +142,12 @@ TEST(test_scan_and_tare)
 {
     REPLY(host_tare(&b.host, 4), EITS_REPLY_OK, 0, 0);
     REPLY(host_stream(&b.host, 7, 1, 0), EITS_REPLY_OK, 0, 0);
-    eits_command_scan s = host_default_scan();
-    s.sample_rate_hz = 5000000;
-    s.samples = 400;
-    REPLY(scan_with(s), EITS_REPLY_RANGE, 8, 0);
+    SCAN((s.sample_rate_hz = 5000000, s.samples = 400), RANGE, 8, 0);
     CHECK_EQUAL(host_info(&b.host).tared, 1);
     CHECK_EQUAL(host_info(&b.host).sample_rate_hz, 1000000);
-    host_forget(&b.host);
-    host_run(&b.host, 100);
+    hear(100);
     CHECK(host_count(&b.host, EITS_PACKET_IMAGE) >= 3);
-    s = host_default_scan();
-    s.excitation_millihz = 25000000;
-    REPLY(scan_with(s), EITS_REPLY_OK, 0, 0);
+    SCAN(s.excitation_millihz = 25000000, OK, 0, 0);
     CHECK_NEAR(fake_generator_hz(&b.board), 25000, 0.02);
     CHECK_EQUAL(host_info(&b.host).tared, 0);
     CHECK_EQUAL(host_info(&b.host).streaming, EITS_STREAM_RAW);
@@ -204,44 +172,31 @@ TEST(test_solver)
                                       .solver = EITS_SOLVER_COORDINATE,
                                       .mac_limit = 123456,
                                       .diagnostics = EITS_DIAGNOSTIC_OUTLIER};
-    eits_command_solver c = good;
-    c.iterations = 0;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1);
-    c.iterations = 1001;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1000);
-    c = good;
-    c.max_touches = 17;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 8, 16);
-    c = good;
-    c.warm_start = 2;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 12, 1);
-    c = good;
-    c.sign = 3;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 16, 2);
-    c = good;
-    c.lambda_rel = 1.5f;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 20, 1);
-    c.lambda_rel = (float)NAN;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 20, 0);
-    c = good;
-    c.gap_rel = -0.1f;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 24, 0);
-    c = good;
-    c.solver = 4;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 28, 3);
-    c = good;
-    c.diagnostics = EITS_DIAGNOSTICS_ALL + 1;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 36, EITS_DIAGNOSTICS_ALL);
-    c = good;
-    c.track = 2;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 40, 1);
+#define SOLVER(change, a, last)                           \
+    do {                                                  \
+        eits_command_solver c = good;                     \
+        change;                                           \
+        REPLY(solver_with(c), EITS_REPLY_RANGE, a, last); \
+    } while (0)
+    SOLVER(c.iterations = 0, 4, 1);
+    SOLVER(c.iterations = 1001, 4, 1000);
+    SOLVER(c.max_touches = 17, 8, 16);
+    SOLVER(c.warm_start = 2, 12, 1);
+    SOLVER(c.sign = 3, 16, 2);
+    SOLVER(c.lambda_rel = 1.5f, 20, 1);
+    SOLVER(c.lambda_rel = (float)NAN, 20, 0);
+    SOLVER(c.gap_rel = -0.1f, 24, 0);
+    SOLVER(c.solver = 4, 28, 3);
+    SOLVER(c.diagnostics = EITS_DIAGNOSTICS_ALL + 1, 36, EITS_DIAGNOSTICS_ALL);
+    SOLVER(c.track = 2, 40, 1);
     const eits_options *options = eits_get_options(b.host.instrument.engine.ctx);
     CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
     CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
     CHECK_EQUAL(options->warm_start, 0);
     CHECK_EQUAL(options->mac_limit, 0);
     CHECK_EQUAL(options->iterations, 30);
-    c = (eits_command_solver){.iterations = 1, .max_touches = 1}; /* the least of each */
+    /* the least of each */
+    eits_command_solver c = {.iterations = 1, .max_touches = 1};
     REPLY(solver_with(c), EITS_REPLY_OK, 0, 0);
     CHECK_EQUAL(options->diagnostics, 0);
     REPLY(solver_with(good), EITS_REPLY_OK, 0, 0);
@@ -268,21 +223,15 @@ TEST(test_solver)
 
 TEST(test_mask_row)
 {
-    eits_command_mask_row c = {.row = 208, .masked = 1};
-    REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_RANGE, 4, 207);
-    c.row = 207;
-    c.masked = 2;
-    REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_RANGE, 6, 1);
+    REPLY(mask_row(208, 1), EITS_REPLY_RANGE, 4, 207);
+    REPLY(mask_row(207, 2), EITS_REPLY_RANGE, 6, 1);
     for (uint16_t bad = 1; bad < 2; --bad) {
-        c.masked = bad;
-        REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_OK, 0, 0);
+        REPLY(mask_row(207, bad), EITS_REPLY_OK, 0, 0);
         REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 2), EITS_REPLY_OK, 0, 0);
         host_run(&b.host, 70);
         const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
-        float volts;
-        memcpy(&volts, packet->payload + sizeof(eits_packet_raw) + 4 * 207, 4);
-        CHECK_EQUAL(packet->payload[packet->size - 1], bad ? EITS_QUALITY_MASKED : 0);
-        CHECK_EQUAL(volts != volts, bad);
+        CHECK_EQUAL(raw_quality(packet, 207), bad ? EITS_QUALITY_MASKED : 0);
+        CHECK_EQUAL(isnan(raw_volts(packet, 207)) != 0, bad);
     }
 }
 

@@ -1,17 +1,14 @@
 /* What the core finds reaches the host by name: in the frame's head, and what persists as faults;
  * on frames of the sheet. */
-#include "bench.h"
-#include "check.h"
-
-static bench b;
+#include "steps.h"
 
 /* Tared, and everything is streamed. */
 static void start(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
     b.board.noise_codes = 4;
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(8);
+    STREAM(7, 1, 0);
 }
 
 static const eits_packet_solved *head_of(const host_packet *packet)
@@ -30,18 +27,15 @@ static void test_open_while_nobody_looks(uint16_t every)
     host_run(&b.host, 50);
     for (uint32_t e = 2; e < 16; e += 6) {
         host_forget(&b.host);
-        b.sheet.detached[e] = true;
-        sheet_solve(&b.sheet);
+        detach(e, true);
         const uint32_t before = b.host.instrument.last_frame;
         host_run(&b.host, 60);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
         CHECK(fault != NULL && fault->index == (int32_t)e && fault->frame <= before + 2);
-        b.sheet.detached[e] = false;
-        sheet_solve(&b.sheet);
+        detach(e, false);
         host_run(&b.host, 300);
         CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0) != NULL);
     }
-    bench_stop(&b);
 }
 
 /* Two electrodes that are merged: both named, each with the other. */
@@ -81,7 +75,6 @@ TEST(test_bridged)
     CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, false, 0) != NULL);
     CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, false, 1) != NULL);
     CHECK_EQUAL(host_info(&b.host).faults >> EITS_FAULT_BRIDGED & 1u, 0);
-    bench_stop(&b);
 }
 
 /* One reading that is off for a frame: left out, in the head and in STATS, and no fault. */
@@ -113,7 +106,6 @@ TEST(test_outlier)
     CHECK(rows >= 1);
     CHECK_EQUAL(host_stats(&b.host, 0).outliers - before, rows);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_FAULT), 0);
-    bench_stop(&b);
 }
 
 /* What is not looked for is not found. */
@@ -128,14 +120,11 @@ TEST(test_switched_off)
                                   .solver = o->solver,
                                   .diagnostics = EITS_DIAGNOSTICS_ALL &
                                                  ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN};
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SOLVER, &solver, sizeof solver).status,
-                EITS_REPLY_OK);
-    b.sheet.detached[5] = true;
-    sheet_solve(&b.sheet);
+    TAKEN(host_command(&b.host, EITS_PACKET_SOLVER, &solver, sizeof solver));
+    detach(5, true);
     host_run(&b.host, 60);
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
     CHECK_EQUAL(head_of(host_last(&b.host, EITS_PACKET_IMAGE))->open_electrodes, 0);
-    bench_stop(&b);
 }
 
 int main(void)
@@ -143,5 +132,6 @@ int main(void)
     test_open_while_nobody_looks(0);
     test_open_while_nobody_looks(5);
     run_tests();
+    bench_stop(&b);
     return checks_report("found");
 }

@@ -1,14 +1,10 @@
 /* Current flows only while a host that asked for frames is heard; the owner's settings and lock;
  * the limit on current; hashes. */
+#include "steps.h"
+
 #include "app/drive.h"
 #include "app/kept.h"
 #include "app/sha256.h"
-#include "bench.h"
-#include "check.h"
-
-#include <string.h>
-
-static bench b;
 
 static bool drives(void)
 {
@@ -18,7 +14,6 @@ static bool drives(void)
 /* A host whose presence is known by its packets alone. */
 static void start_unheard(void)
 {
-    bench_stop(&b); /* of the test before */
     b.host.quiet = true;
     bench_start(&b, &SKIN_ADJACENT);
 }
@@ -53,11 +48,11 @@ TEST(test_off_until_asked)
     run_alive(1000); /* to be there asks for nothing; nor do questions */
     CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_OFF);
     (void)host_stats(&b.host, 0);
-    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 0, 1, 0).status, EITS_REPLY_OK);
+    TAKEN(host_plain(&b.host, EITS_PACKET_SELF_TEST));
+    STREAM(0, 1, 0);
     CHECK(!drives());
     CHECK_EQUAL(b.board.bursts, 0);
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    TARE(4);
     CHECK(drives());
     CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_ON);
     keep_alive(0); /* the host goes */
@@ -71,21 +66,20 @@ TEST(test_silence)
 {
     start_unheard();
     b.board.board.settle_frames = 2;
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0).status,
-                EITS_REPLY_OK);
+    TARE(4);
+    STREAM(EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0);
     run_alive(3000);
     CHECK(drives());
     const host_packet *raw = host_last(&b.host, EITS_PACKET_RAW);
-    float before[208], after[208];
-    memcpy(before, raw->payload + sizeof(eits_packet_raw), sizeof before);
+    float before[208];
+    for (uint32_t i = 0; i < 208; ++i)
+        before[i] = raw_volts(raw, i);
     keep_alive(1);
     host_run(&b.host, 850);
     CHECK(drives());
     host_run(&b.host, 150);
     CHECK(!drives());
-    host_forget(&b.host);
-    host_run(&b.host, 2000);
+    hear(2000);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_RAW), 0);
     const eits_packet_info info = host_info(&b.host);
     CHECK_EQUAL(info.drive, EITS_DRIVE_SILENT);
@@ -94,15 +88,13 @@ TEST(test_silence)
     host_run(&b.host, 20); /* heard, but it did not ask again */
     CHECK(!drives());
     const uint32_t scanned = host_stats(&b.host, 0).frames_scanned;
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0).status,
-                EITS_REPLY_OK);
+    STREAM(EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0);
     host_run(&b.host, 200);
     raw = host_packet_of(&b.host, EITS_PACKET_RAW, 0);
     const eits_packet_raw *head = (const void *)raw->payload;
     CHECK_EQUAL(head->frame, scanned + 2); /* two settled */
-    memcpy(after, raw->payload + sizeof(eits_packet_raw), sizeof after);
     for (uint32_t i = 0; i < 208; ++i)
-        CHECK_NEAR(after[i], before[i], fake_lsb_v(&b.board));
+        CHECK_NEAR(raw_volts(raw, i), before[i], fake_lsb_v(&b.board));
     CHECK(host_count(&b.host, EITS_PACKET_IMAGE) > 0);
     /* a tare that is cut by silence fails, and the old reference stays */
     eits_command_tare c = {77, 200};
@@ -116,7 +108,7 @@ TEST(test_silence)
 TEST(test_owner_keeps_it)
 {
     start_unheard();
-    CHECK_EQUAL(set(EITS_SETTING_KEEP_DRIVE, 0).status, EITS_REPLY_OK);
+    TAKEN(set(EITS_SETTING_KEEP_DRIVE, 0));
     CHECK(drives());
     b.board.monitor.needs_host = false; /* it is what the owner wants */
     b.host.kept_on = true;
@@ -134,7 +126,7 @@ TEST(test_lock)
     start_unheard();
     CHECK_EQUAL(set(8, 0).status, EITS_REPLY_RANGE);
     CHECK_EQUAL(set(0, 10001).status, EITS_REPLY_RANGE);
-    CHECK_EQUAL(set(EITS_SETTING_LOCKED, 400).status, EITS_REPLY_OK);
+    TAKEN(set(EITS_SETTING_LOCKED, 400));
     bench_restart(&b);
     CHECK_EQUAL(host_info(&b.host).settings, EITS_SETTING_LOCKED);
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 400);
@@ -145,7 +137,7 @@ TEST(test_lock)
         const uint16_t wanted = held ? EITS_REPLY_OK : EITS_REPLY_LOCKED;
         host_forget(&b.host);
         scan.excitation_millihz = 25000000;
-        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, wanted);
+        CHECK_EQUAL(scan_with(scan).status, wanted);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_LOCKED, true, 0);
         CHECK((fault != NULL) == !held);
         CHECK(fault == NULL || fault->index == EITS_PACKET_SCAN);
@@ -193,17 +185,17 @@ TEST(test_cuts)
 TEST(test_limit)
 {
     start_unheard();
-    CHECK_EQUAL(set(0, EITS_LIMIT_KEPT).status, EITS_REPLY_OK);
+    TAKEN(set(0, EITS_LIMIT_KEPT));
     CHECK_EQUAL(fw_kept_load(&b.board.board.store).current_limit_ua_rms, 0);
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 437); /* 1.25 times 350 */
     b.board.current_ua = 500;
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_RAW, 1, 0);
     run_alive(500);
     CHECK(drives()); /* nobody said that there is a resistor */
-    CHECK_EQUAL(set(EITS_SETTING_SENSE, 400).status, EITS_REPLY_OK);
+    TAKEN(set(EITS_SETTING_SENSE, 400));
     CHECK(!drives());
     b.board.current_ua = 400;
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_RAW, 1, 0);
     run_alive(500);
     CHECK(drives());
     CHECK_EQUAL(host_info(&b.host).current_ua_rms, 400);
@@ -217,15 +209,15 @@ TEST(test_limit)
     CHECK_EQUAL(host_info(&b.host).current_ua_rms, 401);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_TRIPPED);
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_TRIPPED);
-    CHECK_EQUAL(set(EITS_SETTING_KEEP_DRIVE | EITS_SETTING_SENSE, 400).status, EITS_REPLY_OK);
+    TAKEN(set(EITS_SETTING_KEEP_DRIVE | EITS_SETTING_SENSE, 400));
     CHECK(!drives());
-    CHECK_EQUAL(set(EITS_SETTING_SENSE, EITS_LIMIT_KEPT).status, EITS_REPLY_OK);
+    TAKEN(set(EITS_SETTING_SENSE, EITS_LIMIT_KEPT));
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 400);
-    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
+    TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
     b.board.current_ua = 350;
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(set(EITS_SETTING_SENSE, 1).status, EITS_REPLY_OK); /* the least limit */
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    TARE(4);
+    TAKEN(set(EITS_SETTING_SENSE, 1)); /* the least limit */
+    STREAM(EITS_STREAM_RAW, 1, 0);
     run_alive(500);
     CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_TRIPPED);
 }
@@ -245,7 +237,7 @@ TEST(test_lines_that_do_not_open)
     b.board.lines_fails = 0;
     run_alive(500);
     CHECK(drives());
-    CHECK_EQUAL(host_reply(&b.host, c.request).status, EITS_REPLY_OK); /* it has waited */
+    TAKEN(host_reply(&b.host, c.request)); /* it has waited */
     CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_BUS, 0);
 }
 

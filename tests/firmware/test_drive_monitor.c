@@ -1,11 +1,9 @@
 /* The monitor of the drive sees what must never be: in traces by hand, and done by an instrument
  * with a fault planted in it. */
+#include "steps.h"
+
 #include "app/drive.h"
 #include "app/main_loop.h"
-#include "bench.h"
-#include "check.h"
-
-#include <string.h>
 
 enum { MS = 1000000, ALL = 0xF0000, ROW = 0x3210, NEXT = 0x4321, FULL = 0x2000, RESET = 0x2100 };
 enum { END, HOST, WORD, ADDRESSES, ENABLES, WAIT, LOOK };
@@ -89,7 +87,7 @@ static bool same(const char *a, const char *b)
 
 static void test_traces(void)
 {
-    for (size_t k = 0; k < sizeof TRACES / sizeof *TRACES; ++k) {
+    for (size_t k = 0; IN_TABLE(k, TRACES); ++k) {
         const char *wanted = TRACES[k].violation;
         const char *found = seen(TRACES[k].steps, true);
         if (!same(found, wanted))
@@ -102,7 +100,6 @@ static void test_traces(void)
 
 /* ---- instruments with a fault ---- */
 
-static bench b;
 static fw_lines_ops sound;
 
 static fw_status never_opens(void *ctx, uint32_t mask, uint32_t levels)
@@ -124,7 +121,6 @@ static void does_not_wait(void *ctx, uint32_t ns)
 /* The sentence about two seconds of an instrument before a host, or one that believes so. */
 static const char *run(fw_lines_ops ops, bool asked, bool heard)
 {
-    bench_stop(&b);
     b.host.quiet = true;
     bench_start(&b, &SKIN_ADJACENT);
     fw_instrument *instrument = &b.host.instrument;

@@ -1,9 +1,6 @@
 /* Faults: told once when they rise and once when they go; buses that fail and recover; what the
  * board says of its last end. */
-#include "bench.h"
-#include "check.h"
-
-static bench b;
+#include "steps.h"
 
 static uint32_t told(eits_fault code, bool raised)
 {
@@ -29,13 +26,12 @@ TEST(test_last_reset)
     /* until they are cleared */
     CHECK_EQUAL(host_info(&b.host).faults, 1u << EITS_FAULT_CRASH | 1u << EITS_FAULT_WATCHDOG);
     CHECK((b.board.leds & 4u) != 0);
-    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
+    TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
     CHECK_EQUAL(told(EITS_FAULT_CRASH, false), 1);
     CHECK_EQUAL(told(EITS_FAULT_WATCHDOG, false), 1);
     CHECK_EQUAL(host_info(&b.host).faults, 0);
     host_run(&b.host, 5);
     CHECK((b.board.leds & 4u) == 0);
-    bench_stop(&b);
 }
 
 /* What is cleared by command and still there rises again. */
@@ -43,20 +39,17 @@ TEST(test_cleared_but_there)
 {
     bench_start(&b, NULL);
     CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, true), 1);
-    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
+    TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
     CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, false), 1);
     CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, true), 2);
-    bench_stop(&b);
     bench_start(&b, &SKIN_ADJACENT);
-    b.sheet.detached[9] = true;
-    sheet_solve(&b.sheet);
+    detach(9, true);
     host_run(&b.host, 200);
     CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, true), 1);
-    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
+    TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
     host_run(&b.host, 60);
     CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, true), 2);
     CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, false), 1);
-    bench_stop(&b);
 }
 
 /* The generator cannot be written at start-up: told, tried again, and the scan begins when it can.
@@ -80,8 +73,7 @@ TEST(test_generator_bus)
         host_run(&b.host, 600);
         CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
         CHECK_NEAR(fake_generator_hz(&b.board), 50000, 0.02);
-        CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-        bench_stop(&b);
+        TARE(4);
     }
 }
 
@@ -90,8 +82,8 @@ TEST(test_generator_bus)
 TEST(test_multiplexer_bus)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(4);
+    STREAM(7, 1, 0);
     host_run(&b.host, 30);
     for (uint32_t at = 0; at < 3; ++at) {
         const uint32_t repeated = b.host.instrument.scan.slots_repeated;
@@ -105,7 +97,7 @@ TEST(test_multiplexer_bus)
         for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
             const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
             for (uint32_t i = 0; i < 208; ++i)
-                CHECK_EQUAL(packet->payload[sizeof(eits_packet_raw) + 4 * 208 + i], 0);
+                CHECK_EQUAL(raw_quality(packet, i), 0);
         }
     }
     host_forget(&b.host);
@@ -120,7 +112,6 @@ TEST(test_multiplexer_bus)
     CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
     CHECK_EQUAL(told(EITS_FAULT_SOLVER, false), 1);
     CHECK_EQUAL(host_info(&b.host).faults, 0);
-    bench_stop(&b);
 }
 
 /* A bus that fails while a scan starts is told as that, and not as a converter that gives nothing.
@@ -134,14 +125,13 @@ TEST(test_bus_at_the_start_of_a_scan)
         host_forget(&b.host);
         b.board.lines_fail_from = b.board.lines_calls + at;
         b.board.lines_fails = 1;
-        (void)host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
+        (void)scan_with(scan);
         buses += told(EITS_FAULT_BUS, true);
         host_run(&b.host, 700); /* it is tried again */
         CHECK_EQUAL(told(EITS_FAULT_SCAN_STALLED, true), 0);
         CHECK_EQUAL(host_info(&b.host).faults, 0);
     }
     CHECK(buses >= 3);
-    bench_stop(&b);
 }
 
 /* So many frames with a fault and then without it: when it rises and goes, each electrode by
@@ -157,7 +147,7 @@ TEST(test_hysteresis)
                  {EITS_FAULT_UNLIKE_MODEL, 3}};
     bench_start(&b, NULL);
     fw_faults *faults = &b.host.instrument.faults;
-    for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, kinds); ++k) {
         const eits_fault code = kinds[k].code;
         const fw_fault_detail detail = {.index = 9, .value = 5};
         for (uint32_t frame = 1; frame < kinds[k].shown; ++frame)
@@ -189,7 +179,6 @@ TEST(test_hysteresis)
     CHECK_EQUAL(faults->there[EITS_FAULT_BRIDGED], 1u << 15 | 1u);
     fw_faults_clear(faults, 0);
     CHECK_EQUAL(faults->raised, 0);
-    bench_stop(&b);
 }
 
 TEST(test_watchdog_is_fed)
@@ -204,7 +193,6 @@ TEST(test_watchdog_is_fed)
         lit += b.board.leds & 1u;
     }
     CHECK(lit >= 8 && lit <= 12); /* alive: blinks */
-    bench_stop(&b);
 }
 
-RUN_TESTS("faults")
+RUN_TESTS("faults", bench_stop(&b))

@@ -1,20 +1,16 @@
 /* Touches after each drive: drives are looked at while the main loop is busy, none is left out or
  * told twice, whole frames are brought to one instant, and all begins anew where it must. */
-#include "app/follow.h"
-#include "bench.h"
-#include "check.h"
+#include "steps.h"
 
-#include <string.h>
+#include "app/follow.h"
 
 enum { DRIVES = 16, DRIVE_US = 1300, SCAN_MS = 21, ALL = 31 & ~EITS_STREAM_IMAGE };
-
-static bench b;
 
 static void set_up(const skin_spec *spec)
 {
     bench_start(&b, spec);
     b.board.noise_codes = 0.5;
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    TARE(8);
 }
 
 static eits_packet_followed followed(uint32_t k)
@@ -45,15 +41,11 @@ TEST(test_what_is_refused)
 {
     set_up(&SKIN_ADJACENT); /* without fields */
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
-    bench_stop(&b);
     set_up(&SKIN_WITH_FIELDS);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 2, 0).status, EITS_REPLY_DRIVES);
-    eits_command_scan scan = host_default_scan();
-    scan.check_every = 4;
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    check_each(4);
+    TARE(8);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
-    bench_stop(&b);
 }
 
 /* A still skin: one packet says that it begins, all frames are brought to one instant and solved,
@@ -62,7 +54,7 @@ TEST(test_a_still_skin)
 {
     set_up(&SKIN_WITH_FIELDS);
     host_forget(&b.host);
-    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    STREAM(ALL, 1, 0);
     host_run(&b.host, 20 * SCAN_MS);
     const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
     CHECK(frames >= 18);
@@ -75,21 +67,19 @@ TEST(test_a_still_skin)
     CHECK(memcmp(engine->aligned, engine->frames[(b.host.instrument.scan.taken - 1) % 2u].volts,
                  engine->model.n_rows * sizeof(float)) == 0);
     CHECK_EQUAL(b.host.gaps, 0);
-    bench_stop(&b);
 }
 
 /* A touch: packets of drives in the order that they are measured, each for its own instant. */
 static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
 {
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    STREAM(ALL, 1, 0);
     host_run(&b.host, 5 * SCAN_MS);
     b.board.clock_cost_ns = clock_cost_ns;
     b.board.write_cost_ns = write_cost_ns;
     const uint32_t begun = b.host.instrument.follow.begun;
     host_forget(&b.host);
-    sheet_touch(&b.sheet, -2, 1, 1.6, 4);
-    sheet_solve(&b.sheet);
+    touch(-2, 1, 4);
     const uint32_t scanned = b.host.instrument.scan.frames_scanned;
     const uint64_t from_ns = b.board.now_ns;
     host_run(&b.host, 30 * SCAN_MS);
@@ -112,7 +102,6 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
     CHECK_EQUAL(b.host.gaps, 0);
     CHECK_EQUAL(b.board.nested_writes, 0);
     CHECK(b.host.instrument.follow.running);
-    bench_stop(&b);
 }
 
 /* A main loop that is slower than the scan: frames are left out, drives are not, and a frame that
@@ -120,7 +109,7 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
 TEST(test_a_slow_main_loop)
 {
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    STREAM(ALL, 1, 0);
     host_run(&b.host, 5 * SCAN_MS);
     const uint32_t begun = b.host.instrument.follow.begun;
     const uint32_t scanned = b.host.instrument.scan.frames_scanned;
@@ -134,7 +123,6 @@ TEST(test_a_slow_main_loop)
     CHECK(host_count(&b.host, EITS_PACKET_TOUCHES) <= aligned + 1);
     CHECK(b.host.instrument.follow.running);
     CHECK_EQUAL(b.host.instrument.follow.begun, begun);
-    bench_stop(&b);
 }
 
 /* Commands that change what drives build on begin anew; questions do not. Drives that waited too
@@ -142,7 +130,7 @@ TEST(test_a_slow_main_loop)
 TEST(test_beginning_anew)
 {
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, ALL, 1, 0).status, EITS_REPLY_OK);
+    STREAM(ALL, 1, 0);
     host_run(&b.host, 3 * SCAN_MS);
     const fw_follow *follow = &b.host.instrument.follow;
     uint32_t begun = follow->begun;
@@ -150,9 +138,7 @@ TEST(test_beginning_anew)
     (void)host_stats(&b.host, 0);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK_EQUAL(follow->begun, begun);
-    eits_command_mask_row mask = {.row = 3, .masked = 1};
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
-                EITS_REPLY_OK);
+    TAKEN(mask_row(3, 1));
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(follow->begun > begun && follow->running);
     begun = follow->begun;
@@ -164,13 +150,12 @@ TEST(test_beginning_anew)
     host_run(&b.host, 3 * SCAN_MS);
     CHECK(follow->begun > begun && follow->running);
     begun = follow->begun;
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    TARE(8);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(follow->begun > begun && follow->running);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_TOUCHES, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_TOUCHES, 1, 0);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(!follow->running && b.host.instrument.scan.drive_done == NULL);
-    bench_stop(&b);
 }
 
 /* A touch that only frames find is one once two of them have found it; a frame that is brought to
@@ -178,7 +163,7 @@ TEST(test_beginning_anew)
 TEST(test_a_place_that_frames_find)
 {
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_FOLLOWED, 1, 0);
     host_run(&b.host, 3 * SCAN_MS);
     fw_instrument *instrument = &b.host.instrument;
     fw_frame *frame = &instrument->engine.frames[0];
@@ -193,11 +178,9 @@ TEST(test_a_place_that_frames_find)
             instrument->follow.owed_frame = frame->number;
             (void)fw_follow_align(instrument, frame);
         }
-        CHECK_EQUAL(eits_fast_touches(instrument->engine.fast, touches, EITS_FAST_TOUCHES, &count),
-                    EITS_OK);
+        CHECK_OK(eits_fast_touches(instrument->engine.fast, touches, EITS_FAST_TOUCHES, &count));
         CHECK_EQUAL(count, round);
     }
-    bench_stop(&b);
 }
 
 int main(void)
@@ -205,5 +188,6 @@ int main(void)
     run_tests();
     test_a_touch(0, 0);
     test_a_touch(2000, 900000);
+    bench_stop(&b);
     return checks_report("follow");
 }

@@ -1,12 +1,8 @@
 /* From tare to stream: the reference, images with the core's own bits, streaming every n-th frame,
  * back-pressure. */
-#include "bench.h"
-#include "check.h"
+#include "steps.h"
+
 #include "context/context.h"
-
-#include <string.h>
-
-static bench b;
 
 /* The core as a host runs it beside the board, on the frames that the board sends. */
 static struct mirror {
@@ -24,16 +20,15 @@ static struct mirror {
 static void mirror_start(uint32_t untouched)
 {
     memset(&mirror, 0, sizeof mirror);
-    CHECK_EQUAL(eits_init(mirror.workspace, eits_workspace_size(&b.open, 0), &b.open, &mirror.ctx),
-                EITS_OK);
+    CHECK_OK(eits_init(mirror.workspace, eits_workspace_size(&b.open, 0), &b.open, &mirror.ctx));
     eits_options options = *eits_get_options(mirror.ctx);
-    CHECK_EQUAL(eits_options_track(&options), EITS_OK); /* as the firmware does */
+    CHECK_OK(eits_options_track(&options)); /* as the firmware does */
     options.noise_floor_v = eits_get_options(b.host.instrument.engine.ctx)->noise_floor_v;
     options.warm_start = 1; /* of both, so that a frame depends on those before it */
     b.host.instrument.engine.ctx->options.warm_start = 1;
-    CHECK_EQUAL(eits_set_options(mirror.ctx, &options), EITS_OK);
+    CHECK_OK(eits_set_options(mirror.ctx, &options));
     if (untouched > 1)
-        CHECK_EQUAL(eits_reference_begin(mirror.ctx, untouched), EITS_OK);
+        CHECK_OK(eits_reference_begin(mirror.ctx, untouched));
 }
 
 static int same_bits(const void *a, const void *c, size_t size)
@@ -65,7 +60,7 @@ static void mirror_touches(const host_packet *packet)
     eits_touch *touches = mirror.found;
     uint32_t count = 0;
     if (mirror.ctx->info.stop != EITS_STOP_BELOW_THRESHOLD || head->status == 0)
-        CHECK_EQUAL(eits_find_touches(mirror.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+        CHECK_OK(eits_find_touches(mirror.ctx, touches, EITS_MAX_TOUCHES, &count));
     ++mirror.touches;
     mirror.different +=
         head->count != count || packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
@@ -80,9 +75,8 @@ static void mirror_events(const host_packet *packet)
     const eits_packet_event *sent = (const eits_packet_event *)(const void *)(head + 1);
     eits_event events[EITS_MAX_EVENTS];
     uint32_t told = 0;
-    CHECK_EQUAL(eits_gestures_update(&mirror.gestures, mirror.found, mirror.found_count,
-                                     head->time_us, events, EITS_MAX_EVENTS, &told),
-                EITS_OK);
+    CHECK_OK(eits_gestures_update(&mirror.gestures, mirror.found, mirror.found_count, head->time_us,
+                                  events, EITS_MAX_EVENTS, &told));
     ++mirror.frames_of_events;
     mirror.events += told;
     mirror.different += head->frame != mirror.frame || head->count != told ||
@@ -107,16 +101,15 @@ static void mirror_follow(void)
             memcpy(mirror.volts, packet->payload + sizeof *head, 4 * b.open.n_rows);
             mirror.frame = head->frame;
             if ((head->flags & EITS_RAW_REFERENCE) != 0)
-                CHECK_EQUAL(mirror.ctx->reference.wanted > 0
-                                ? eits_reference_add(mirror.ctx, mirror.volts, b.open.n_rows)
-                                : eits_reference_set(mirror.ctx, mirror.volts, b.open.n_rows),
-                            EITS_OK);
+                CHECK_OK(mirror.ctx->reference.wanted > 0
+                             ? eits_reference_add(mirror.ctx, mirror.volts, b.open.n_rows)
+                             : eits_reference_set(mirror.ctx, mirror.volts, b.open.n_rows));
         } else if (packet->type == EITS_PACKET_REPLY &&
                    ((const eits_packet_reply *)(const void *)head)->command == EITS_PACKET_TARE) {
             if (mirror.ctx->reference.wanted > 0)
-                CHECK_EQUAL(eits_reference_finish(mirror.ctx), EITS_OK);
+                CHECK_OK(eits_reference_finish(mirror.ctx));
             eits_forget(mirror.ctx);
-            CHECK_EQUAL(eits_gestures_init(&mirror.gestures, NULL), EITS_OK);
+            CHECK_OK(eits_gestures_init(&mirror.gestures, NULL));
         } else if (packet->type == EITS_PACKET_IMAGE) {
             mirror_image(packet);
         } else if (packet->type == EITS_PACKET_TOUCHES) {
@@ -125,12 +118,6 @@ static void mirror_follow(void)
             mirror_events(packet);
         }
     }
-}
-
-static void touch(double x, double y, double factor)
-{
-    sheet_touch(&b.sheet, x, y, 1.6, factor);
-    sheet_solve(&b.sheet);
 }
 
 /* Images and touches have the bits of the core run on the frames that were sent; warm starts
@@ -142,16 +129,13 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     b.board.noise_codes = 2;
     b.board.write_cost_ns = busy_ms * 1000000u; /* meanwhile the scan goes on, as far as it may */
     if (check_every != 1) {
-        eits_command_scan scan = host_default_scan();
-        scan.check_every = check_every;
-        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status,
-                    EITS_REPLY_OK);
+        check_each(check_every);
     }
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_RAW, 1, 0);
     host_forget(&b.host);
     mirror_start(untouched);
-    CHECK_EQUAL(host_tare(&b.host, untouched).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 15, every, 0).status, EITS_REPLY_OK);
+    TARE(untouched);
+    STREAM(15, every, 0);
     mirror_follow();
     CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.99f);
     CHECK(same_bits(mirror.ctx->reference.v0, b.host.instrument.engine.ctx->reference.v0,
@@ -164,18 +148,16 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     touch(-4, 1, 3);
     host_run(&b.host, ms);
     mirror_follow();
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_RAW, 1, 0);
     if (untouched > 1)
-        CHECK_EQUAL(eits_reference_begin(mirror.ctx, untouched), EITS_OK);
+        CHECK_OK(eits_reference_begin(mirror.ctx, untouched));
     /* with the touches: they are gone, and their ids */
-    CHECK_EQUAL(host_tare(&b.host, untouched).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 15, every, 0).status, EITS_REPLY_OK);
+    TARE(untouched);
+    STREAM(15, every, 0);
     touch(4, -2, 3);
     host_run(&b.host, ms);
     mirror_follow();
-    eits_command_mask_row mask = {.row = 17, .masked = 1};
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
-                EITS_REPLY_OK);
+    TAKEN(mask_row(17, 1));
     host_run(&b.host, ms);
     mirror_follow(); /* the row comes as not a number: nothing else is to be told */
     sheet_init(&b.sheet);
@@ -188,7 +170,6 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     CHECK_EQUAL(mirror.different, 0);
     CHECK_EQUAL(b.host.gaps, 0);
     CHECK_EQUAL(host_info(&b.host).tared, 1);
-    bench_stop(&b);
 }
 
 /* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the
@@ -198,34 +179,25 @@ TEST(test_phase_of_the_voltages)
     for (int k = 0; k < 9; ++k) {
         bench_start(&b, &SKIN_ADJACENT);
         b.board.extra_turn = k / 9.0;
-        CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
-        CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+        STREAM(EITS_STREAM_RAW, 1, 0);
+        TARE(8);
         CHECK_NEAR(b.host.instrument.engine.ctx->reference.gain, 1, 1e-3);
         CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.9999f);
         host_run(&b.host, 3000); /* the generator, 12 mHz off, would turn by 13 degrees */
-        float volts[256];
-        memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
-               sizeof(float) * 208);
-        for (uint32_t i = 0; i < 208; ++i)
-            CHECK_NEAR(volts[i], bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
+        CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 1) <= 0.5);
         /* what turns after the tare is not followed: half of a voltage is left */
         b.board.extra_turn += 1 / 6.0;
         host_run(&b.host, 60);
-        memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
-               sizeof(float) * 208);
-        for (uint32_t i = 0; i < 208; ++i)
-            CHECK_NEAR(volts[i], 0.5 * bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
-        bench_stop(&b);
+        CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 0.5) <= 0.5);
     }
 }
 
 TEST(test_streaming)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_TOUCHES, 3, 5).status, EITS_REPLY_OK);
-    host_forget(&b.host);
-    host_run(&b.host, 600);
+    TARE(1);
+    STREAM(EITS_STREAM_TOUCHES, 3, 5);
+    hear(600);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 5);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_IMAGE) + host_count(&b.host, EITS_PACKET_RAW), 0);
     for (uint32_t k = 1; k < 5; ++k) {
@@ -239,28 +211,26 @@ TEST(test_streaming)
     CHECK_EQUAL(host_info(&b.host).streaming, 0); /* five, and no more */
     CHECK_EQUAL(host_stats(&b.host, 0).frames_solved, 5);
     host_forget(&b.host);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_EVENTS, 1, 4).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_EVENTS, 1, 4);
     host_run(&b.host, 200);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_EVENTS), 4); /* whether any happened or not */
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 0);
     CHECK_EQUAL(host_packet_of(&b.host, EITS_PACKET_EVENTS, 0)->size, sizeof(eits_packet_events));
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_IMAGE, 2, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_IMAGE, 2, 0);
     const eits_packet_info info = host_info(&b.host);
     CHECK_EQUAL(info.streaming, EITS_STREAM_IMAGE);
     CHECK_EQUAL(info.every, 2);
-    CHECK_EQUAL(host_stream(&b.host, 0, 1, 0).status, EITS_REPLY_OK);
-    host_forget(&b.host);
-    host_run(&b.host, 200);
+    STREAM(0, 1, 0);
+    hear(200);
     CHECK_EQUAL(b.host.packets, 0);
-    bench_stop(&b);
 }
 
 /* Where the link takes no more, whole packets are dropped and counted, and nothing waits. */
 TEST(test_back_pressure)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(1);
+    STREAM(7, 1, 0);
     const uint32_t sent = b.host.instrument.tx_queue.sent;
     b.host.gaps = 0;
     b.board.host_room = 3000;
@@ -274,16 +244,14 @@ TEST(test_back_pressure)
     CHECK_EQUAL(b.host.gaps, stats.packets_dropped);
     CHECK(stats.packets_sent > sent);
     CHECK_EQUAL(b.host.decoder.crc_errors + b.host.decoder.framing_errors, 0);
-    bench_stop(&b);
 }
 
 /* A tare that fails leaves the last reference, its angle and its images. */
 TEST(test_failed_tare)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    CHECK_EQUAL(host_tare(&b.host, 16).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0).status,
-                EITS_REPLY_OK);
+    TARE(16);
+    STREAM(EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0);
     mirror_start(0);
     const fw_engine *engine = &b.host.instrument.engine;
     static float v0[256];
@@ -308,8 +276,7 @@ TEST(test_failed_tare)
     b.sheet.detached[3] = false;
     b.board.extra_turn -= 0.1;
     sheet_init(&b.sheet);
-    host_forget(&b.host);
-    host_run(&b.host, 100);
+    hear(100);
     const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
     CHECK(image != NULL);
     float peak = 0;
@@ -319,7 +286,6 @@ TEST(test_failed_tare)
         peak = value > peak ? value : peak;
     }
     CHECK(peak < 1e-5f);
-    bench_stop(&b);
 }
 
 /* Frames whose scan began before the command are not untouched ones; frames of a tare are all sent,
@@ -327,11 +293,11 @@ TEST(test_failed_tare)
 TEST(test_reference_frames)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 5, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_RAW, 5, 0);
     host_run(&b.host, 31);
     host_forget(&b.host);
     const uint32_t asked_us = (uint32_t)(b.board.now_ns / 1000);
-    CHECK_EQUAL(host_tare(&b.host, 6).status, EITS_REPLY_OK);
+    TARE(6);
     uint32_t untouched = 0, last = 0;
     for (uint32_t k = 0; k < b.host.packets; ++k) {
         const eits_packet_raw *head = (const void *)b.host.packet[k].payload;
@@ -344,23 +310,22 @@ TEST(test_reference_frames)
     }
     CHECK_EQUAL(untouched, 6);
     CHECK_EQUAL(b.host.packet[b.host.packets - 1].type, EITS_PACKET_REPLY);
-    bench_stop(&b);
 }
 
 TEST(test_self_test_keeps_the_tare)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_RAW, 1, 0);
     host_forget(&b.host);
     mirror_start(4);
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(4);
+    STREAM(7, 1, 0);
     touch(3, 3, 4);
     host_run(&b.host, 100);
     mirror_follow();
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    STREAM(EITS_STREAM_RAW, 1, 0);
+    TAKEN(host_plain(&b.host, EITS_PACKET_SELF_TEST));
+    STREAM(7, 1, 0);
     mirror_follow();
     eits_forget(mirror.ctx);          /* a self-test forgets the warm start */
     mirror.ctx->projection.stale = 1; /* and the basis, which costs MACs to build anew */
@@ -371,11 +336,8 @@ TEST(test_self_test_keeps_the_tare)
     /* nor does it forget the voltages' angle: what turns now is not followed */
     b.board.extra_turn += 1 / 6.0;
     host_run(&b.host, 60);
-    float volts;
-    memcpy(&volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
-           sizeof volts);
+    const float volts = raw_volts(host_last(&b.host, EITS_PACKET_RAW), 0);
     CHECK_NEAR(volts, 0.5 * bench_volts(&b, 0), 0.5 * fake_lsb_v(&b.board));
-    bench_stop(&b);
 }
 
 /* A tare takes frames whose scan began with the command or later, also where the clock wraps. */
@@ -400,5 +362,6 @@ int main(void)
     test_same_bits(&SKIN_OPPOSITE, 5, 1, 4, 0);
     test_same_bits(&SKIN_ADJACENT, 4, 1, 1, 50);
     run_tests();
+    bench_stop(&b);
     return checks_report("instrument");
 }

@@ -1,27 +1,19 @@
 /* Quality: open electrodes by name within one frame and never for touches, saturation, reciprocity,
  * on frames of the sheet. */
-#include "bench.h"
-#include "check.h"
-
-#include <math.h>
-#include <string.h>
-
-static bench b;
+#include "steps.h"
 
 static void start(uint16_t check_every)
 {
     bench_start(&b, &SKIN_ADJACENT);
     b.board.noise_codes = 4;
-    eits_command_scan scan = host_default_scan();
-    scan.check_every = check_every;
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    check_each(check_every);
+    STREAM(EITS_STREAM_RAW, 1, 0);
 }
 
 static void tare(void)
 {
-    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(8);
+    STREAM(7, 1, 0);
 }
 
 static bool uses(uint32_t row, uint32_t electrode)
@@ -48,7 +40,7 @@ static uint32_t first_named(uint32_t e, bool tared)
         const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
         const eits_packet_raw *head = (const void *)packet->payload;
         for (uint32_t i = 0; i < 208; ++i) {
-            if ((packet->payload[sizeof *head + 4 * 208 + i] & EITS_QUALITY_OPEN) != 0)
+            if ((raw_quality(packet, i) & EITS_QUALITY_OPEN) != 0)
                 return head->frame;
         }
     }
@@ -59,12 +51,9 @@ static uint32_t first_named(uint32_t e, bool tared)
  * numbers; with one the core gets them as they are. */
 static void check_rows(const host_packet *packet, uint32_t e, bool tared)
 {
-    const uint8_t *volts = packet->payload + sizeof(eits_packet_raw), *quality = volts + 4 * 208;
     for (uint32_t i = 0; i < 208; ++i) {
-        float value;
-        memcpy(&value, volts + 4 * i, 4);
-        CHECK_EQUAL((quality[i] & EITS_QUALITY_OPEN) != 0, !tared && uses(i, e));
-        CHECK_EQUAL(value != value, !tared && uses(i, e));
+        CHECK_EQUAL((raw_quality(packet, i) & EITS_QUALITY_OPEN) != 0, !tared && uses(i, e));
+        CHECK_EQUAL(isnan(raw_volts(packet, i)) != 0, !tared && uses(i, e));
     }
 }
 
@@ -78,8 +67,7 @@ static void test_open(bool tared, uint16_t check_every)
     for (uint32_t e = 0; e < 16; e += 5) {
         host_run(&b.host, 50);
         host_forget(&b.host);
-        b.sheet.detached[e] = true;
-        sheet_solve(&b.sheet);
+        detach(e, true);
         const uint32_t off_us = (uint32_t)(b.board.now_ns / 1000);
         host_run(&b.host, 60);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
@@ -108,8 +96,7 @@ static void test_open(bool tared, uint16_t check_every)
             CHECK_EQUAL(image->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN,
                         EITS_DIAGNOSTIC_ELECTRODE_OPEN);
         }
-        b.sheet.detached[e] = false;
-        sheet_solve(&b.sheet);
+        detach(e, false);
         /* the frame under way may still be without it */
         const uint32_t back = b.host.instrument.last_frame + 1;
         host_run(&b.host, 300);
@@ -119,7 +106,6 @@ static void test_open(bool tared, uint16_t check_every)
               gone->frame <= back + EITS_FAULT_CLEAR_FRAMES);
         CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_ELECTRODE_OPEN, 0);
     }
-    bench_stop(&b);
 }
 
 /* Two at once, neighbours or not. */
@@ -128,17 +114,16 @@ TEST(test_two_open)
     start(1);
     tare();
     for (uint32_t other = 4; other < 12; other += 4) {
-        b.sheet.detached[3] = b.sheet.detached[other] = true;
-        sheet_solve(&b.sheet);
+        b.sheet.detached[3] = true;
+        detach(other, true);
         host_run(&b.host, 60);
         CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN],
                     1u << 3 | 1u << other);
-        b.sheet.detached[3] = b.sheet.detached[other] = false;
-        sheet_solve(&b.sheet);
+        b.sheet.detached[3] = false;
+        detach(other, false);
         host_run(&b.host, 300);
         CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
     }
-    bench_stop(&b);
 }
 
 /* An electrode behind an amplifier that runs into its limit is open too. */
@@ -157,7 +142,6 @@ TEST(test_open_at_the_rail)
     CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 6);
     const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_SATURATED, true, 0);
     CHECK(fault != NULL);
-    bench_stop(&b);
 }
 
 /* A skin of other voltages than the model's by far: the tare says what is to be expected. */
@@ -176,7 +160,6 @@ TEST(test_faint_skin)
     tare();
     host_run(&b.host, 50);
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
-    bench_stop(&b);
 }
 
 /* One row that reads something whatever is connected, and is masked for that: it does not speak for
@@ -194,16 +177,12 @@ TEST(test_masked_row_is_not_judged)
     tare();
     for (uint16_t i = 0; i < 208; ++i) {
         const uint8_t *row = b.open.protocol + 4 * (size_t)i;
-        eits_command_mask_row mask = {.row = i, .masked = 1};
         if (row[0] == 5 && row[2] == 8)
-            CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
-                        EITS_REPLY_OK);
+            TAKEN(mask_row(i, 1));
     }
-    b.sheet.detached[5] = true;
-    sheet_solve(&b.sheet);
+    detach(5, true);
     host_run(&b.host, 60);
     CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 5);
-    bench_stop(&b);
 }
 
 /* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half
@@ -214,7 +193,7 @@ static void test_touches_are_not_open(bool tared)
     if (tared)
         tare();
     const double factors[] = {0.02, 0.3, 3, 10};
-    for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
+    for (size_t f = 0; IN_TABLE(f, factors); ++f) {
         for (int place = 0; place < 5; ++place) {
             sheet_init(&b.sheet);
             sheet_touch(&b.sheet, 1.7 * place, -0.4 * place, place == 4 ? 2.5 : 1 + place,
@@ -225,7 +204,6 @@ static void test_touches_are_not_open(bool tared)
         }
     }
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
-    bench_stop(&b);
 }
 
 static double one_row_saturates(void *user, const uint8_t e[4], uint64_t at_ns)
@@ -253,11 +231,8 @@ TEST(test_saturation)
     for (uint32_t i = 0; i < 208; ++i) {
         const uint8_t *row = b.open.protocol + 4 * (size_t)i;
         const bool it = (row[0] == 2 && row[2] == 9) || (row[0] == 9 && row[2] == 2);
-        const uint8_t quality = raw->payload[sizeof(eits_packet_raw) + 4 * 208 + i];
-        float volts;
-        memcpy(&volts, raw->payload + sizeof(eits_packet_raw) + 4 * i, 4);
-        CHECK_EQUAL(quality, it ? EITS_QUALITY_SATURATED : 0);
-        CHECK_EQUAL(volts != volts, it);
+        CHECK_EQUAL(raw_quality(raw, i), it ? EITS_QUALITY_SATURATED : 0);
+        CHECK_EQUAL(isnan(raw_volts(raw, i)) != 0, it);
         marked += it;
     }
     CHECK_EQUAL(marked, 2);
@@ -265,7 +240,6 @@ TEST(test_saturation)
     CHECK_EQUAL(image->masked, 2);
     CHECK_EQUAL(image->saturated, 2);
     CHECK_EQUAL(image->diagnostics, EITS_DIAGNOSTIC_SATURATED);
-    bench_stop(&b);
 }
 
 static double broken_reciprocity(void *user, const uint8_t e[4], uint64_t at_ns)
@@ -301,13 +275,11 @@ static void test_reciprocity(uint16_t check_every)
         for (uint32_t i = 0; i < 208; ++i) {
             const uint8_t *row = b.open.protocol + 4 * (size_t)i;
             const bool it = (row[0] == 2 && row[2] == 5) || (row[0] == 5 && row[2] == 2);
-            const uint8_t quality = packet->payload[sizeof *head + 4 * 208 + i];
-            CHECK_EQUAL((quality & EITS_QUALITY_RECIPROCITY) != 0, it);
+            CHECK_EQUAL((raw_quality(packet, i) & EITS_QUALITY_RECIPROCITY) != 0, it);
             marked += it;
         }
     }
     CHECK(marked >= 2);
-    bench_stop(&b);
 }
 
 /* A dead front end: no voltage at all. */
@@ -339,7 +311,6 @@ TEST(test_dead)
     const eits_packet_solved *touches =
         (const void *)host_last(&b.host, EITS_PACKET_TOUCHES)->payload;
     CHECK_EQUAL(touches->count, 0);
-    bench_stop(&b);
 }
 
 int main(void)
@@ -352,5 +323,6 @@ int main(void)
     test_touches_are_not_open(false);
     test_reciprocity(1);
     test_reciprocity(3);
+    bench_stop(&b);
     return checks_report("quality");
 }

@@ -1,11 +1,7 @@
 /* Starting: without a model, on another model than before, and how the main loop ends. */
+#include "steps.h"
+
 #include "app/main_loop.h"
-#include "bench.h"
-#include "check.h"
-
-#include <string.h>
-
-static bench b;
 
 TEST(test_no_model)
 {
@@ -20,7 +16,7 @@ TEST(test_no_model)
     CHECK_EQUAL(info.bank_bytes, FAKE_BANK - 32);
     CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_NO_MODEL);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_NO_MODEL);
-    CHECK_EQUAL(host_stream(&b.host, 0, 1, 0).status, EITS_REPLY_OK);
+    STREAM(0, 1, 0);
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_NO_MODEL);
     host_run(&b.host, 3000);
     CHECK_EQUAL(b.board.bursts, 0);
@@ -28,10 +24,9 @@ TEST(test_no_model)
     CHECK_NEAR(fake_generator_hz(&b.board), 0, 0);
     CHECK((b.board.leds & 4u) != 0);
     skin_model model = skin_model_make(&SKIN_ADJACENT);
-    CHECK_EQUAL(host_upload(&b.host, model.blob, model.size, model.crc, 4096).status,
-                EITS_REPLY_OK);
+    TAKEN(host_upload(&b.host, model.blob, model.size, model.crc, 4096));
     CHECK(host_fault(&b.host, EITS_FAULT_NO_MODEL, false, 0) != NULL);
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    TARE(4);
     info = host_info(&b.host);
     CHECK_EQUAL(info.model_bytes, (long long)model.size);
     CHECK_EQUAL(info.model_crc, model.crc);
@@ -39,7 +34,6 @@ TEST(test_no_model)
     CHECK_EQUAL(info.n_folded, 104);
     CHECK_EQUAL(info.faults, 0);
     skin_model_free(&model);
-    bench_stop(&b);
 }
 
 /* After a change of the model the new table is scanned, reciprocals and all, and the old tare is
@@ -47,18 +41,15 @@ TEST(test_no_model)
 TEST(test_model_change)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    eits_command_scan scan = host_default_scan();
-    scan.check_every = 3;
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    check_each(3);
+    TARE(4);
+    STREAM(7, 1, 0);
     host_run(&b.host, 70);
     skin_model other = skin_model_make(&SKIN_OPPOSITE);
-    CHECK_EQUAL(host_upload(&b.host, other.blob, other.size, other.crc, 1000).status,
-                EITS_REPLY_OK);
+    TAKEN(host_upload(&b.host, other.blob, other.size, other.crc, 1000));
     skin_model_free(&b.model);
     b.model = other;
-    CHECK_EQUAL(eits_model_open(&b.open, other.blob, other.size), EITS_OK);
+    CHECK_OK(eits_model_open(&b.open, other.blob, other.size));
     const eits_packet_info info = host_info(&b.host);
     CHECK_EQUAL(info.n_rows, 192);
     CHECK(info.n_electrodes == b.open.n_electrodes && info.n_folded == b.open.n_folded &&
@@ -69,9 +60,8 @@ TEST(test_model_change)
     CHECK_EQUAL(info.tared, 0);
     CHECK_EQUAL(info.streaming, 0);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_IMAGE, 1, 0).status, EITS_REPLY_NOT_TARED);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
-    host_forget(&b.host);
-    host_run(&b.host, 100);
+    STREAM(EITS_STREAM_RAW, 1, 0);
+    hear(100);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 5);
     for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
         const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
@@ -83,7 +73,6 @@ TEST(test_model_change)
     bench_restart(&b); /* the newer one is opened */
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
     CHECK_EQUAL(host_info(&b.host).bank, 1);
-    bench_stop(&b);
 }
 
 TEST(test_starts_and_ends)
@@ -115,7 +104,6 @@ TEST(test_starts_and_ends)
     wrong = b.board.board;
     wrong.mclk_hz = 8388608;
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &wrong), 1);
-    bench_stop(&b);
 }
 
-RUN_TESTS("start")
+RUN_TESTS("start", bench_stop(&b))

@@ -1,11 +1,7 @@
 /* Model banks: which one is opened, and uploads. Power cuts are the fuzzer's (tests/fuzz) and the
  * emulated board's (tests/python/emulator/test_power_cuts.py). */
-#include "bench.h"
-#include "check.h"
+#include "steps.h"
 
-#include <string.h>
-
-static bench b;
 static skin_model adjacent, opposite;
 
 static eits_packet_reply begin_with(uint32_t bytes, uint32_t crc)
@@ -32,7 +28,7 @@ TEST(test_newest)
                  {0x80000006u, 5, 1},
                  {0x80000001u, 5, 0},
                  {7, 7, 0}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         bench_start(&b, NULL);
         fake_put_model(&b.board, 0, cases[k].first, adjacent.blob, adjacent.size);
         fake_put_model(&b.board, 1, cases[k].second, opposite.blob, opposite.size);
@@ -55,16 +51,14 @@ TEST(test_newest)
 static void test_upload(size_t piece)
 {
     start_with_adjacent();
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, piece).status,
-                EITS_REPLY_OK);
+    TARE(4);
+    TAKEN(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, piece));
     CHECK_EQUAL(b.board.rewrites, 0);
     CHECK_EQUAL(b.board.erases, 1);
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
     /* the old one is still there */
     CHECK(memcmp(b.board.bank[0], adjacent.blob, adjacent.size) == 0);
-    CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, piece).status,
-                EITS_REPLY_OK);
+    TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, piece));
     CHECK_EQUAL(host_info(&b.host).bank, 0);
     bench_restart(&b);
     CHECK_EQUAL(host_info(&b.host).n_rows, 208);
@@ -78,8 +72,7 @@ static void still_adjacent(int tared)
     CHECK_EQUAL(info.model_crc, adjacent.crc);
     CHECK_EQUAL(info.bank, 0);
     CHECK_EQUAL(info.tared, tared);
-    host_forget(&b.host);
-    host_run(&b.host, 60);
+    hear(60);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 2); /* scanning, and still streamed */
     if (tared)
         CHECK(host_count(&b.host, EITS_PACKET_IMAGE) >= 2);
@@ -92,8 +85,8 @@ static void still_adjacent(int tared)
 TEST(test_refused)
 {
     start_with_adjacent();
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(4);
+    STREAM(7, 1, 0);
     eits_packet_reply reply = begin_with(FAKE_BANK - 31, 0);
     CHECK_EQUAL(reply.status, EITS_REPLY_MODEL_SIZE);
     CHECK_EQUAL(reply.detail[0], FAKE_BANK - 32);
@@ -126,8 +119,8 @@ TEST(test_refused)
     fake_put_model(&b.board, 1, 7, bad.blob, bad.size); /* by a programmer: not opened */
     bench_restart(&b);
     CHECK_EQUAL(host_info(&b.host).bank, 0);
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(4);
+    STREAM(7, 1, 0);
     skin_model_free(&bad);
     spec = SKIN_ADJACENT;
     spec.wrong_golden = 1;
@@ -149,19 +142,18 @@ TEST(test_refused)
 TEST(test_memory)
 {
     start_with_adjacent();
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(4);
+    STREAM(7, 1, 0);
     skin_spec spec = SKIN_ADJACENT;
     spec.rank = 60;
     spec.side = 16;
     skin_model big = skin_model_make(&spec);
     eits_model model;
-    CHECK_EQUAL(eits_model_open(&model, big.blob, big.size), EITS_OK);
-    CHECK_EQUAL(host_upload(&b.host, big.blob, big.size, big.crc, 4096).status, EITS_REPLY_OK);
+    CHECK_OK(eits_model_open(&model, big.blob, big.size));
+    TAKEN(host_upload(&b.host, big.blob, big.size, big.crc, 4096));
     const size_t needs = fw_engine_needs(&model);
     CHECK(needs < FAKE_WORKSPACE);
-    CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096).status,
-                EITS_REPLY_OK);
+    TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096));
     for (int fits = 1; fits >= 0; --fits) {
         b.board.board.workspace_bytes = (needs + 15) / 16 * 16 - (fits ? 0 : 16);
         bench_restart(&b);
@@ -169,9 +161,7 @@ TEST(test_memory)
         CHECK_EQUAL(reply.status, fits ? EITS_REPLY_OK : EITS_REPLY_MODEL_SIZE);
         CHECK_EQUAL(host_info(&b.host).rank, fits ? 60 : 24);
         if (fits)
-            CHECK_EQUAL(
-                host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096).status,
-                EITS_REPLY_OK);
+            TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096));
         else
             CHECK_EQUAL(reply.detail[0], (long long)b.board.board.workspace_bytes);
     }
@@ -191,8 +181,8 @@ TEST(test_offsets)
 {
     start_with_adjacent();
     const uint32_t size = (uint32_t)opposite.size;
-    CHECK_EQUAL(begin_with(size, opposite.crc).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 1000).status, EITS_REPLY_OK);
+    TAKEN(begin_with(size, opposite.crc));
+    TAKEN(host_model_data(&b.host, 0, opposite.blob, 1000));
     eits_packet_reply reply = host_model_data(&b.host, 0, opposite.blob, 1000);
     CHECK_EQUAL(reply.status, EITS_REPLY_OFFSET);
     CHECK_EQUAL(reply.detail[0], 1000);
@@ -214,26 +204,25 @@ TEST(test_offsets)
     CHECK_EQUAL(b.host.instrument.scan.running, 0);
     host_run(&b.host, 1500);
     CHECK_EQUAL(b.host.instrument.scan.running, 1);
-    CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
+    TARE(1);
     reply = begin_with(size, opposite.crc);
-    CHECK_EQUAL(reply.status, EITS_REPLY_OK);
+    TAKEN(reply);
     CHECK_EQUAL(reply.detail[0], 1000);
     CHECK_EQUAL(b.board.erases, 1);
-    CHECK_EQUAL(host_upload(&b.host, opposite.blob, size, opposite.crc, 3000).status,
-                EITS_REPLY_OK);
+    TAKEN(host_upload(&b.host, opposite.blob, size, opposite.crc, 3000));
     CHECK_EQUAL(b.board.erases, 1);
     CHECK_EQUAL(b.board.rewrites, 0);
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
     /* another announcement starts over */
-    CHECK_EQUAL(begin_with(size, opposite.crc).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 1000).status, EITS_REPLY_OK);
+    TAKEN(begin_with(size, opposite.crc));
+    TAKEN(host_model_data(&b.host, 0, opposite.blob, 1000));
     reply = begin_with(size, opposite.crc ^ 1);
     CHECK_EQUAL(reply.detail[0], 0);
     CHECK_EQUAL(b.board.erases, 3);
-    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(begin_with(100, 7).status, EITS_REPLY_OK);
+    TAKEN(host_model_data(&b.host, 0, opposite.blob, 4));
+    TAKEN(begin_with(100, 7));
     CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 104).status, EITS_REPLY_RANGE);
-    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 100).status, EITS_REPLY_OK);
+    TAKEN(host_model_data(&b.host, 0, opposite.blob, 100));
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_MODEL_COMMIT).status, EITS_REPLY_MODEL_CRC);
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
 }
@@ -246,8 +235,7 @@ TEST(test_odd_end)
     memcpy(longer, opposite.blob, opposite.size);
     memset(longer + opposite.size, 0x5A, 3); /* bytes behind the model are not its own */
     const size_t size = opposite.size + 3;
-    CHECK_EQUAL(host_upload(&b.host, longer, size, eits_crc32(0, longer, size), 4096).status,
-                EITS_REPLY_OK);
+    TAKEN(host_upload(&b.host, longer, size, eits_crc32(0, longer, size), 4096));
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
     CHECK_EQUAL(host_info(&b.host).model_bytes, (long long)size);
     CHECK_EQUAL(b.board.bank[1][size], 0xFF);
@@ -258,14 +246,14 @@ TEST(test_odd_end)
 TEST(test_flash_fails)
 {
     start_with_adjacent();
-    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    TARE(4);
+    STREAM(7, 1, 0);
     b.board.erase_status = FW_E_FLASH;
     CHECK_EQUAL(begin_with((uint32_t)opposite.size, opposite.crc).status, EITS_REPLY_FLASH);
     still_adjacent(1);
     b.board.erase_status = FW_OK;
-    CHECK_EQUAL(begin_with((uint32_t)opposite.size, opposite.crc).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 400).status, EITS_REPLY_OK);
+    TAKEN(begin_with((uint32_t)opposite.size, opposite.crc));
+    TAKEN(host_model_data(&b.host, 0, opposite.blob, 400));
     b.board.program_status = FW_E_FLASH;
     const eits_packet_reply reply = host_model_data(&b.host, 400, opposite.blob + 400, 400);
     CHECK_EQUAL(reply.status, EITS_REPLY_FLASH);
@@ -277,8 +265,7 @@ TEST(test_flash_fails)
     CHECK_EQUAL(late.status, EITS_REPLY_OFFSET);
     CHECK_EQUAL(late.detail[0], -1);
     still_adjacent(1);
-    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status,
-                EITS_REPLY_OK);
+    TAKEN(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096));
     CHECK_EQUAL(b.board.rewrites, 0);
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
 }
@@ -292,5 +279,6 @@ int main(void)
     test_upload(52);
     skin_model_free(&adjacent);
     skin_model_free(&opposite);
+    bench_stop(&b);
     return checks_report("store");
 }
