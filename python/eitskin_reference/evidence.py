@@ -95,11 +95,12 @@ class Tested:
 @dataclass(eq=False)
 class Budget:
     """The columns that a frame's test has ``made``, of at most ``most`` in what is being tried and
-    ``all`` at last (0: any number); ``spent``: more were wanted."""
+    ``all`` at last (0: any number), those ``kept`` instead; ``spent``: more were wanted."""
 
     most: int
     all: int
     made: int = 0
+    kept: int = 0
     spent: bool = False
 
     def allows(self, columns: int) -> bool:
@@ -279,6 +280,7 @@ class Hypothesis:
         known = PLACE * len(answer.discs) if self.places_made and answer.parameters > PLACE else 0
         self.places_made = False
         self.budget.made += len(columns) - known
+        self.budget.kept += known
         left, off = self.data - answer.parts().ravel() @ columns, answer.offsets().ravel()
         precision = np.tile(PRECISION[: answer.parameters], len(answer.discs))
         here = float(left @ left) + answer.prior()
@@ -647,6 +649,7 @@ def keep_likely(fit: Fit, errors: DataErrors) -> Tested | None:
             if not whole or drifted.evidence < best.evidence:
                 best = drifted
     budget.most = min(budget.all or SPLIT_COLUMNS, SPLIT_COLUMNS)
+    budget.made += budget.kept
     while best.take_split():
         pass
     count = len(best.answer.discs)

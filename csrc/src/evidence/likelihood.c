@@ -144,6 +144,7 @@ uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const ei
     out->at_hand = 1;
     ctx->evidence.places_made = 0;
     ctx->evidence.columns_made += n - known * answer->count;
+    ctx->evidence.columns_kept += known * answer->count;
     if (extends)
         make_room(ctx, answer);
     eits_copy(ctx->evidence.left, ctx->evidence.data, stride);

@@ -133,6 +133,8 @@ static void split(eits_context *ctx, const eits_scratch *scratch, const eits_fit
                    most = all == 0 || all > EITS_SPLIT_COLUMNS ? EITS_SPLIT_COLUMNS : all;
     (void)take_errors(ctx, scratch, f, v, v->drift, macs); /* as before */
     ctx->evidence.columns_most = most;
+    /* what was saved is not for splits: long touches would be tried as two that are one */
+    ctx->evidence.columns_made += ctx->evidence.columns_kept;
     while (k < v->answer.count && take_split(ctx, scratch, v, k, macs))
         k = likeliest_pair(ctx, v);
 }
@@ -175,7 +177,7 @@ static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, ei
 
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
-    ctx->evidence.columns_made = ctx->evidence.spent = 0;
+    ctx->evidence.columns_made = ctx->evidence.columns_kept = ctx->evidence.spent = 0;
     ctx->evidence.columns_most = columns_without_drift(ctx, f);
     if (f->count == 0)
         return;
