@@ -33,10 +33,8 @@ def rated(
     ``tared`` how places are corrected by that, None where they are not."""
     x, y = PLACE_APART * np.clip(tested.apart_mm, -MAX_MOVE * pixel_mm, MAX_MOVE * pixel_mm).T
     least = pixel_mm**2 * PLACE_MIN
-    if tared is None:
-        least += pixel_mm**2 * PLACE_DISTANCE * distance
-    else:
-        least += PLACE_GEOMETRY * tared.left_mm2
+    trust, left = (0.0, 0.0) if tared is None else (tared.trust, PLACE_GEOMETRY * tared.left_mm2)
+    least += trust * left + (1 - trust) * pixel_mm**2 * PLACE_DISTANCE * distance
     place = PLACE_FACTOR * tested.place_mm2 + np.column_stack([x * x + least, x * y, y * y + least])
     return tested.rise / (tested.rise + CONFIDENCE_HALF), place
 

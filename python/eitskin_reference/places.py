@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from eitskin.fem.grid import Grid
 from eitskin.model.model_errors import ModelErrors
-from eitskin_reference.constants_table import MAX_SHIFT
+from eitskin_reference.constants_table import MAX_SHIFT, ROW_SPREAD
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -15,11 +15,12 @@ FloatArray = npt.NDArray[np.float64]
 @dataclass(frozen=True, eq=False)
 class Corrected:
     """``left_mm2``: what the variance of a place grows by; ``shift_mm`` (2, t): the polynomials
-    that take places back to where touches lie."""
+    that take places back to where touches lie; ``trust``: how much of it, 0 to 1."""
 
     grid: Grid
     left_mm2: float
     shift_mm: FloatArray
+    trust: float
 
     def on_skin(self, x_mm: float, y_mm: float) -> tuple[float, float]:
         """Where a touch lies that the modelled skin has there."""
@@ -40,4 +41,7 @@ def corrected(grid: Grid, errors: ModelErrors, log_gains: FloatArray) -> Correct
     known = np.nan_to_num(log_gains)
     left = errors.places.left.astype(np.float64) @ known
     shift = errors.places.moves @ (errors.places.seen.astype(np.float64) @ known)
-    return Corrected(grid, float(left @ left), shift)
+    outside = errors.places.rest.astype(np.float64) @ known
+    limit = ROW_SPREAD**2 * len(outside)
+    trust = (limit / (limit + float(outside @ outside))) ** 2 if len(outside) else 1.0
+    return Corrected(grid, float(left @ left), trust * shift, trust)

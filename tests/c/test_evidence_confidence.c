@@ -70,11 +70,14 @@ TEST(places_widen_by_what_their_correction_leaves)
     told.uncertainty.move_terms = 1;
     ctx->model = &told;
     ctx->reference.row_gains = 1;
+    ctx->reference.place_trust = R(0.75);
     ctx->reference.distance = R(0.25);
     ctx->reference.place_mm2 = 2;
     const double pixel = (double)told.pixel_mm, floor = pixel * pixel * (double)EITS_PLACE_MIN,
                  own = (double)EITS_PLACE_FACTOR * (double)PLACE[0] + floor;
-    CHECK_NEAR(rated(100, 1, PLACE, 0, 0).place_mm2[0][0], own + 2 * (double)EITS_PLACE_GEOMETRY,
+    CHECK_NEAR(rated(100, 1, PLACE, 0, 0).place_mm2[0][0],
+               own + 0.75 * 2 * (double)EITS_PLACE_GEOMETRY +
+                   0.25 * pixel * pixel * (double)EITS_PLACE_DISTANCE * 0.25,
                1e-5);
     ctx->reference.row_gains = 0;
     CHECK_NEAR(rated(100, 1, PLACE, 0, 0).place_mm2[0][0],

@@ -40,11 +40,12 @@ static small_model with_places(int geom)
 }
 
 /* Fold k's numbers of M are .2 and -.1 k; number i of U is i - 7.5. */
-static small_model with_moves(int geom, uint32_t rows, uint32_t terms, uint32_t size)
+static small_model with_moves(int geom, uint32_t rows, uint32_t terms, uint32_t rest, uint32_t size)
 {
     static uint8_t moves[HEAD + ROWS * 4 * SMALL_FOLDED + 17 * TERM];
     small_put_u32(moves, rows);
     small_put_u32(moves + 4, terms);
+    small_put_u32(moves + 8, rest);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         small_put_f32(moves + HEAD + 8 * k, 0.2f);
         small_put_f32(moves + HEAD + 8 * k + 4, -0.1f * (float)k);
@@ -57,7 +58,7 @@ static small_model with_moves(int geom, uint32_t rows, uint32_t terms, uint32_t 
 
 static small_model with_terms(uint32_t terms)
 {
-    return with_moves(1, ROWS, terms, FOLDS + terms * TERM);
+    return with_moves(1, ROWS, terms, 0, FOLDS + terms * TERM);
 }
 
 static eits_status opens(small_model made, eits_model *model)
@@ -87,22 +88,25 @@ TEST(moves_of_another_size_without_places_or_out_of_range_are_refused)
 {
     const float odd[] = {2e6f, -2e6f, (float)NAN};
     const struct {
-        uint32_t rows, terms, size;
-    } of_size[] = {{ROWS, 3, 0},
-                   {ROWS, 3, HEAD - 4},
-                   {ROWS, 3, HEAD},
-                   {ROWS, 3, FOLDS + 3 * TERM - 4},
-                   {ROWS, 3, FOLDS + 3 * TERM + 4},
-                   {0, 3, HEAD},
-                   {ROWS + 1, 3, FOLDS + 3 * TERM},
-                   {EITS_MAX_PLACE_ROWS + 1, 3, FOLDS + 3 * TERM},
-                   {0x80000000u, 3, FOLDS + 3 * TERM}};
+        uint32_t rows, terms, rest, size;
+    } of_size[] = {{ROWS, 3, 0, 0},
+                   {ROWS, 3, 0, HEAD - 4},
+                   {ROWS, 3, 0, HEAD},
+                   {ROWS, 3, 0, FOLDS + 3 * TERM - 4},
+                   {ROWS, 3, 0, FOLDS + 3 * TERM + 4},
+                   {0, 3, 0, HEAD},
+                   {ROWS + 1, 3, 0, FOLDS + 3 * TERM},
+                   {EITS_MAX_PLACE_ROWS + 1, 3, 0, FOLDS + 3 * TERM},
+                   {0x80000000u, 3, 0, FOLDS + 3 * TERM},
+                   {ROWS, 3, 1, FOLDS + 3 * TERM},
+                   {ROWS, 3, EITS_MAX_PLACE_ROWS + 1, FOLDS + 3 * TERM}};
     eits_model model;
     for (size_t k = 0; k < sizeof of_size / sizeof of_size[0]; ++k)
-        CHECK_EQUAL(
-            opens(with_moves(1, of_size[k].rows, of_size[k].terms, of_size[k].size), &model),
-            EITS_E_MODEL_SECTION);
-    CHECK_EQUAL(opens(with_moves(0, ROWS, 1, FOLDS + TERM), &model), EITS_E_MODEL_VALUE);
+        CHECK_EQUAL(opens(with_moves(1, of_size[k].rows, of_size[k].terms, of_size[k].rest,
+                                     of_size[k].size),
+                          &model),
+                    EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(opens(with_moves(0, ROWS, 1, 0, FOLDS + TERM), &model), EITS_E_MODEL_VALUE);
     for (int k = 0; k < 3; ++k) {
         small_model made = with_terms(3);
         uint32_t size;
@@ -203,6 +207,32 @@ TEST(a_shift_is_at_most_some_pixels_and_none_without_row_gains)
     CHANGE_OPTIONS(c.ctx, o.row_gains = 1);
     take_reference(&c, 0.9, z); /* so far is an instrument */
     CHECK(!eits_corrects_places(c.ctx));
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+/* B has one row: fold 0 alone. */
+TEST(rows_with_gains_of_their_own_are_corrected_less)
+{
+    small_model made = with_moves(1, ROWS, 1, 1, FOLDS + TERM + 4 * SMALL_FOLDED);
+    uint32_t size;
+    float *row = (float *)(void *)(small_model_section(&made, "MOVE", &size) + FOLDS + TERM);
+    memset(row, 0, 4 * SMALL_FOLDED);
+    row[0] = 1;
+    small_model_seal(&made);
+    small_context c;
+    small_context_open(&c, &made, 0);
+    const double of[] = {0, 0.03, 0.1};
+    for (int k = 0; k < 3; ++k) {
+        eits_place_sums sums = {{2, 0}, {3, 0}, {0}};
+        eits_add_log_gain(&c.model, 0, (eits_real)of[k], &sums);
+        const double spread = (double)EITS_ROW_SPREAD,
+                     trust = pow(spread * spread / (spread * spread + of[k] * of[k]), 2);
+        eits_learn_places(c.ctx, &sums);
+        CHECK_NEAR(c.ctx->reference.place_trust, trust, 1e-6);
+        CHECK_NEAR(c.ctx->reference.shift_mm[0][0], -7.5 * (3 + 0.2 * of[k]) * trust, 1e-4);
+        CHECK_NEAR(c.ctx->reference.place_mm2, pow(2 + 0.2 * of[k], 2), 1e-5);
+    }
     small_context_close(&c);
     small_model_free(&made);
 }

@@ -186,10 +186,11 @@ typedef struct eits_uncertainty {
     /* M, n_folded x move_rows, fold by fold, mm, and U, 2 x move_terms x move_rows, first along x,
      * then y: such a skin has a touch found off by the polynomial with coefficients U M'y, terms 1,
      * x, y, x^2, x y, y^2 ... with x and y from the grid's middle over half its longer side
-     * (section MOVE); NULL: not known */
-    const float *moved, *moves;
-    uint32_t move_rows;  /* at most EITS_MAX_PLACE_ROWS */
-    uint32_t move_terms; /* 1, 3, 6, 10 or EITS_MAX_MOVE_TERMS; 0: none */
+     * (section MOVE); NULL: not known. And of y what no such skin has, n_folded x rest_rows: what
+     * is there all the same is of rows with gains of their own */
+    const float *moved, *moves, *rest;
+    uint32_t move_rows, rest_rows; /* at most EITS_MAX_PLACE_ROWS */
+    uint32_t move_terms;           /* 1, 3, 6, 10 or EITS_MAX_MOVE_TERMS; 0: none */
 } eits_uncertainty;
 
 /* An open model. All pointers go into the blob; a caller reads it and never writes it. */

@@ -44,6 +44,7 @@ typedef struct eits_reference {
     /* what the variance of a place grows by for what v0 tells of electrodes and outline, mm^2; 0
      * where the model does not say */
     eits_real place_mm2;
+    eits_real place_trust; /* how much of what moves places is taken back, 0 to 1 */
     /* mm, along x and y: what takes places back to where touches lie, by terms (frame/places.c) */
     eits_real shift_mm[2][EITS_MAX_MOVE_TERMS];
     uint32_t row_gains; /* 1: in force */

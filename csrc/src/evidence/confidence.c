@@ -33,9 +33,10 @@ static eits_real variance_of_all(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
     const eits_real pixel = (eits_real)ctx->model->pixel_mm;
-    if (!eits_corrects_places(ctx))
-        return pixel * pixel * eits_fma(EITS_PLACE_DISTANCE, b->distance, EITS_PLACE_MIN);
-    return eits_fma(EITS_PLACE_GEOMETRY, b->place_mm2, pixel * pixel * EITS_PLACE_MIN);
+    const eits_real floor = pixel * pixel * EITS_PLACE_MIN,
+                    trust = eits_corrects_places(ctx) ? b->place_trust : 0,
+                    stays = pixel * pixel * EITS_PLACE_DISTANCE * b->distance;
+    return floor + eits_fma(trust, EITS_PLACE_GEOMETRY * b->place_mm2 - stays, stays);
 }
 
 void eits_rate_touches(const eits_context *ctx, eits_fit *f)

@@ -44,9 +44,9 @@
 
 /* ---- Chosen: on the tuning family of the worlds (seeds 41 and 42, 100 scenes of each of seven
  * sets): with 40 or 60 as a minimum 3 to 4 of 200 frames of five discs 2.5 radii apart are lost,
- * with 80 none; of 1200 of ellipses and fingers (seeds 21 and 22, two hundred of each) 2 are lost
- * and 2 won against any number; the board's worst of 180 frames (seed 1) then has 4.9 million
- * instructions. Check: eitskin bench worlds */
+ * with 80 none; of 1200 of 200 frames of ellipses (seeds 21 and 22) one more is wrong than with 200
+ * columns, of 200 of fingers one less; the board's worst of 180 frames (seed 1) then has 4.9
+ * million instructions. Check: eitskin bench worlds */
 
 /* of test_columns, that a sheet may be tested with that does not look drifted, less the moves that
  * the fit has made [columns]. larger: costs; smaller: shapes become touches, and more frames are

@@ -27,6 +27,10 @@
  * as MAX_DISTANCE */
 #define EITS_MAX_RECIPROCITY R(0.1)
 
+/* with gains of rows' own that differ by so much places are corrected by a quarter [rms log ratio].
+ * larger: an instrument's gains move touches; smaller: misplaced electrodes do */
+#define EITS_ROW_SPREAD R(0.03)
+
 /* a place is corrected by at most this along x and y [pixels]. larger: an instrument that differs
  * moves touches; smaller: misplaced electrodes do */
 #define EITS_MAX_SHIFT R(1.0)

@@ -8,8 +8,9 @@
  *     sum_t T_t(x, y) sum_j U_tj z_j,    T_t = 1, x, y, x^2, x y, y^2, ...
  *
  * along either axis, x and y from the grid's middle over half its longer side. That is taken back;
- * |N'y|^2 is the variance of what it leaves. python/eitskin/model/tare_places.py has the formulas.
- */
+ * |N'y|^2 is the variance of what it leaves. Directions of y that no such skin has tell how much of
+ * it is of rows with gains of their own: the more, the less is taken back.
+ * python/eitskin/model/tare_places.py has the formulas. */
 #include "frame/reference.h"
 
 #include "base/vec.h"
@@ -19,11 +20,27 @@ void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
                        eits_place_sums *sums)
 {
     const eits_uncertainty *u = &model->uncertainty;
-    const size_t place = (size_t)u->place_rows * k, move = (size_t)u->move_rows * k;
+    const size_t place = (size_t)u->place_rows * k, move = (size_t)u->move_rows * k,
+                 rest = (size_t)u->rest_rows * k;
     for (uint32_t j = 0; j < u->place_rows; ++j)
         sums->place[j] = eits_fma((eits_real)u->places[place + j], log_gain, sums->place[j]);
     for (uint32_t j = 0; j < u->move_rows; ++j)
         sums->move[j] = eits_fma((eits_real)u->moved[move + j], log_gain, sums->move[j]);
+    for (uint32_t j = 0; j < u->rest_rows; ++j)
+        sums->rest[j] = eits_fma((eits_real)u->rest[rest + j], log_gain, sums->rest[j]);
+}
+
+/* How far to trust the correction: rows with gains of their own look like electrodes elsewhere,
+ * too.
+ */
+static eits_real trust(const eits_uncertainty *u, const eits_real *rest)
+{
+    eits_real square = 0;
+    for (uint32_t j = 0; j < u->rest_rows; ++j)
+        square = eits_fma(rest[j], rest[j], square);
+    const eits_real limit = EITS_ROW_SPREAD * EITS_ROW_SPREAD * (eits_real)u->rest_rows;
+    const eits_real part = u->rest_rows > 0 ? limit / (limit + square) : 1;
+    return part * part;
 }
 
 void eits_learn_places(eits_context *ctx, const eits_place_sums *sums)
@@ -31,6 +48,7 @@ void eits_learn_places(eits_context *ctx, const eits_place_sums *sums)
     const eits_uncertainty *u = &ctx->model->uncertainty;
     eits_reference *b = &ctx->reference;
     b->place_mm2 = 0;
+    b->place_trust = trust(u, sums->rest);
     for (uint32_t j = 0; j < u->place_rows; ++j)
         b->place_mm2 = eits_fma(sums->place[j], sums->place[j], b->place_mm2);
     for (uint32_t axis = 0; axis < 2; ++axis) {
@@ -39,7 +57,8 @@ void eits_learn_places(eits_context *ctx, const eits_place_sums *sums)
             eits_real shift = 0;
             for (uint32_t j = 0; j < u->move_rows; ++j)
                 shift = eits_fma((eits_real)row[j], sums->move[j], shift);
-            b->shift_mm[axis][t] = shift; /* the gains' logarithms are -y: it takes back */
+            /* the gains' logarithms are -y: it takes back */
+            b->shift_mm[axis][t] = b->place_trust * shift;
         }
     }
 }

@@ -39,9 +39,9 @@ void eits_take_second_frame(eits_context *ctx);
 
 /* ---- places.c ---- */
 
-/* -N'y and -M'y (model.h, eits_uncertainty). */
+/* -N'y, -M'y and minus the rest of y (model.h, eits_uncertainty). */
 typedef struct eits_place_sums {
-    eits_real place[EITS_MAX_PLACE_ROWS], move[EITS_MAX_PLACE_ROWS];
+    eits_real place[EITS_MAX_PLACE_ROWS], move[EITS_MAX_PLACE_ROWS], rest[EITS_MAX_PLACE_ROWS];
 } eits_place_sums;
 
 /* Add what fold k's logarithm of its gain makes of them. */

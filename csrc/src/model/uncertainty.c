@@ -71,8 +71,8 @@ eits_status eits_read_places(eits_model *model, const eits_section *section)
     return EITS_OK;
 }
 
-/* Section MOVE: rows and terms, so many numbers for each fold, and for either axis and each term.
- */
+/* Section MOVE: rows, terms, rows of the rest; so many numbers for each fold, for either axis and
+ * each term, and for each fold. */
 eits_status eits_read_moves(eits_model *model, const eits_section *section)
 {
     uint32_t head[4];
@@ -81,18 +81,20 @@ eits_status eits_read_moves(eits_model *model, const eits_section *section)
     if (section->size < sizeof head)
         return EITS_E_MODEL_SECTION;
     memcpy(head, section->data, sizeof head);
-    const uint32_t rows = head[0], terms = head[1];
+    const uint32_t rows = head[0], terms = head[1], rest = head[2], folds = model->n_folded;
     const float *values = (const float *)(const void *)(section->data + sizeof head);
-    if (rows == 0 || rows > EITS_MAX_PLACE_ROWS ||
+    if (rows == 0 || rows > EITS_MAX_PLACE_ROWS || rest > EITS_MAX_PLACE_ROWS ||
         (terms != 1 && terms != 3 && terms != 6 && terms != 10 && terms != EITS_MAX_MOVE_TERMS) ||
-        section->size != sizeof head + 4u * rows * (model->n_folded + 2u * terms))
+        section->size != sizeof head + 4u * (rows * (folds + 2u * terms) + rest * folds))
         return EITS_E_MODEL_SECTION;
-    if (!are_places(values, rows * (model->n_folded + 2u * terms)) ||
+    if (!are_places(values, rows * (folds + 2u * terms) + rest * folds) ||
         model->uncertainty.places == NULL)
         return EITS_E_MODEL_VALUE;
     model->uncertainty.moved = values;
-    model->uncertainty.moves = values + (size_t)rows * model->n_folded;
+    model->uncertainty.moves = values + (size_t)rows * folds;
+    model->uncertainty.rest = model->uncertainty.moves + (size_t)rows * 2u * terms;
     model->uncertainty.move_rows = rows;
+    model->uncertainty.rest_rows = rest;
     model->uncertainty.move_terms = terms;
     return EITS_OK;
 }

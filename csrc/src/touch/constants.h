@@ -124,8 +124,8 @@
 #define EITS_SPLIT_CROWD 4
 
 /* ---- Chosen: on the tuning family of the worlds (seeds 41 and 42, 100 scenes of each of seven
- * sets): no count changes from 140 on, but of twelve touches on a ring and one in the middle none
- * is left with 140, and eleven with 180. Check: eitskin bench worlds */
+ * sets): with 140 no more than one of 200 frames of eight discs is lost, but of twelve touches on a
+ * ring and one in the middle none is left, and eleven with 180. Check: eitskin bench worlds */
 
 /* after which no merge and no split is tried any more [steps of a disc]. larger: crowds cost more;
  * smaller: counts stay as the image's peaks say */

@@ -13,7 +13,7 @@ from eitskin.errors import ModelError
 Float32s = npt.NDArray[np.float32]
 
 HEAD = struct.Struct("<I3f")
-MOVE_HEAD = struct.Struct("<II8x")
+MOVE_HEAD = struct.Struct("<III4x")
 MAX_ROWS, MAX_MM = 32, 1e6
 MOVE_TERMS = (1, 3, 6, 10, 15)  # of polynomials in two coordinates up to the fourth degree
 ROW_GAINS = 1
@@ -25,20 +25,22 @@ NEGATIVE = 1e-5  # an eigenvalue below 0 by this part of the greatest is roundin
 class TarePlaces:
     """What a tare tells of places, by y = log(v0 / v_ref) over the k folds: ``left`` N (p, k), mm,
     |N y|^2 is what the variance of a place grows by; ``seen`` M (q, k) and ``moves`` U (2, t, q),
-    mm: along x and y a touch is found off by the polynomial with coefficients U M y."""
+    mm: along x and y a touch is found off by the polynomial with coefficients U M y; ``rest`` (r,
+    k) directions of y that no skin has, whatever its electrodes, outline and sheet."""
 
     left: Float32s
     seen: Float32s
     moves: Float32s
+    rest: Float32s
 
     def encode(self) -> dict[str, bytes]:
         """The sections GEOM and MOVE, rows fold by fold."""
-        left, seen, moves = (
+        left, seen, moves, rest = (
             np.ascontiguousarray(part).astype("<f4").tobytes()
-            for part in (self.left.T, self.seen.T, self.moves)
+            for part in (self.left.T, self.seen.T, self.moves, self.rest.T)
         )
-        head = MOVE_HEAD.pack(len(self.seen), self.moves.shape[1])
-        return {"GEOM": left, "MOVE": head + seen + moves}
+        head = MOVE_HEAD.pack(len(self.seen), self.moves.shape[1], len(self.rest))
+        return {"GEOM": left, "MOVE": head + seen + moves + rest}
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,14 +122,16 @@ def decode_places(geom: bytes, move: bytes, folds: int, where: str) -> TarePlace
     Raises:
         ModelError: one has another length than its counts ask for, or a number is out of range.
     """
-    rows, rest = divmod(len(geom), 4 * folds)
-    if rest or not 1 <= rows <= MAX_ROWS:
+    rows, over = divmod(len(geom), 4 * folds)
+    if over or not 1 <= rows <= MAX_ROWS:
         raise ModelError(_other_size(where, "GEOM"))
-    count, terms = MOVE_HEAD.unpack_from(move) if len(move) >= MOVE_HEAD.size else (0, 0)
+    headed = len(move) >= MOVE_HEAD.size
+    count, terms, rest = MOVE_HEAD.unpack_from(move) if headed else (0, 0, 0)
     if (
         not 1 <= count <= MAX_ROWS
         or terms not in MOVE_TERMS
-        or len(move) != MOVE_HEAD.size + 4 * count * (folds + 2 * terms)
+        or rest > MAX_ROWS
+        or len(move) != MOVE_HEAD.size + 4 * (count * (folds + 2 * terms) + rest * folds)
     ):
         raise ModelError(_other_size(where, "MOVE"))
     left = np.frombuffer(geom, dtype="<f4").reshape(folds, rows)
@@ -138,10 +142,12 @@ def decode_places(geom: bytes, move: bytes, folds: int, where: str) -> TarePlace
                 f"{where}: holds a number in section {name!r} that is out of range; build the model"
                 " again"
             )
+    seen, moves, outside = np.split(numbers, np.cumsum([folds * count, 2 * terms * count]))
     return TarePlaces(
         np.ascontiguousarray(left.T),
-        np.ascontiguousarray(numbers[: folds * count].reshape(folds, count).T),
-        numbers[folds * count :].reshape(2, terms, count),
+        np.ascontiguousarray(seen.reshape(folds, count).T),
+        moves.reshape(2, terms, count),
+        np.ascontiguousarray(outside.reshape(folds, rest).T),
     )
 
 

@@ -16,7 +16,8 @@ are from 0 on this skin. c^ is smaller than c, by r = V^-1 cov(c^) in the mean s
 is what the variance of a place grows by: n causes of a kind leave ``left`` when they are as great
 as V says. Of electrodes, which may all turn at once, that is what the regression leaves; the
 outline's harmonics are taken back whole, and the sheet's fields not at all. N and M, of which c^ is
-made, have the ROWS directions of y that tell most.
+made, have the ROWS directions of y that tell most; those that tell least, which no such skin has,
+show gains of single rows.
 """
 
 from dataclasses import dataclass
@@ -50,6 +51,7 @@ ROWS = 16  # more tells nothing more, 8 too little: on the tuning family of the 
 DEGREE = 4  # of 3, 4 and 5 the least that takes back what can be, on the tuning family, seed 21
 FIELDS = 80  # smooth fields of the sheet: what 20 leave looks like shifted electrodes
 MOVING = 12  # of them move touches; the others by less
+OUTSIDE = 0.1  # of ROUGH: what directions have of skins that are to tell rows' own gains
 ROUGH = 0.01  # rms of what the linearisation leaves of y
 SPACING = 0.2  # R: of the places that are looked at
 STEP = 0.01  # R: a shift or wave, for its derivatives
@@ -88,7 +90,14 @@ def tare_places(skins: RandomSkins) -> TarePlaces:
         np.asarray(told[:, None] * of_left @ inverse, dtype=np.float32),
         np.asarray(of_moves @ inverse, dtype=np.float32),
         np.asarray(shift @ of_moves.T, dtype=np.float32),
+        np.asarray(_outside((logs.T * variance) @ logs), dtype=np.float32),
     )
+
+
+def _outside(covariance: FloatArray) -> FloatArray:
+    """The ROWS directions (r, k) that ``covariance`` (k, k) has least of: hardly any."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors[:, :ROWS][:, values[:ROWS] < (OUTSIDE * ROUGH) ** 2].T)
 
 
 def _strongest(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -173,7 +173,7 @@ def test_what_the_tare_tells_of_places_is_read_as_written():
         np.random.default_rng(3),
         len(model.fold.first),
     )
-    shapes = ((3, folds), (2, folds), (2, 6, 2))
+    shapes = ((3, folds), (2, folds), (2, 6, 2), (4, folds))
     places = TarePlaces(*(draw.normal(size=shape).astype(np.float32) for shape in shapes))
     blob = encode_model(replace(model, model_errors=replace(bare, places=places)))
     assert HEADER.unpack_from(blob)[1:3] == (1, 10)
@@ -188,6 +188,11 @@ def test_what_the_tare_tells_of_places_is_read_as_written():
         ({"seen": places.seen[:, 1:]}, "section 'MOVE' of a size"),
         ({"seen": np.vstack([places.seen] * 17)}, "section 'MOVE' of a size"),
         ({"moves": places.moves[:, :5]}, "section 'MOVE' of a size"),
+        ({"rest": np.vstack([places.rest] * 9)}, "section 'MOVE' of a size"),
+        (
+            {"rest": places.rest + np.float32(np.inf)},
+            "a number in section 'MOVE' that is out of range",
+        ),
         ({"moves": places.moves * -2e6}, "a number in section 'MOVE' that is out of range"),
     ):
         wrong = replace(bare, places=replace(places, **change))
