@@ -154,11 +154,7 @@ def weights_of(force_n: FloatArray) -> FloatArray:
 
 
 def check_presses(presses: Presses) -> None:
-    """Refuse what cannot fix a law.
-
-    Raises:
-        FrameError: too few presses or weights, or weights too much alike.
-    """
+    """Refuse what cannot fix a law."""
     if len(presses) < MIN_PRESSES:
         raise FrameError(
             f"calibration: {len(presses)} presses are too few; record at least {MIN_PRESSES} that"
@@ -242,11 +238,7 @@ def _steepness(fitted: FittedLaw, force_n: FloatArray) -> float:
 
 
 def fit(presses: Presses, radius_mm: float, form: str, order: int) -> FittedLaw:
-    """One law and order to all ``presses``.
-
-    Raises:
-        MissingExtraError: scipy is not installed.
-    """
+    """One law and order to all ``presses``."""
     try:
         from scipy.optimize import least_squares
     except ImportError:

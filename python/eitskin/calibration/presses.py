@@ -50,11 +50,7 @@ def find_presses(
     where: str,
 ) -> tuple[Presses, list[str]]:
     """The presses of ``weights`` in ``frames``, whose frames are counted by ``numbers``; and a line
-    for each that shows no touch.
-
-    Raises:
-        FrameError: a press has no frame here, or the quiet frames cannot be used.
-    """
+    for each that shows no touch."""
     at = {number: k for k, number in enumerate(numbers)}
     reconstructor.tare(frames.reference_voltage_v)
     seen: list[tuple[float, float, float, float]] = []

@@ -18,11 +18,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the script.
-
-    Raises:
-        MissingExtraError: shtab is not installed.
-    """
+    """Print the script."""
     try:
         import shtab
     except ImportError:

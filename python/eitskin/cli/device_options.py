@@ -206,11 +206,7 @@ def read_mode(text: str) -> Stream:
 
 
 def read_scan(options: argparse.Namespace) -> ScanSettings:
-    """What is named of the scan.
-
-    Raises:
-        UsageError: every frame would be checked.
-    """
+    """What is named of the scan."""
     if options.reciprocal == 1:
         raise UsageError(
             "--reciprocal 1 would check every frame, which is a full scan; use --full, or at least"
@@ -239,11 +235,7 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
 
 def read_ignored(text: str | None) -> int | None:
     """The diagnostics that are left, bit k of ``core.diagnostics.DIAGNOSTICS``, without those in
-    "outlier,electrode-noisy" or "all"; None for None.
-
-    Raises:
-        UsageError: one is unknown.
-    """
+    "outlier,electrode-noisy" or "all"; None for None."""
     if text is None:
         return None
     names = [name.replace(" ", "-") for name in DIAGNOSTICS]
@@ -256,11 +248,7 @@ def read_ignored(text: str | None) -> int | None:
 
 
 def check_recording(path: Path | None, overwrite: bool) -> None:
-    """Refuse a recording that could not be written, before a device is opened.
-
-    Raises:
-        FileError: its folder is not there, or it exists and may not be written over.
-    """
+    """Refuse a recording that could not be written, before a device is opened."""
     refuse_unwritable(path)
     if path is not None and path.is_file() and not overwrite:
         raise FileError(

@@ -26,11 +26,7 @@ WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
 
 
 def load_core(width: str) -> Any:
-    """The compiled module of ``width`` ("float32" or "float64").
-
-    Raises:
-        UsageError: it was not built.
-    """
+    """The compiled module of ``width`` ("float32" or "float64")."""
     try:
         return importlib.import_module(f"eitskin.core.{WIDTHS[width]}")
     except ImportError as error:
@@ -116,11 +112,7 @@ class CoreEngine:
         return f"{text} (C core, status {int(status)})"
 
     def set_options(self, options: Options) -> None:
-        """Replace the options.
-
-        Raises:
-            UsageError: one is out of its range; the old ones stay.
-        """
+        """Replace the options."""
         values = asdict(options)
         try:
             values |= {name: known.index(values[name]) for name, known in CHOICES.items()}
@@ -207,11 +199,7 @@ class CoreEngine:
     def reconstruct(
         self, frame: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> Reconstruction:
-        """One frame (m,) volts to image and touches.
-
-        Raises:
-            FrameError: the frame cannot be used.
-        """
+        """One frame (m,) volts to image and touches."""
         if frame.shape != (self.n_rows,):
             raise FrameError(
                 f"frame: has shape {frame.shape}, but the model's protocol has {self.n_rows} rows"
@@ -251,11 +239,7 @@ class CoreEngine:
         self, frames: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> list[Reconstruction | FrameError]:
         """Frames (k, m) volts, each as after :meth:`forget`, in one call of C, which runs without
-        Python's lock; a frame that cannot be used gives its error, and the others are done.
-
-        Raises:
-            FrameError: frames of another length than the model's.
-        """
+        Python's lock; a frame that cannot be used gives its error, and the others are done."""
         if frames.ndim != 2 or frames.shape[1] != self.n_rows:
             raise FrameError(
                 f"frames: have shape {frames.shape}, but the model's protocol has {self.n_rows}"

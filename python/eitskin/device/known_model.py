@@ -60,11 +60,7 @@ def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> Know
 
 
 def scanned_protocol(info: BoardInfo, known: KnownModel | None, name: str) -> Protocol:
-    """The protocol that a board scans: its model's, or the usual one that has the same hash.
-
-    Raises:
-        DeviceError: it is none of the usual ones, and the model is not known.
-    """
+    """The protocol that a board scans: its model's, or the usual one that has the same hash."""
     if known is not None:
         return known.model.protocol
     for protocol in _usual(info.n_electrodes):

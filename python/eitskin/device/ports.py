@@ -61,11 +61,7 @@ def listing(found: list[Port]) -> str:
 
 
 def only_board() -> Port:
-    """The one port that is a board's.
-
-    Raises:
-        DeviceError: none is, or several are.
-    """
+    """The one port that is a board's."""
     found = ports()
     boards = [port for port in found if port.is_board]
     if len(boards) == 1:
@@ -166,11 +162,7 @@ class _NotNow(DeviceError):
 
 
 def open_port(path: str, baud: int) -> Any:
-    """A pyserial port.
-
-    Raises:
-        DeviceError: saying why not, and what to do.
-    """
+    """A pyserial port."""
     import serial
 
     try:

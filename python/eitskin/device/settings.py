@@ -59,11 +59,7 @@ class SolverSettings:
 
 
 def check_tare_frames(frames: int) -> int:
-    """``frames`` if a board can take its reference from so many.
-
-    Raises:
-        UsageError: it cannot.
-    """
+    """``frames`` if a board can take its reference from so many."""
     if frames != 1 and not 4 <= frames <= MAX_TARE:
         raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to {MAX_TARE}")
     return frames

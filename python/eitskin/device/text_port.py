@@ -205,11 +205,7 @@ class SocketLines:
 
 
 def open_port(path: str, baud: int) -> LinePort:
-    """The port behind ``path``.
-
-    Raises:
-        DeviceError, FileError, UsageError: it cannot be opened.
-    """
+    """The port behind ``path``."""
     if path.startswith(TCP):
         return SocketLines(path)
     if path == "-":

@@ -25,11 +25,7 @@ class Timing:
 
 def split_timing(url: str) -> tuple[str, Timing]:
     """A device's URL without what follows '?', and what that says. Of other schemes than sim, emu
-    and file the URL stays as it is.
-
-    Raises:
-        UsageError: it says something else than speed and loop, or a number cannot be.
-    """
+    and file the URL stays as it is."""
     scheme, _, _ = url.partition(":")
     bare, mark, query = url.rpartition("?")
     if scheme not in TIMED or not mark:
@@ -47,11 +43,7 @@ def split_timing(url: str) -> tuple[str, Timing]:
 
 
 def read_speed(text: str, where: str) -> float:
-    """The speed in "2", "0.5" or "max" (0).
-
-    Raises:
-        UsageError: it cannot be.
-    """
+    """The speed in "2", "0.5" or "max" (0)."""
     try:
         speed = 0.0 if text == "max" else float(text)
     except ValueError:

@@ -125,9 +125,6 @@ class ForwardModel:
 
         ``contact_impedance_ohm_m2`` replaces the model's for this call; changing which are 0 makes
         a new pattern.
-
-        Raises:
-            UsageError: a shape is wrong, or a value not finite and above 0 (impedances may be 0).
         """
         conductivity = self._checked_conductivity(conductivity_s_per_m)
         impedance = self._impedance

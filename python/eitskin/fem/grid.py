@@ -54,11 +54,7 @@ class Grid:
         return np.asarray(np.asarray(self.origin_mm) + (self.index + 0.5) * self.pixel_mm)
 
     def image(self, values: npt.ArrayLike) -> FloatArray:
-        """``values`` (n,) as an image (ny, nx), row 0 the lowest y, nan outside.
-
-        Raises:
-            UsageError: the number of values is not n.
-        """
+        """``values`` (n,) as an image (ny, nx), row 0 the lowest y, nan outside."""
         flat = np.asarray(values, dtype=np.float64)
         if flat.shape != (self.n_pixels,):
             raise UsageError(
@@ -70,11 +66,7 @@ class Grid:
         return picture
 
     def values(self, image: npt.ArrayLike) -> FloatArray:
-        """The kept pixels of an ``image`` (ny, nx), (n,): the inverse of ``image``.
-
-        Raises:
-            UsageError: the image's shape is not (ny, nx).
-        """
+        """The kept pixels of an ``image`` (ny, nx), (n,): the inverse of ``image``."""
         picture = np.asarray(image, dtype=np.float64)
         if picture.shape != (self.ny, self.nx):
             raise UsageError(
@@ -95,11 +87,7 @@ class Grid:
 
 def grid_for(outline: Outline, pixels_across: int = 32) -> Grid:
     """The grid with ``pixels_across`` pixels along the bounding box's longer side; the shorter
-    side's cover is centred.
-
-    Raises:
-        UsageError: ``pixels_across`` is not within 4 to 512.
-    """
+    side's cover is centred."""
     if not 4 <= pixels_across <= MAX_PIXELS_ACROSS:
         raise UsageError(
             f"grid: {pixels_across} pixels across is out of range; use 4 to {MAX_PIXELS_ACROSS}"

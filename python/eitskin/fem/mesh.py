@@ -131,12 +131,7 @@ def mesh_for_elements(skin: Skin, elements: int = 3000, *, timeout_s: float = 60
 
 def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[npt.NDArray[Any]]:
     """Run mesh_worker.py on ``request``, killing it after ``timeout_s``; returns its four arrays.
-    ``name``: the skin.
-
-    Raises:
-        GeometryError: it failed or was killed.
-        MissingExtraError: netgen is not installed.
-    """
+    ``name``: the skin."""
     if importlib.util.find_spec("netgen") is None:
         raise missing_extra("model", "netgen-mesher")
     package_root = str(Path(eitskin.__file__).parents[1])

@@ -52,9 +52,6 @@ def import_frames(
     ``n_electrodes``); ``skin`` gives numbering direction and prediction where known. An eitskin
     frames file may be repaired again. ``lenient`` is for examination: NaN and Inf pass, and where
     no quiet frames are named the first frame is taken.
-
-    Raises:
-        EitskinError: each of its kinds, for what cannot be read or does not fit.
     """
     if Path(path).suffix.lower() == ".mat":
         options, n_electrodes = with_eidors_defaults(path, options, protocol, n_electrodes)
@@ -151,11 +148,7 @@ def _check_protocol(path: str | Path, frames: Frames, protocol: Protocol | None)
 def accepted_counts(
     options: ImportOptions, protocol: Protocol | None
 ) -> tuple[tuple[int, ...], str]:
-    """How many rows a source frame may have, and the words that say why.
-
-    Raises:
-        UsageError: neither a protocol nor a table is given.
-    """
+    """How many rows a source frame may have, and the words that say why."""
     if options.source.protocol_table is not None:
         return (), "its table"
     if options.table is not None:

@@ -36,12 +36,7 @@ def source_rows(
     where: str,
 ) -> IntArray:
     """The rows [I+, I-, V+, V-] of a source in its own order, in our numbers, (rows, 4). ``own``:
-    the source's own table.
-
-    Raises:
-        FrameError: a table names electrodes that are not there, or is none.
-        UsageError: neither a protocol nor a table is given.
-    """
+    the source's own table."""
     given = table_rows(options)
     given = own if given is None else given
     if given is None:
@@ -62,11 +57,7 @@ def source_rows(
 
 
 def table_rows(options: ImportOptions) -> IntArray | None:
-    """The source's rows as the options themselves, or the file that they name, list them.
-
-    Raises:
-        FrameError: the file is no table of four columns of whole numbers.
-    """
+    """The source's rows as the options themselves, or the file that they name, list them."""
     if options.table is not None:
         return np.asarray(options.table, dtype=np.int64).reshape(-1, 4)
     if options.table_file is None:
@@ -102,11 +93,7 @@ class Placement:
 
 def place(options: ImportOptions, protocol: Protocol | None, model: Model, where: str) -> Placement:
     """How frames that stand as ``options`` say come to the rows of ``model``; ``protocol``: the
-    source's, None: the model's.
-
-    Raises:
-        EitskinError: the options are of files only, or the model has rows that the source has not.
-    """
+    source's, None: the model's."""
     if options.equalise:
         raise UsageError(
             f"{where}: equalise needs a whole file; take it out, or calibrate:  eitskin calibrate"

@@ -124,11 +124,7 @@ def read_source(
 
 def electrode_table(rows: NDArray[Any], base: int, where: str) -> IntArray:
     """A source's protocol table as (rows, 4) electrodes from 0; ``base`` is the source's number of
-    its first electrode.
-
-    Raises:
-        FrameError: it is not (rows, 4) whole numbers.
-    """
+    its first electrode."""
     table = np.asarray(rows)
     if (
         table.ndim != 2
@@ -144,11 +140,7 @@ def electrode_table(rows: NDArray[Any], base: int, where: str) -> IntArray:
 
 
 def refuse_nonfinite(raw: RawFrames, where: str) -> None:
-    """Refuse NaN and Inf.
-
-    Raises:
-        FrameError: naming the first such value.
-    """
+    """Refuse NaN and Inf."""
     for what, values in (("frames", raw.voltage), ("reference", raw.reference)):
         bad = np.argwhere(~np.isfinite(values)) if values is not None else np.zeros((0, 2))
         if values is not None and len(bad):

@@ -69,10 +69,6 @@ class Session:
         summary, score: what the frames amounted to so far.
         recorder: where every packet is recorded.
         pacer: holds what is simulated, emulated or recorded until it is due; not a real board.
-
-    Raises:
-        EitskinError: as ``open_device``; a setting cannot be, the board refuses it, or a recording
-            cannot be written.
     """
 
     def __init__(

@@ -77,11 +77,7 @@ def encode_load(law: LoadLaw) -> bytes:
 
 
 def decode_load(content: bytes, where: str) -> LoadLaw:
-    """The section LOAD; ``where`` names its file in errors.
-
-    Raises:
-        ModelError: a length or number is out of range.
-    """
+    """The section LOAD; ``where`` names its file in errors."""
     wrong = ModelError(
         f"{where}: holds a calibration (section 'LOAD') that is out of range; calibrate again"
     )

@@ -193,11 +193,7 @@ class Follower:
     # ---- commands, from any thread ----
 
     def live(self) -> PageSession:
-        """The session under way.
-
-        Raises:
-            DeviceError: there is none.
-        """
+        """The session under way."""
         session = self.session
         if session is None:
             raise DeviceError("nothing is being followed; press  Start again")
@@ -223,11 +219,7 @@ class Follower:
         return self._changed(session, action)
 
     def mode(self, kinds: list[str]) -> Future[str]:
-        """What is streamed.
-
-        Raises:
-            UsageError: nothing, or something unknown.
-        """
+        """What is streamed."""
         session = self.live()
         if not kinds or not set(kinds) <= set(KINDS):
             raise UsageError(f"mode: choose from {', '.join(KINDS)}")
@@ -256,11 +248,7 @@ class Follower:
         return self._changed(session, action)
 
     def preset(self, name: str) -> Future[str]:
-        """Scan and solver by name, and the reference for them.
-
-        Raises:
-            UsageError: there is none of that name.
-        """
+        """Scan and solver by name, and the reference for them."""
         session, target = self._board("a preset"), preset(name, "f767")
 
         def action(device: Device) -> str:
@@ -292,11 +280,7 @@ class Follower:
         return self._changed(session, action)
 
     def teach(self, what: str) -> Future[str] | str:
-        """ "back", "skip"; "fit": a thread of its own makes the model, then the board gets it.
-
-        Raises:
-            UsageError: nothing is taught here.
-        """
+        """ "back", "skip"; "fit": a thread of its own makes the model, then the board gets it."""
         teacher = self.teacher
         if teacher is None:
             raise UsageError("teach: start  eitskin view --teach PLAN.csv")
@@ -338,11 +322,7 @@ class Follower:
         return self._changed(session, action)
 
     def pace(self, what: str, speed: float | None = None) -> str:
-        """ "play", "pause", "step" or "speed".
-
-        Raises:
-            UsageError: it is a real board, whose time cannot be held.
-        """
+        """ "play", "pause", "step" or "speed"."""
         if what == "play" and self.session is None:
             self.again()
             return "starting again"

@@ -270,10 +270,6 @@ def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
 
     Steps before the first that varies are applied once, here; the others for each state, at the
     time of its frame.
-
-    Raises:
-        ConfigError: an effect leaves a conductivity that is not finite and above 0 (here, and from
-            the function).
     """
     scene, times, start = compiled.scene, compiled.times_s(), compiled.frames.start
     materials = [step for step in compiled.steps if isinstance(step, MaterialStep)]

@@ -116,11 +116,7 @@ MOST = {
 
 def law_from_table(table: Mapping[str, Any], name: str, where: str) -> Law:
     """The law called ``name`` with its parameters in ``table``; other keys of the table are not
-    looked at.
-
-    Raises:
-        ConfigError: a parameter is out of range, or belongs to another law.
-    """
+    looked at."""
     own = (*LAW_KEYS[name], DRIVING_KEY[name])
     for other, keys in LAW_KEYS.items():
         for key in (*keys, DRIVING_KEY[other]):

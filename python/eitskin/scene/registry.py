@@ -72,12 +72,7 @@ class Registry:
         return {**found, **self.modules}
 
     def load(self, name: str, where: str) -> EffectModule:
-        """Import the module of the effect ``name``; ``where`` names the scene in errors.
-
-        Raises:
-            ConfigError: no such effect, or its module cannot be imported or breaks the contract of
-                ``effect.py``.
-        """
+        """Import the module of the effect ``name``; ``where`` names the scene in errors."""
         target = self.modules.get(name) or self.names().get(name)
         if target is None:
             raise ConfigError(

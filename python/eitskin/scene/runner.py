@@ -48,11 +48,7 @@ def forward_of(compiled: Compiled, work: Work) -> Forward:
 
 class FrameMaker:
     """The frames of a compiled scene, each made when it is asked for; a state is solved when a
-    frame first needs it. The same values in whatever order.
-
-    Raises:
-        ConfigError: an effect makes a conductivity that cannot be (also from the methods).
-    """
+    frame first needs it. The same values in whatever order."""
 
     def __init__(self, compiled: Compiled) -> None:
         self.compiled, self.work = compiled, Work()
@@ -208,11 +204,7 @@ def run(
 
 
 def run_scene(scene: Scene) -> Frames:
-    """The frames of ``scene`` with their truth.
-
-    Raises:
-        ConfigError: as ``compile_scene`` and ``simulate_frames``.
-    """
+    """The frames of ``scene`` with their truth."""
     return run(compile_scene(scene))
 
 

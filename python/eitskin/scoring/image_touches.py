@@ -28,9 +28,6 @@ def touches_in_image(
         centres_mm: (n, 2) pixel centres.
         threshold: fraction t of the image's largest value.
         sign: -1 for resistive touches.
-
-    Raises:
-        MissingExtraError: scipy is absent.
     """
     try:
         from scipy.ndimage import label

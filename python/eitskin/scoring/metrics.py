@@ -52,11 +52,7 @@ class Raster:
 
 def raster_inside(region: Region, spacing_mm: float = RASTER_MM) -> Raster:
     """Square cells of ``spacing_mm`` over the bounding box; those whose centre is inside ``region``
-    are kept.
-
-    Raises:
-        UsageError: the spacing is not positive, or so coarse that no cell is inside.
-    """
+    are kept."""
     if not spacing_mm > 0:
         raise UsageError(f"raster spacing {spacing_mm!r} mm must be above 0; 1.5 is usual")
     x0, y0, x1, y1 = region.bounding_box_mm
@@ -129,9 +125,6 @@ def lookup_for(points_mm: FloatArray, grid: Grid, kind: str = LOOKUP) -> Lookup:
     "nearest" shows the nearest kept pixel. "bilinear" weights the up to four pixels whose centres
     surround the cell, leaving out those that are not kept (where none is, the nearest one is
     shown), as smooth pictures do.
-
-    Raises:
-        UsageError: ``kind`` is neither.
     """
     nearest = _nearest_pixels(points_mm, grid.centres_mm())
     if kind == "nearest":

@@ -93,8 +93,7 @@ class FoxgloveSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address`` and ``FoxgloveSink``; SinkError where the port is
-    taken."""
+    """See the module."""
     named = "foxglove://" if url == "foxglove:" else url
     parts, host, port = address(named, PORT, usage=USAGE)
     nothing_more(url, parts, USAGE)

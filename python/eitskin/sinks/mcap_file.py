@@ -71,7 +71,7 @@ class McapSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``new_file``; MissingExtraError where mcap is not installed."""
+    """See the module."""
     try:
         import mcap_ros2.writer  # noqa: F401
     except ImportError:

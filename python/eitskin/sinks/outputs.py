@@ -54,11 +54,7 @@ def open_sink(url: str, source: Source) -> Sink:
 class Outputs:
     """The sinks of ``urls``, open. ``patient``: the board runs only while it is asked and is not
     paced, so that a sink that is behind may be waited for, 2 s at most; else never. ``say`` gets a
-    line where one fails.
-
-    Raises:
-        EitskinError: one cannot be opened; the others are closed again.
-    """
+    line where one fails."""
 
     def __init__(
         self,

@@ -101,8 +101,7 @@ class TuioSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address``, ``connected`` and ``need_osc``; SinkError where the
-    skin's bounding box is not known."""
+    """See the module."""
     parts, host, port = address(url, PORT, usage=USAGE)
     nothing_more(url, parts, USAGE)
     need_osc("tuio")

@@ -25,18 +25,14 @@ class UdpSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address`` and ``connected``."""
+    """See the module."""
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE)
     return UdpSink(connected(url, host, port))
 
 
 def connected(url: str, host: str, port: int) -> socket.socket:
-    """A socket that sends datagrams there.
-
-    Raises:
-        SinkError: the host is not known.
-    """
+    """A socket that sends datagrams there."""
     try:
         kind, _, _, _, target = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         opened = socket.socket(kind, socket.SOCK_DGRAM)

@@ -107,7 +107,7 @@ class WebSocketSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address`` and ``WebSocketSink``."""
+    """See the module."""
     parts, host, port = address(url, None, usage=USAGE, lowest=0)
     nothing_more(url, parts, USAGE)
     return WebSocketSink(url, host, port)

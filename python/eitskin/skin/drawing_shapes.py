@@ -51,11 +51,7 @@ class TooManyPoints(Exception):
 
 
 def limited(shapes: Iterable[DrawnShape], where: str) -> list[DrawnShape]:
-    """All of them.
-
-    Raises:
-        ConfigError: they have over ``MAX_POINTS`` points.
-    """
+    """All of them."""
     found, points = [], 0
     try:
         for one in shapes:

@@ -51,11 +51,7 @@ class Page:
 
 
 def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
-    """Every shape of the SVG file ``content``.
-
-    Raises:
-        ConfigError: it is damaged, no SVG, too large, or of no known size.
-    """
+    """Every shape of the SVG file ``content``."""
     try:
         root = ET.fromstring(content)
     except (ET.ParseError, ValueError, LookupError) as error:

@@ -188,11 +188,7 @@ def skip(n: int, skip: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
 
 
 def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """A protocol of one's own: ``rows`` (m, 4) [I+, I-, V+, V-].
-
-    Raises:
-        ProtocolError: the rows are invalid, or more than two hold the same voltage.
-    """
+    """A protocol of one's own: ``rows`` (m, 4) [I+, I-, V+, V-]."""
     try:
         given = np.asarray(rows)
     except ValueError:
@@ -206,11 +202,7 @@ def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> 
 
 def in_order(protocol: Protocol, order: str | Iterable[int]) -> Protocol:
     """``protocol`` with its drives measured in ``order``: their numbers; or "by k", drive k j
-    modulo their count at place j.
-
-    Raises:
-        ProtocolError: it does not have each drive once.
-    """
+    modulo their count at place j."""
     if isinstance(order, str):
         drives = len(protocol.drive_starts)
         word, _, number = order.partition(" ")
@@ -226,12 +218,7 @@ def in_order(protocol: Protocol, order: str | Iterable[int]) -> Protocol:
 
 def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where: str) -> Protocol:
     """The protocol in a parsed TOML table; ``where`` names its source in errors. An empty table is
-    adjacent.
-
-    Raises:
-        ConfigError: an unknown key, a wrong type, or a key that does not go with the kind.
-        ProtocolError: the protocol cannot be.
-    """
+    adjacent."""
     check_keys(toml_table, ("kind", "skip", "table", "current_a", "order"), where)
     kind = choice(toml_table, "kind", "adjacent", KINDS, where)
     for key in ("skip", "table"):

@@ -25,11 +25,7 @@ T = TypeVar("T")
 
 
 def check_threads(threads: int | None) -> int:
-    """``threads``, or where it is None as many as this process may use.
-
-    Raises:
-        UsageError: out of range.
-    """
+    """``threads``, or where it is None as many as this process may use."""
     if threads is None:
         return min(
             (
@@ -85,11 +81,7 @@ class Batch:
 
     def tare(self, quiet_v: npt.ArrayLike) -> LearnedReference:
         """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
-        noise.
-
-        Raises:
-            FrameError: a frame cannot be used.
-        """
+        noise."""
         frames = np.atleast_2d(np.asarray(quiet_v, dtype=np.float64))
         if frames.ndim != 2 or frames.shape[1] != self._engines[0].n_rows or not len(frames):
             raise FrameError(
@@ -108,11 +100,7 @@ class Batch:
         self, frames_v: npt.ArrayLike, *, touches: bool = True
     ) -> Iterator[Reconstruction | FrameError]:
         """The results of frames (k, m) in V, in their order; for a frame that cannot be used, its
-        error. Ids count up from 1.
-
-        Raises:
-            FrameError: the frames are not (k, m) numbers.
-        """
+        error. Ids count up from 1."""
         frames = np.asarray(frames_v, dtype=np.float64)
         if frames.ndim != 2 or frames.shape[1] != self._engines[0].n_rows:
             raise FrameError(

@@ -110,11 +110,7 @@ def shifted_or_refused(
     found: Explained, skin: Skin | None, place_sd_mm: float, progress: Progress
 ) -> Explained:
     """``found`` explains nothing: the same with each press at a place some later or earlier, where
-    that does.
-
-    Raises:
-        FrameError: it does not either.
-    """
+    that does."""
     presses = found.presses
     few = presses.take(np.arange(min(len(presses), ENOUGH_FOR_SHIFT)))
     for by in shifts(presses):

@@ -57,11 +57,7 @@ UNITS = {
 
 
 def read_budget(text: str) -> Budget:
-    """A budget from "10ms", "800us", "600kMACs" or "2.5Minstructions".
-
-    Raises:
-        UsageError: it is none.
-    """
+    """A budget from "10ms", "800us", "600kMACs" or "2.5Minstructions"."""
     match = re.fullmatch(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?)\s*([A-Za-z]+)", text.strip())
     unit = None if match is None else match.group(2).lower()
     unit = unit if unit in UNITS or unit is None else f"{unit}s"
@@ -197,11 +193,7 @@ def _cell(cell: Any) -> dict[str, Any]:
 
 
 def front_from(values: Any, where: str) -> Front:
-    """Results from JSON values.
-
-    Raises:
-        ConfigError: they are none, or of another version.
-    """
+    """Results from JSON values."""
     try:
         if values["format"] != FORMAT or values["version"] != VERSION:
             raise KeyError("format")
@@ -222,12 +214,7 @@ def front_from(values: Any, where: str) -> Front:
 
 
 def load_front(path: Path | None = None) -> Front:
-    """The results in ``path``, or those that ship with the package.
-
-    Raises:
-        FileError: it cannot be read.
-        ConfigError: it holds no results.
-    """
+    """The results in ``path``, or those that ship with the package."""
     if path is not None:
         try:
             return front_from(parse_json(read_bytes(path, "results file")), str(path))
@@ -283,11 +270,7 @@ PRESETS = (*PRESET_ACCURACY, *PRESET_REPORT_MS)
 
 
 def preset(name: str, board: str, where: Conditions | None = None) -> Target:
-    """What the preset ``name`` asks for on ``board``.
-
-    Raises:
-        UsageError: there is none of that name.
-    """
+    """What the preset ``name`` asks for on ``board``."""
     if name not in PRESETS:
         raise UsageError(f"preset {name}: {nearest(name, PRESETS)}")
     ms = PRESET_REPORT_MS.get(name)
@@ -298,11 +281,7 @@ def preset(name: str, board: str, where: Conditions | None = None) -> Target:
 
 
 def check_wish(target: Target) -> Target:
-    """``target`` if it can be.
-
-    Raises:
-        UsageError: nothing is asked for, or a number is out of range.
-    """
+    """``target`` if it can be."""
     if target.budget is None and target.accuracy is None:
         raise UsageError(
             "name what to choose by:  --preset balanced,  --budget 10ms  or  --accuracy 0.86"
@@ -326,11 +305,7 @@ def check_wish(target: Target) -> Target:
 def choose(points: Iterable[Point], target: Target, what: str = "measured point") -> Point:
     """With a budget the most accurate point within it; with an accuracy the cheapest that reaches
     it; with both the cheapest that does both. Points that save on the fit of touches are left out.
-    ``what`` names the points in the refusal.
-
-    Raises:
-        UsageError: none does; the text says how near one comes.
-    """
+    ``what`` names the points in the refusal."""
     known = []
     for one in points:
         cost, accuracy = (

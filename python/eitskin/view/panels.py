@@ -80,11 +80,7 @@ class Page:
 def check_path(
     path: str | Path | None, formats: Sequence[str] = FORMATS, what: str = "picture"
 ) -> None:
-    """Refuse a picture's name that says no format, before anything is done for it.
-
-    Raises:
-        UsageError: naming the formats.
-    """
+    """Refuse a picture's name that says no format, before anything is done for it."""
     if path is not None and Path(path).suffix.lower() not in formats:
         suffix = Path(path).suffix
         said = f"{suffix!r} is no format of a {what}" if suffix else f"a {what} needs a suffix"

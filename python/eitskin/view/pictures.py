@@ -87,11 +87,7 @@ class Panel:
 
 
 def load_matplotlib() -> Any:
-    """matplotlib, set to draw without a display.
-
-    Raises:
-        MissingExtraError: it is not installed.
-    """
+    """matplotlib, set to draw without a display."""
     try:
         import matplotlib
         import matplotlib.backends.backend_agg

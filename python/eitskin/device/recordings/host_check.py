@@ -76,11 +76,7 @@ class HostCheck:
 
 
 class HostTwin:
-    """This host's core, kept in step with a board's; with ``board`` also touches after drives.
-
-    Raises:
-        UsageError: an option is out of range.
-    """
+    """This host's core, kept in step with a board's; with ``board`` also touches after drives."""
 
     def __init__(self, known: KnownModel, options: Options, board: BoardInfo | None = None) -> None:
         self._core = Reconstructor(known.model, blob=known.blob, options=options)

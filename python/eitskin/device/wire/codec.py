@@ -63,11 +63,7 @@ def _core() -> Any:
 
 
 def encode(packet_type: int, sequence: int, payload: bytes) -> bytes:
-    """The packet's bytes on the wire.
-
-    Raises:
-        DeviceError: the payload is longer than a packet may be.
-    """
+    """The packet's bytes on the wire."""
     module = _core()
     buffer = module.ffi.new("uint8_t[]", len(payload) + len(payload) // 254 + 32)
     size = module.lib.eits_link_encode(

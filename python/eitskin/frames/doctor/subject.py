@@ -67,9 +67,6 @@ def subject_from_source(
     ``load_frames`` reads it.
 
     Unlike import, NaN and Inf pass, and where no quiet frames are named the first frame is taken.
-
-    Raises:
-        EitskinError: as ``import_frames``.
     """
     if is_frames_file(path) and options == ImportOptions():
         return subject_from_frames(load_frames(path, allow_nonfinite=True), skin, str(path))

@@ -37,11 +37,7 @@ class Parameters:
 
 
 def make(parameters: Parameters, session: EffectSession) -> ContactStep:
-    """Adds the bridges.
-
-    Raises:
-        ConfigError: an electrode does not exist.
-    """
+    """Adds the bridges."""
     count = session.skin.electrodes.count
     for electrode in parameters.electrodes:
         if not 0 <= electrode < count:

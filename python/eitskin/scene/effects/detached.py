@@ -47,11 +47,7 @@ def is_off(time_s: float, parameters: Parameters) -> bool:
 
 
 def make(parameters: Parameters, session: EffectSession) -> ContactStep:
-    """Marks the electrodes while they are off.
-
-    Raises:
-        ConfigError: an electrode does not exist, or no row of the protocol is left.
-    """
+    """Marks the electrodes while they are off."""
     count = session.skin.electrodes.count
     for electrode in parameters.electrodes:
         if not 0 <= electrode < count:

@@ -46,11 +46,7 @@ def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
 
 
 def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
-    """The skin that is meshed.
-
-    Raises:
-        ConfigError: there is not one known shift for each electrode, or shifted electrodes overlap.
-    """
+    """The skin that is meshed."""
     count, spread, known = (
         session.skin.electrodes.count,
         parameters.spread_mm,
