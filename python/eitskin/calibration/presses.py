@@ -29,7 +29,6 @@ class Presses:
         return len(self.force_n)
 
     def take(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> "Presses":
-        """Some of them."""
         return Presses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
 
 

@@ -13,7 +13,6 @@ SCAN = ("samples", "full", "reciprocal")  # a preset chooses them, too
 
 
 def add_wish(parser: Any) -> None:
-    """Add them."""
     option(
         parser,
         "--preset",

@@ -27,7 +27,6 @@ SETTINGS = (  # bits of eits_setting, each with what sets and what clears it
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``board``."""
     parser.description = (
         "Show or change what a board's owner has set; the board keeps it over a loss of power."
         " A locked board takes changes only while its blue button is held."
@@ -48,7 +47,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Change what is named, and show all."""
     with open_named(options) as device:
         if options.clear_faults:
             device.clear_faults()

@@ -26,7 +26,6 @@ from eitskin.solve.reconstructor import Reconstructor
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``calibrate``."""
     parser.description = (
         "Fit the law that turns a touch's strength and place into its load to recordings of"
         " known weights, say how far it is to be trusted, and store it in a copy of the model."
@@ -54,7 +53,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Find the presses, fit, write, say."""
     if len(options.recordings) != len(options.weights):
         raise UsageError(
             f"calibrate: {len(options.recordings)} recordings and {len(options.weights)} lists of"

@@ -17,7 +17,6 @@ BOARD = "emu:demo"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``demo``."""
     parser.description = (
         "Simulate three touches on the paper's skin (nonlinear forward model on another, finer"
         " mesh, noise), reconstruct them with the C core and the prebuilt model, and draw them;"
@@ -34,7 +33,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate, reconstruct, print, draw."""
     from eitskin.demo.demo import run_demo, to_json, to_text
     from eitskin.view.demo_picture import draw_demo
 

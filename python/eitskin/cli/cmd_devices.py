@@ -19,7 +19,6 @@ URLS = {
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``devices``."""
     parser.description = (
         "List the serial ports of this computer and ask those that look like a board's what"
         " they are. Ports that do not are left alone: name one with  eitskin info --device"
@@ -31,7 +30,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """List, ask, print."""
     found = discover(ask=not options.quiet)
     if options.json:
         print_json({"ports": [port.as_dict() for port in found], "urls": URLS})

@@ -35,7 +35,6 @@ TOUCH_RADIUS_PER_SIZE = 0.05
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``doctor``."""
     parser.description = (
         "Say what is wrong with measured frames before an image is made of them: channel order,"
         " sign, numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains,"
@@ -73,7 +72,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, examine, say."""
     if (options.source is None) == (options.device is None):
         raise UsageError("doctor: name frames to examine, or a board: --device URL")
     ring_ohm = options.resistor_ring

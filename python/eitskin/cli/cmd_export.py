@@ -15,7 +15,6 @@ from eitskin.solve.reconstructor import Reconstructor
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``export``."""
     parser.description = (
         "Write EIDORS structs that MATLAB and Octave load: fmdl with electrodes and patterns,"
         " img_bkgnd, the Jacobian J of its elements, c2f from our pixels to them; with frames"
@@ -30,7 +29,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reconstruct, mesh, write."""
     refuse_unwritable(options.output)
     model, blob, _ = load_or_prebuilt(options.model)
     frames, images = None, None

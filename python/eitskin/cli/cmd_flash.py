@@ -20,7 +20,6 @@ TOOLS = ("openocd", "st-flash", "pyocd")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``flash``."""
     parser.description = (
         "Put firmware on a NUCLEO-F767ZI through its ST-LINK, and a model into its first bank,"
         " by whichever of openocd, st-flash and pyocd is installed. The exact commands are"
@@ -37,7 +36,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Plan, print, run."""
     if options.no_model and options.model is not None:
         raise UsageError("flash: --model and --no-model contradict each other; give one of them")
     if options.json and not options.dry_run:

@@ -14,7 +14,6 @@ from eitskin.frames.importer import import_frames
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``import``."""
     parser.description = (
         "Turn a text, NPY, NPZ or MAT file of measured voltages into a frames file, in the"
         " protocol's order, signed, in volts. Run  eitskin doctor SOURCE  first to learn which"
@@ -28,7 +27,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, repair, write."""
     refuse_unwritable(options.output, options.save_layout)
     protocol, skin, n_electrodes = read_protocol(options)
     named = read_options(options)

@@ -11,7 +11,6 @@ from eitskin.model.storage import STORAGES
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``info``."""
     parser.description = (
         "Ask a board what it is, which model it has, how it scans, which faults it reports and"
         " what it has counted."
@@ -22,7 +21,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask and print."""
     with open_named(options) as device:
         info, url = device.board, device.transport.url
         replays = device.transport.replays

@@ -36,7 +36,6 @@ NUMPY_BOUND = 1e-4
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``model``."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
     option(
@@ -119,7 +118,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run_build(options: argparse.Namespace) -> int:
-    """Build and write a model."""
     from eitskin.frames.homogeneous_fem import transfer_by_elements
 
     their = read_eidors(options.skin) if _is_eidors(options) else None
@@ -183,7 +181,6 @@ def run_voltages(options: argparse.Namespace) -> int:
 
 
 def run_info(options: argparse.Namespace) -> int:
-    """Print what is in a model."""
     model, blob, name = load_or_prebuilt(options.model)
     _print_info(model, len(blob), name, options.json)
     return 0

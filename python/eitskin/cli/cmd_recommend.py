@@ -17,7 +17,6 @@ from eitskin.tuning.recommend import Recommendation, write_model
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``recommend``."""
     parser.description = (
         "Choose from measured results: the most accurate point within --budget, or the cheapest"
         " that reaches --accuracy. The budget holds for solve and touches of the mean frame"
@@ -39,7 +38,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Choose, say why, and write the model."""
     target = read_target(
         options,
         options.board,

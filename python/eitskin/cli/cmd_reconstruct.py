@@ -16,7 +16,6 @@ from eitskin.reconstruct.steps import ReconstructSettings, reconstruct_frames
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``reconstruct``."""
     parser.description = (
         "Turn frames into touches in millimetres and images. Where the frames carry the truth,"
         " the touches are compared with it."

@@ -17,7 +17,6 @@ from eitskin.live.session import Session
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``record``."""
     parser.description = (
         "Take the reference, then write every packet of a board to a file as it comes, the"
         " reference's raw frames included. A recording that is cut, even by kill -9, can be"
@@ -34,7 +33,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Record, then say how much."""
     settings = session_settings(options, read_mode(options.mode), record=options.output)
     with Session(options.device, settings, say=say, progress=say_progress) as session:
         items = session.items()

@@ -20,7 +20,6 @@ from eitskin.live.settings import SessionSettings
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``replay``."""
     parser.description = (
         "Show a recording as  eitskin stream  showed it; write its raw frames as a frames file;"
         " or put them through this host's core and compare every bit of the images and touches"
@@ -43,7 +42,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show, export or check."""
     refuse_unwritable(options.picture, options.frames)
     if options.check or options.frames is not None:
         shown = (options.mode, options.picture, options.film, options.first)

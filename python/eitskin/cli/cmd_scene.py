@@ -15,7 +15,6 @@ from eitskin.view.scene_pictures import draw_scene
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``scene``."""
     parser.description = (
         "A scene file says what happens on a skin and which imperfections take part;"
         " docs/guide/scenes.md."
@@ -52,7 +51,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run_scene(options: argparse.Namespace) -> int:
-    """Simulate and write."""
     from eitskin.scene.compiler import compile_scene
     from eitskin.scene.runner import run
 
@@ -86,7 +84,6 @@ def run_scene(options: argparse.Namespace) -> int:
 
 
 def run_plan(options: argparse.Namespace) -> int:
-    """Print the plan."""
     from eitskin.scene.compiler import compile_scene
 
     plan = compile_scene(find_scene(options.scene)).plan
@@ -95,7 +92,6 @@ def run_plan(options: argparse.Namespace) -> int:
 
 
 def run_picture(options: argparse.Namespace) -> int:
-    """Simulate and draw."""
     from eitskin.scene.compiler import compile_scene
     from eitskin.scene.runner import run
 
@@ -110,7 +106,6 @@ def run_picture(options: argparse.Namespace) -> int:
 
 
 def run_list(options: argparse.Namespace) -> int:
-    """Print the library."""
     found = descriptions()
     if options.json:
         print_json(found)

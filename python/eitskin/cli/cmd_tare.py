@@ -10,7 +10,6 @@ from eitskin.device.settings import check_tare_frames
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``tare``."""
     parser.description = (
         "Take a board's reference frame from its untouched skin; four frames or more also tell"
         " it the noise. It is kept until the board is reset, the scan is changed or another"
@@ -22,7 +21,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Tare and say so."""
     check_tare_frames(options.frames)
     with open_named(options) as device:
         if not device.transport.synchronous:

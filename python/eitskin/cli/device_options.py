@@ -143,7 +143,6 @@ def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def add_every(parser: argparse.ArgumentParser) -> None:
-    """How many of the frames."""
     text = "every N-th frame (default: as many as the line carries)"
     option(parser, "--every N", text, within=(1, 0xFFFF))
 
@@ -161,12 +160,10 @@ def add_report(parser: argparse.ArgumentParser) -> None:
 
 
 def add_verbose(parser: argparse.ArgumentParser) -> None:
-    """How much is said of each frame."""
     option(parser, "-v --verbose", "all that is known of a frame, the solver's numbers included")
 
 
 def add_outputs(parser: argparse.ArgumentParser) -> None:
-    """``--to``."""
     option(
         parser,
         "--to URL",
@@ -178,7 +175,6 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
 
 
 def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
-    """The sinks of ``--to``, open."""
     transport, board = session.device.transport, session.device.board
     model = None if session.known is None else session.known.model
     source = Source(transport.url, board.board, model, getattr(options, "overwrite", False))
@@ -186,7 +182,6 @@ def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
 
 
 def add_zones(parser: argparse.ArgumentParser) -> None:
-    """``--zones``."""
     option(
         parser, "--zones FILE.toml", "named keys, pads and rings whose presses are reported", Path
     )

@@ -24,5 +24,4 @@ def print_table(facts: dict[str, Any]) -> None:
 
 
 def print_json(facts: Any) -> None:
-    """Facts for programs."""
     print(json.dumps(facts, indent=2))

@@ -30,7 +30,6 @@ REMEDY = {
 
 
 def add_parser(actions: Any) -> None:
-    """Add ``check``."""
     parser = actions.add_parser(
         "check",
         help="whether a taught model still fits, from the untouched skin alone",
@@ -55,7 +54,6 @@ def add_parser(actions: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Look, say."""
     model, _ = load_model(options.model)
     untouched, protocol = _of_board(options) if options.frames is None else _of_file(options.frames)
     found = still_fits(model, untouched, protocol, where=str(options.model))

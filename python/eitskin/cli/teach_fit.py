@@ -20,7 +20,6 @@ from eitskin.view.taught_picture import draw_taught
 
 
 def add_parser(actions: Any) -> None:
-    """Add ``fit``."""
     parser = actions.add_parser("fit", help="presses to a model, with what it is worth")
     option(parser, "presses PRESSES.npz", "from  eitskin teach record", Path)
     option(parser, "-o --output MODEL.eitm", None, Output, required=True)
@@ -43,7 +42,6 @@ def add_parser(actions: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit, write, say."""
     refuse_unwritable(options.output, options.picture)
     if options.picture is not None:
         check_picture(options.picture)

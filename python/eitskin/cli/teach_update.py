@@ -16,7 +16,6 @@ from eitskin.teaching.update import update
 
 
 def add_parser(actions: Any) -> None:
-    """Add ``update``."""
     parser = actions.add_parser(
         "update",
         help="adapt a taught model by a few new presses",
@@ -35,7 +34,6 @@ def add_parser(actions: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Adapt, write, say."""
     refuse_unwritable(options.output)
     model, _ = load_model(options.model)
     presses = load_presses(options.presses)

@@ -112,7 +112,6 @@ class CoreEngine:
         return f"{text} (C core, status {int(status)})"
 
     def set_options(self, options: Options) -> None:
-        """Replace the options."""
         values = asdict(options)
         try:
             values |= {name: known.index(values[name]) for name, known in CHOICES.items()}
@@ -325,7 +324,6 @@ def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
 
 
 def _bits(word: int) -> tuple[int, ...]:
-    """The places of the bits that are set."""
     return tuple(bit for bit in range(64) if word >> bit & 1) if word else ()
 
 

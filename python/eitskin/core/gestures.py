@@ -76,7 +76,6 @@ class GestureEvent:
         }
 
     def text(self) -> str:
-        """In a line."""
         said = [self.name]
         if self.phase != EventPhase.ONCE and self.kind != EventKind.PRESS:
             said.append(

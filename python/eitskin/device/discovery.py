@@ -19,7 +19,6 @@ class FoundPort:
     why: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         board = None if self.board is None else self.board.as_dict()
         port = {
             "url": f"serial:{self.port.path}",

@@ -81,7 +81,6 @@ class LiveSummary:
     board: BoardStats | None = None
 
     def add(self, frame: LiveFrame) -> None:
-        """Count a frame."""
         if not self.frames:
             self.first_us = frame.time_us
         self.frames += 1
@@ -105,7 +104,6 @@ class LiveSummary:
         return self.solve_us.quantile(0.5), self.solve_us.quantile(0.99)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         quantiles = self.solve_quantiles_us or (None, None)
         return {
             "frames": self.frames,
@@ -120,7 +118,6 @@ class LiveSummary:
         }
 
     def lines(self) -> list[str]:
-        """For reading."""
         rate = "" if self.rate_hz is None else f", {self.rate_hz:.1f} a second of the board's time"
         link = self.link
         text = (

@@ -162,7 +162,6 @@ class _NotNow(DeviceError):
 
 
 def open_port(path: str, baud: int) -> Any:
-    """A pyserial port."""
     import serial
 
     try:

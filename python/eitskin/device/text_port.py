@@ -205,7 +205,6 @@ class SocketLines:
 
 
 def open_port(path: str, baud: int) -> LinePort:
-    """The port behind ``path``."""
     if path.startswith(TCP):
         return SocketLines(path)
     if path == "-":

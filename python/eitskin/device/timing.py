@@ -133,7 +133,6 @@ class Pacer:
         self._change(paused=True)
 
     def play(self) -> None:
-        """Go on."""
         self._change(paused=False)
 
     def step(self) -> None:

@@ -38,7 +38,6 @@ class Grid:
 
     @property
     def pixel_area_mm2(self) -> float:
-        """One pixel's area."""
         return self.pixel_mm**2
 
     @cached_property

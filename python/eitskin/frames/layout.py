@@ -181,7 +181,6 @@ class LineParser:
             self._choose(self.cells)
 
     def frame(self, row: Row) -> LineFrame:
-        """The frame of ``row``."""
         cells = row.cells
         if self.cells is None:
             if not any(parse_cell(cell) is not None for cell in cells):

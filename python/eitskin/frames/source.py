@@ -140,7 +140,6 @@ def electrode_table(rows: NDArray[Any], base: int, where: str) -> IntArray:
 
 
 def refuse_nonfinite(raw: RawFrames, where: str) -> None:
-    """Refuse NaN and Inf."""
     for what, values in (("frames", raw.voltage), ("reference", raw.reference)):
         bad = np.argwhere(~np.isfinite(values)) if values is not None else np.zeros((0, 2))
         if values is not None and len(bad):

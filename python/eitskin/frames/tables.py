@@ -42,7 +42,6 @@ class TextTable:
 
     @property
     def n_columns(self) -> int:
-        """The number of columns."""
         return len(self.cells[0])
 
     def numbers(self, columns: Sequence[int]) -> NDArray[Any]:

@@ -67,7 +67,6 @@ class LoadLaw:
 
 
 def encode_load(law: LoadLaw) -> bytes:
-    """The section's bytes."""
     head = HEAD.pack(len(law.strength), law.order, law.radius_mm, law.reach, law.uncertainty)
     content = head + b"".join(
         part.astype("<f4").tobytes() for part in (law.strength, law.force_n, law.gain)

@@ -40,7 +40,6 @@ class RowForm:
     square: Float32s
 
     def encode(self) -> bytes:
-        """The section's bytes."""
         rows = np.zeros((4, stride_for(len(self.scale))), dtype="<f4")
         rows[:, : len(self.scale)] = self.scale, self.strength, self.energy, self.square
         return HEAD.pack(self.mu, self.s1, self.s1_square) + rows.tobytes()

@@ -101,7 +101,6 @@ class Follower:
         self._thread = threading.Thread(target=self._run, name="eitskin view", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -209,7 +208,6 @@ class Follower:
         return session.ask(run)
 
     def tare(self) -> Future[str]:
-        """The reference again."""
         session = self._board("tare")
 
         def action(device: Device) -> str:
@@ -234,7 +232,6 @@ class Follower:
         return self._changed(session, action)
 
     def solver(self, **changes: Any) -> Future[str]:
-        """Sign or iterations."""
         session = self._board("the solver")
         named = replace(session.settings.solver, **changes)
 

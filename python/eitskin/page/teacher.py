@@ -47,7 +47,6 @@ class Teacher:
         self.on_event(self.facts())
 
     def take(self, frame: Frame) -> None:
-        """The next frame."""
         if frame.voltage_v is None:
             return
         with self._lock:

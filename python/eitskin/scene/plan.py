@@ -56,7 +56,6 @@ class Plan:
     method: str
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
         return {
             "scene": self.scene,
             "steps": [

@@ -119,7 +119,6 @@ class TruthScore:
     errors_mm: Sample = field(default_factory=Sample)
 
     def add(self, matching: Matching) -> None:
-        """One frame's."""
         self.frames += 1
         self.found += matching.hits
         self.missed += matching.misses
@@ -140,7 +139,6 @@ class TruthScore:
         }
 
     def text(self) -> str:
-        """In a line."""
         facts = self.as_dict()
         line = (
             f"against the scene's truth: {facts['found']} of {facts['true']} touches found,"

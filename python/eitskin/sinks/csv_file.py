@@ -64,5 +64,4 @@ def new_file(url: str, source: Source, first: bytes = b"") -> RecordingFile:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module."""
     return CsvSink(new_file(url, source, _text([COLUMNS])))

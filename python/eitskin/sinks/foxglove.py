@@ -61,7 +61,6 @@ class FoxgloveSink:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
         return int(self._server.port)
 
     def write(self, told: Told) -> None:

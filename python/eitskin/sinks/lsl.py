@@ -75,7 +75,6 @@ class LslSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module."""
     name, _, query = url.partition(":")[2].partition("?")
     touches = setting(url, query, "touches", 1, 64, 8)
     if "/" in name:

@@ -71,7 +71,6 @@ class McapSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module."""
     try:
         import mcap_ros2.writer  # noqa: F401
     except ImportError:

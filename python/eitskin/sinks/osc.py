@@ -17,7 +17,6 @@ USAGE = "osc://HOST:PORT or osc://HOST:PORT/prefix"
 
 
 def need_osc(extra: str) -> None:
-    """Refuse where python-osc is not installed."""
     if find_spec("pythonosc") is None:
         raise missing_extra(extra, "python-osc")
 
@@ -82,7 +81,6 @@ def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module."""
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE, path=True)
     need_osc("osc")

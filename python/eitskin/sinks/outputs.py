@@ -81,7 +81,6 @@ class Outputs:
         self.close()
 
     def put(self, item: Frame | Report | Notice) -> None:
-        """Give it to every sink."""
         told = Told(item)
         for one in self._queues:
             one.put(told, self._patience_s)
@@ -170,7 +169,6 @@ class Queue:
 
     @property
     def counts(self) -> dict[str, Any]:
-        """So far."""
         return {
             "url": self._url,
             "sent": self._sent,

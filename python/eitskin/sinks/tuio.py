@@ -101,7 +101,6 @@ class TuioSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module."""
     parts, host, port = address(url, PORT, usage=USAGE)
     nothing_more(url, parts, USAGE)
     need_osc("tuio")

@@ -25,7 +25,6 @@ class UdpSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module."""
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE)
     return UdpSink(connected(url, host, port))

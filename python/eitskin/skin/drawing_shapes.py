@@ -51,7 +51,6 @@ class TooManyPoints(Exception):
 
 
 def limited(shapes: Iterable[DrawnShape], where: str) -> list[DrawnShape]:
-    """All of them."""
     found, points = [], 0
     try:
         for one in shapes:

@@ -65,7 +65,6 @@ class Explained:
 
 
 def quiet_progress(items: Iterable[Any], what: str) -> Iterable[Any]:
-    """Shows nothing."""
     return items
 
 
@@ -137,7 +136,6 @@ def shifts(presses: Presses) -> list[int]:
 
 
 def shift_note(by: int) -> str:
-    """For a report."""
     count = abs(by)
     how = f"the first {count} were missed" if by > 0 else f"{count} more came first"
     if count == 1:

@@ -217,7 +217,6 @@ class Learned:
 
     @property
     def kernel(self) -> Kernel:
-        """The kernel in use."""
         return self.process.kernel
 
     def whitened(self, difference: FloatArray) -> FloatArray:

@@ -70,7 +70,6 @@ class Configuration:
     model_errors: bool = True
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         return asdict(self)
 
     @property

@@ -26,7 +26,6 @@ class Album:
         self._last: ComparedFrame | None = None
 
     def add(self, seen: ComparedFrame) -> None:
-        """Another frame."""
         if self._count % self._step == 0:
             self._kept.append(seen)
             if len(self._kept) >= MAX_KEPT:

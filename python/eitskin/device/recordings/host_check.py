@@ -48,16 +48,13 @@ class HostCheck:
 
     @property
     def compared(self) -> int:
-        """Frames."""
         return self.same + len(self.different)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         wrong = bool(self.different) or self.drives_different > 0
         return asdict(self) | {"same_bits": self.compared > 0 and not wrong}
 
     def text(self) -> str:
-        """In a line."""
         if not self.compared:
             line = "same bits: not told; no frame could be compared"
         elif self.different:

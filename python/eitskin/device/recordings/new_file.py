@@ -58,7 +58,6 @@ class RecordingFile:
             raise
 
     def write(self, data: bytes) -> None:
-        """Append ``data``."""
         try:
             written = self._file.write(data)
         except (OSError, ValueError) as error:

@@ -53,7 +53,6 @@ class LinkCounters:
     lines_skipped: int = 0
 
     def as_dict(self) -> dict[str, int]:
-        """For JSON."""
         return asdict(self)
 
 

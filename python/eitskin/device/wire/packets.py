@@ -101,7 +101,6 @@ class BoardInfo(InfoPacket):
         return Drive(self.drive).name.lower() if self.drive in list(Drive) else str(self.drive)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         values = asdict(self) | {
             "firmware": self.firmware_text,
             "protocol_hash": f"{self.protocol_hash:016x}",
@@ -214,7 +213,6 @@ class BoardStats(StatsPacket):
     """The board's counters; ``stages`` by ``STAGES``."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         return asdict(self)
 
 

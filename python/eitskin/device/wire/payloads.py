@@ -56,7 +56,6 @@ def _read_text(values: Sequence[Any]) -> str:
 
 
 def _read_electrodes(values: Sequence[Any]) -> tuple[int, ...]:
-    """The places of the bits that are set."""
     word = values[0]
     return tuple(bit for bit in range(64) if word >> bit & 1) if word else ()
 

@@ -84,7 +84,6 @@ class Report:
         }
 
     def lines(self) -> list[str]:
-        """The report as lines of text."""
         lines = [f"{self.source}: {self.subject}"]
         for finding in self.findings:
             lines.append(f"  {finding.severity.upper():5} {finding.name}: {finding.text}")
