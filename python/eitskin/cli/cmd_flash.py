@@ -9,14 +9,12 @@ from hashlib import sha256
 from pathlib import Path
 
 from eitskin.cli.arguments import option
-from eitskin.device.flash import plan_flash, run_flash
+from eitskin.device.flash import TOOLS, plan_flash, run_flash
 from eitskin.errors import UsageError
 from eitskin.fileio import write_bytes
 from eitskin.firmware.prebuilt import BOARD, load_image
 from eitskin.model.eitm import load_model
 from eitskin.model.prebuilt import load_prebuilt
-
-TOOLS = ("openocd", "st-flash", "pyocd")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

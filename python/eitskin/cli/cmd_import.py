@@ -1,13 +1,12 @@
 """``eitskin import``: somebody else's measured frames to a frames file."""
 
 import argparse
-import json
-import sys
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.import_options import add_import_options, read_options, read_protocol, write_layout
+from eitskin.cli.printing import answer, say
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import save_frames
 from eitskin.frames.importer import import_frames
@@ -47,17 +46,13 @@ def run(options: argparse.Namespace) -> int:
         "notes": list(frames.meta.get("notes", ())),
     }
     for note in said["notes"]:
-        print(f"eitskin: {options.source}: {note}", file=sys.stderr)
-    if options.json:
-        print(json.dumps(said))
-        return 0
-    print(
+        say(f"{options.source}: {note}")
+    skin = "" if options.skin is None else f" --skin {options.skin}"
+    return answer(
+        options,
+        said,
         f"{options.output}: {said['frames']} frame(s) of {said['channels']} channels,"
         f" {said['quiet_frames']} quiet, {said['electrodes']} electrodes, {said['touches']} known"
-        f" touches; unit {said['unit']}"
+        f" touches; unit {said['unit']}",
+        f"next: eitskin doctor {options.output}{skin}",
     )
-    print(
-        f"next: eitskin doctor {options.output}"
-        + (f" --skin {options.skin}" if options.skin is not None else "")
-    )
-    return 0

@@ -1,11 +1,10 @@
 """``eitskin tare``: the reference from the untouched skin."""
 
 import argparse
-import json
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import TARE_FRAMES, add_device, open_named
-from eitskin.cli.printing import say
+from eitskin.cli.printing import answer, say
 from eitskin.device.settings import check_tare_frames
 
 
@@ -27,8 +26,5 @@ def run(options: argparse.Namespace) -> int:
             say(f"leave the skin untouched: taking the reference from {options.frames} frames")
         device.tare(options.frames)
         url = device.transport.url
-    if options.json:
-        print(json.dumps({"device": url, "frames": options.frames, "tared": True}))
-    else:
-        print(f"{url}: reference taken from {options.frames} frames")
-    return 0
+    facts = {"device": url, "frames": options.frames, "tared": True}
+    return answer(options, facts, f"{url}: reference taken from {options.frames} frames")

@@ -63,7 +63,7 @@ def all_magnitudes(names: Sequence[str]) -> bool:
 
 
 def paired(names: Sequence[str], values: NDArray[Any], how: str | None, option: str) -> Paired:
-    """How the columns of ``values`` (rows, c), with these ``names`` (empty: no header), are pairs."""
+    """How the columns of ``values`` (rows, c) with these ``names`` (empty: no header) are pairs."""
     count = values.shape[1]
     if count % 2:
         raise UsageError(f"{option}: with --complex-part columns come in pairs; {count} are named")

@@ -63,7 +63,7 @@ def kept_channels(
 def imputed(
     values: FloatArray, rows: IntArray, n_electrodes: int, channels: Sequence[int]
 ) -> FloatArray:
-    """``values`` (n, m) with ``channels`` replaced by their reciprocal channels of ``rows`` (m, 4)."""
+    """``values`` (n, m) with ``channels`` replaced by their reciprocals among ``rows`` (m, 4)."""
     check_range(channels, len(rows), "--impute-channels")
     if not channels:
         return values

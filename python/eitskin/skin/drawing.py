@@ -42,7 +42,7 @@ class Drawing:
         return found
 
     def outline(self, element: str | None = None, mark: str | None = None) -> Outline:
-        """The one closed outline, of those that ``element`` names and that are not marked ``mark``."""
+        """The one closed outline of those that ``element`` names and that ``mark`` does not."""
         marks = {id(one) for one in self.marked(mark)} if mark is not None else set()
         shapes = [one for one in self.shapes if id(one) not in marks]
         if element is not None:
