@@ -5,7 +5,7 @@ import argparse
 
 from eitskin.cli.arguments import option
 from eitskin.cli.printing import answer
-from eitskin.device.discovery import FoundPort, discover
+from eitskin.device.open import FoundPort, discover
 from eitskin.device.source import source_schemes
 
 URLS = {

@@ -155,12 +155,8 @@ def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subje
         values = floats(text, "--touch")
         if len(values) not in (2, 3):
             raise UsageError(f"--touch {text}: must be X,Y or X,Y,RADIUS in mm")
-        radius = (
-            values[2]
-            if len(values) == 3
-            else TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
-        )
-        touches.append((values[0], values[1], radius))
+        usual = TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
+        touches.append((values[0], values[1], values[2] if len(values) == 3 else usual))
     if not subject.skin.outline.contains([touch[:2] for touch in touches]).all():
         raise UsageError(
             "--touch: a touch lies outside the skin; give millimetres from the outline's centre"

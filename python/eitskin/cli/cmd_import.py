@@ -47,12 +47,12 @@ def run(options: argparse.Namespace) -> int:
     }
     for note in said["notes"]:
         say(f"{options.source}: {note}")
-    skin = "" if options.skin is None else f" --skin {options.skin}"
+    with_skin = "" if options.skin is None else f" --skin {options.skin}"
     return answer(
         options,
         said,
         f"{options.output}: {said['frames']} frame(s) of {said['channels']} channels,"
         f" {said['quiet_frames']} quiet, {said['electrodes']} electrodes, {said['touches']} known"
         f" touches; unit {said['unit']}",
-        f"next: eitskin doctor {options.output}{skin}",
+        f"next: eitskin doctor {options.output}{with_skin}",
     )

@@ -26,8 +26,8 @@ def run(options: argparse.Namespace) -> int:
         replays = device.transport.replays
         stats = None if replays else device.stats(reset=options.reset_statistics)
         hashes = device.hashes().as_dict()
-    facts = {"device": url, "board": info.as_dict(), "sha256": hashes}
-    facts["statistics"] = None if stats is None else stats.as_dict()
+    counted = None if stats is None else stats.as_dict()
+    facts = {"device": url, "board": info.as_dict(), "sha256": hashes, "statistics": counted}
     shown = _facts(info, url) | {f"{name} SHA": one for name, one in hashes.items() if one}
     if stats is None:
         return answer(options, facts, table(shown))

@@ -3,9 +3,9 @@
 import argparse
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import TARE_FRAMES, add_device, open_named
+from eitskin.cli.device_options import add_device, open_named
 from eitskin.cli.printing import answer, say
-from eitskin.device.settings import check_tare_frames
+from eitskin.device.client import TARE_FRAMES, check_tare_frames
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -10,9 +10,9 @@ from eitskin.cli.printing import say
 from eitskin.config import nearest
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.core.gestures import Zone
-from eitskin.device.client import Device
+from eitskin.device.client import TARE_FRAMES, Device, check_tare_frames
 from eitskin.device.open import open_with_files
-from eitskin.device.settings import ScanSettings, SolverSettings, check_tare_frames
+from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
@@ -28,7 +28,6 @@ DEVICE_HELP = (
     " file:RUN.eits (a recording); SCENE is a file or a scene of  eitskin scene list; after the"
     " last three, ?speed=1&loop=1"
 )
-TARE_FRAMES = 16
 MAX_U32 = 2**32 - 1
 
 
@@ -189,10 +188,7 @@ def add_zones(parser: argparse.ArgumentParser) -> None:
 
 def read_zones(path: Path | None) -> tuple[Zone, ...]:
     """The zones of ``--zones``."""
-    if path is None:
-        return ()
-
-    return load_zones(path)
+    return () if path is None else load_zones(path)
 
 
 def read_mode(text: str) -> Stream:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import TARE_FRAMES, add_device
+from eitskin.cli.device_options import add_device
 from eitskin.cli.printing import answer
 from eitskin.cli.teach_record import raw_session
+from eitskin.device.client import TARE_FRAMES
 from eitskin.device.known_model import scanned_protocol
 from eitskin.device.live_frames import LiveFrame
 from eitskin.errors import DeviceError

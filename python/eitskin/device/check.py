@@ -6,9 +6,9 @@ from pathlib import Path
 
 from eitskin import __version__
 from eitskin.device.link import Link
-from eitskin.device.wire.codec import LinkCounters
 from eitskin.device.wire.link_table import LINK_VERSION
 from eitskin.device.wire.packets import BoardInfo
+from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import load_model
 from eitskin.model.model import Model

@@ -74,10 +74,8 @@ def plan_flash(
     pieces = [(path, FIRMWARE_ADDRESS)]
     bank_file = None
     if model is not None:
-        bank_file, no_record = (
-            folder / f"eitskin-bank-{zlib.crc32(model):08x}.bin",
-            folder / "eitskin-no-record.bin",
-        )
+        bank_file = folder / f"eitskin-bank-{zlib.crc32(model):08x}.bin"
+        no_record = folder / "eitskin-no-record.bin"
         write_bytes(bank_file, bank_bytes(model, 1))
         write_bytes(no_record, bytes([ERASED]) * RECORD_BYTES)
         # the other bank may hold a model of a later generation, which would win
@@ -138,21 +136,10 @@ def _st_flash(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tu
 
 
 def _pyocd(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tuple[str, ...]]:
-    which = ("--uid", serial) if serial is not None else ()
+    load = ["pyocd", "load", "--target", "stm32f767zi", "--no-wait"]
+    load += [] if serial is None else ["--uid", serial]
     return [
-        (
-            "pyocd",
-            "load",
-            "--target",
-            "stm32f767zi",
-            "--no-wait",
-            *which,
-            "--format",
-            "bin",
-            "--base-address",
-            f"0x{address:08x}",
-            str(path),
-        )
+        (*load, "--format", "bin", "--base-address", f"0x{address:08x}", str(path))
         for path, address in pieces
     ]
 

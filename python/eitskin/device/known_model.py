@@ -34,9 +34,8 @@ def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | No
     if path is not None:
         return KnownModel(*model_of(info, path, name))
     model, blob = load_prebuilt()
-    return (
-        KnownModel(model, blob) if info.has_model and zlib.crc32(blob) == info.model_crc else None
-    )
+    theirs = info.has_model and zlib.crc32(blob) == info.model_crc
+    return KnownModel(model, blob) if theirs else None
 
 
 def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> KnownModel:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from eitskin.device.client import Device
+from eitskin.device.client import TARE_FRAMES, Device
 from eitskin.device.known_model import KnownModel
 from eitskin.device.link import Reconnect
 from eitskin.device.recordings.recording import Recorder
@@ -24,7 +24,7 @@ from eitskin.device.wire.packets import RawFrame
 from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.errors import DeviceError, EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice, Report
-from eitskin.live.session import TARE_FRAMES, Session
+from eitskin.live.session import Session
 from eitskin.live.settings import KINDS, SessionSettings
 from eitskin.model.eitm import decode_model
 from eitskin.page.teacher import Teacher

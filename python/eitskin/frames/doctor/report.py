@@ -69,14 +69,7 @@ class Report:
             "subject": self.subject,
             "healthy": self.healthy,
             "findings": [
-                {
-                    "name": finding.name,
-                    "severity": finding.severity,
-                    "text": finding.text,
-                    "evidence": _finite(finding.evidence),
-                    "repair": finding.repair,
-                }
-                for finding in self.findings
+                vars(finding) | {"evidence": _finite(finding.evidence)} for finding in self.findings
             ],
             "untold": list(self.untold),
             "measured": _finite(self.measured),
