@@ -55,21 +55,13 @@ def find_presses(
     seen: list[tuple[float, float, float, float]] = []
     unseen: list[str] = []
     for weight in weights:
-        rows = (
-            [at[number] for number in range(weight.first, weight.last + 1) if number in at]
-            if len(at)
-            else []
-        )
+        rows = [k for number, k in at.items() if weight.first <= number <= weight.last]
         name = f"{where}: frames {weight.first} to {weight.last}"
         if not rows:
-            raise FrameError(
-                f"{name} of the list of weights are not there; it has {_span(numbers)}"
-            )
-        touches = [
-            touch
-            for row in rows
-            if (touch := _pressed(reconstructor, frames.voltage_v[row], weight)) is not None
-        ]
+            held = f"frames {min(numbers)} to {max(numbers)}" if numbers else "no frames"
+            raise FrameError(f"{name} of the list of weights are not there; it has {held}")
+        shown = (_pressed(reconstructor, frames.voltage_v[row], weight) for row in sorted(rows))
+        touches = [touch for touch in shown if touch is not None]
         if 2 * len(touches) <= len(rows):
             unseen.append(f"{name}: {len(touches)} of {len(rows)} show the weight; left out")
             continue
@@ -77,10 +69,6 @@ def find_presses(
         seen.append((weight.force_n, *found.tolist()))
     table = np.array(seen, dtype=np.float64).reshape(-1, 4)
     return Presses(table[:, 0], table[:, 1], table[:, 2:]), unseen
-
-
-def _span(numbers: Sequence[int]) -> str:
-    return f"frames {min(numbers)} to {max(numbers)}" if len(numbers) else "no frames"
 
 
 def _pressed(reconstructor: Reconstructor, frame_v: FloatArray, weight: Weight) -> Touch | None:

@@ -96,8 +96,7 @@ def run_list(options: argparse.Namespace) -> int:
 
 def run_effects(options: argparse.Namespace) -> int:
     """Print the effects without importing them, or one effect with its parameters."""
-    from eitskin.scene.effect_table import describe_parameters
-    from eitskin.scene.registry import Registry, summary_of
+    from eitskin.scene.registry import Registry, describe_parameters, summary_of
     from eitskin.scene.runner import plain
 
     registry = Registry()

@@ -47,11 +47,8 @@ def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
 
 def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
     """The skin that is meshed."""
-    count, spread, known = (
-        session.skin.electrodes.count,
-        parameters.spread_mm,
-        len(parameters.shift_mm),
-    )
+    count, spread = session.skin.electrodes.count, parameters.spread_mm
+    known = len(parameters.shift_mm)
     if known not in (0, count):
         raise ConfigError(f"shift_mm: {known} shifts for {count} electrodes; give one each")
     shift_mm = (
