@@ -75,10 +75,8 @@ class Grid:
 
     def locate(self, points_mm: npt.ArrayLike) -> IntArray:
         """The kept pixel in which each of ``points_mm`` (k, 2) lies, (k,); -1 outside of all."""
-        cell = np.floor(
-            (np.asarray(points_mm, dtype=np.float64).reshape(-1, 2) - self.origin_mm)
-            / self.pixel_mm
-        )
+        points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
+        cell = np.floor((points - self.origin_mm) / self.pixel_mm)
         known = (cell >= 0).all(axis=1) & (cell[:, 0] < self.nx) & (cell[:, 1] < self.ny)
         ix, iy = np.where(known[:, None], cell, 0).astype(np.int64).T
         return np.asarray(np.where(known, self.number[iy, ix], -1))

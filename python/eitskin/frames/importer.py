@@ -70,21 +70,13 @@ def import_frames(
     voltage, reference = raw.voltage[:, index] * sign, quiet[:, index] * sign
     n = _count(protocol, n_electrodes)
     rows = relabel(rows, swap_map(n, options.swaps))
-    prediction = (
-        homogeneous(skin, n).voltages(rows)
-        if options.sign == "magnitude" or options.equalise
-        else None
-    )
+    predicted = options.sign == "magnitude" or options.equalise
+    prediction = homogeneous(skin, n).voltages(rows) if predicted else None
     keep = kept_channels(rows, n, options.drop_channels, options.drop_electrodes)
-    voltage, reference = (
-        imputed(
-            flipped(signed(values, options.sign, prediction), options.flip_channels),
-            rows,
-            n,
-            options.impute_channels,
-        )[:, keep]
-        for values in (voltage, reference)
-    )
+    for_all = (rows, n, options.impute_channels)
+    signs = (signed(values, options.sign, prediction) for values in (voltage, reference))
+    turned = (flipped(values, options.flip_channels) for values in signs)
+    voltage, reference = (imputed(values, *for_all)[:, keep] for values in turned)
     if options.equalise and prediction is not None:
         gain = equalising_gains(reference.mean(axis=0), prediction[keep])
         voltage, reference = voltage * gain, reference * gain

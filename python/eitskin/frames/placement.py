@@ -1,7 +1,6 @@
 """Where each channel of a frame comes from, in a source's own order: electrodes renumbered, rows in
 a protocol's order, signs."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +18,7 @@ from eitskin.frames.orders import (
     swap_map,
     touching,
 )
-from eitskin.frames.repair import check_range, partners
+from eitskin.frames.repair import check_range, good_reciprocals
 from eitskin.frames.source import electrode_table
 from eitskin.frames.tables import read_table
 from eitskin.model.model import Model
@@ -121,28 +120,15 @@ def place(options: ImportOptions, protocol: Protocol | None, model: Model, where
         sign = -sign
     check_range(options.flip_channels, len(measured), "--flip-channels")
     sign[list(options.flip_channels)] *= -1
-    index = _filled(options.impute_channels, measured, n, match.index.copy(), sign)
+    index = match.index.copy()
+    check_range(options.impute_channels, len(measured), "--impute-channels")
+    filled = good_reciprocals(options.impute_channels, measured, n)
+    for channel, (other, between) in filled.items():
+        index[channel], sign[channel] = index[other], between * sign[other]
     check_range(options.drop_channels, len(measured), "--drop-channels")
     blank = touching(measured, options.drop_electrodes)
     blank[list(options.drop_channels)] = True
     return Placement(len(rows), index, sign, blank, magnitude)
-
-
-def _filled(
-    channels: Sequence[int], rows: IntArray, n: int, index: IntArray, sign: NDArray[np.float64]
-) -> IntArray:
-    """``index``, and ``sign`` in place, with ``channels`` taken from their reciprocals."""
-    check_range(channels, len(rows), "--impute-channels")
-    partner = partners(rows, n) if channels else {}
-    for channel in channels:
-        if channel not in partner or partner[channel][0] in channels:
-            raise UsageError(
-                f"--impute-channels {channel}: {rows[channel].tolist()} has no good reciprocal; use"
-                " --drop-channels"
-            )
-        other, between = partner[channel]
-        index[channel], sign[channel] = index[other], between * sign[other]
-    return index
 
 
 def _expected(model: Model) -> NDArray[np.float64]:

@@ -65,18 +65,24 @@ def imputed(
 ) -> FloatArray:
     """``values`` (n, m) with ``channels`` replaced by their reciprocals among ``rows`` (m, 4)."""
     check_range(channels, len(rows), "--impute-channels")
-    if not channels:
-        return values
-    filled, partner = values.copy(), partners(rows, n_electrodes)
+    filled = values.copy()
+    for channel, (other, sign) in good_reciprocals(channels, rows, n_electrodes).items():
+        filled[:, channel] = sign * values[:, other]
+    return filled
+
+
+def good_reciprocals(
+    channels: Sequence[int], rows: IntArray, n_electrodes: int
+) -> dict[int, tuple[int, int]]:
+    """For each of ``channels`` the one that fills it, which is none of them, and the sign."""
+    partner = partners(rows, n_electrodes) if channels else {}
     for channel in channels:
         if channel not in partner or partner[channel][0] in channels:
             raise UsageError(
                 f"--impute-channels {channel}: {rows[channel].tolist()} has no good reciprocal; use"
                 " --drop-channels"
             )
-        other, sign = partner[channel]
-        filled[:, channel] = sign * values[:, other]
-    return filled
+    return {channel: partner[channel] for channel in channels}
 
 
 def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArray:

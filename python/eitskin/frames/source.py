@@ -261,11 +261,8 @@ def _from_arrays(
     path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
 ) -> RawFrames:
     kind = Path(path).suffix[1:].upper()
-    _refuse(
-        options,
-        ("columns", "reference_columns", "delimiter", "header_rows", "label", "pairs"),
-        kind,
-    )
+    of_text = ("columns", "reference_columns", "delimiter", "header_rows", "label", "pairs")
+    _refuse(options, of_text, kind)
     arrays, where = read_arrays(path), str(path)
     if options.voltage is None and list(arrays) == ["array"]:
         options = replace(options, voltage="array")
@@ -284,19 +281,17 @@ def _from_arrays(
     )
     reference = None
     if options.reference is not None:
-        frames_in = (
-            options.frames_in if in_rows is None else FRAMES_IN[1] if in_rows else FRAMES_IN[2]
-        )
+        frames_in = options.frames_in
+        if in_rows is not None:
+            frames_in = "rows" if in_rows else "columns"
         counts = (voltage.shape[1],)
         reference, _ = _frames_of(
             arrays, options.reference, "--reference", counts, frames_in, where, "the frames"
         )
     names: tuple[str, ...] = ()
     if options.names is not None:
-        names = tuple(
-            str(name)
-            for name in np.atleast_1d(pick(arrays, options.names, "--names", where)).ravel()
-        )
+        given = pick(arrays, options.names, "--names", where)
+        names = tuple(map(str, np.atleast_1d(given).ravel()))
     times = None
     if options.time is not None:
         times = _times(pick(arrays, options.time, "--time", where), f"{where}: {options.time}")

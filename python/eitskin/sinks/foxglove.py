@@ -67,10 +67,8 @@ class FoxgloveSink:
         channel = self._channels.get(told.message["type"])
         if channel is None:
             return
-        message = told.message
-        time_s = message["time_unix_s"] if message["time_unix_s"] is not None else message["time_s"]
-        now = round(1e9 * (time_s or 0.0))
-        channel.log(json.dumps(message).encode(), log_time=now)
+        now = told.time_ns
+        channel.log(json.dumps(told.message).encode(), log_time=now)
         if told.frame is not None and told.frame.image is not None and self._model is not None:
             picture = np.nan_to_num(self._model.grid.image(told.frame.image)[::-1])
             height, width = picture.shape

@@ -11,7 +11,7 @@ from typing import Any
 
 from eitskin.errors import missing_extra
 from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
-from eitskin.sinks.udp import connected
+from eitskin.sinks.udp import connected, send
 
 USAGE = "osc://HOST:PORT or osc://HOST:PORT/prefix"
 
@@ -45,11 +45,7 @@ class OscSink:
     def write(self, told: Told) -> None:
         messages = [(self._prefix + path, values) for path, values in osc_messages(told.message)]
         if messages:
-            data = bundle(messages)
-            try:
-                self._socket.send(data)
-            except ConnectionRefusedError:
-                self._socket.send(data)
+            send(self._socket, bundle(messages))
 
     def close(self) -> None:
         self._socket.close()

@@ -53,6 +53,12 @@ class Told:
         return self._item if isinstance(self._item, dict) else self._item.message()
 
     @cached_property
+    def time_ns(self) -> int:
+        """The message's time, UTC where that is known."""
+        unix_s = self.message["time_unix_s"]
+        return round(1e9 * ((self.message["time_s"] if unix_s is None else unix_s) or 0.0))
+
+    @cached_property
     def text(self) -> str:
         """The message as a line of JSON."""
         return encoded(self.message)

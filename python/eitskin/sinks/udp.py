@@ -15,10 +15,7 @@ class UdpSink:
         self._socket = target
 
     def write(self, told: Told) -> None:
-        try:
-            self._socket.send(told.text.encode())
-        except ConnectionRefusedError:  # of a datagram before: nobody listens on this machine
-            self._socket.send(told.text.encode())
+        send(self._socket, told.text.encode())
 
     def close(self) -> None:
         self._socket.close()
@@ -28,6 +25,14 @@ def open_sink(url: str, source: Source) -> Sink:
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE)
     return UdpSink(connected(url, host, port))
+
+
+def send(target: socket.socket, data: bytes) -> None:
+    """One datagram; nobody need listen."""
+    try:
+        target.send(data)
+    except ConnectionRefusedError:  # of a datagram before: nobody listens on this machine
+        target.send(data)
 
 
 def connected(url: str, host: str, port: int) -> socket.socket:

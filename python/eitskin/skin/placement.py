@@ -58,12 +58,8 @@ def by_points(
         along = np.mod(start - arc_mm if way else arc_mm - start, perimeter)
         steps = np.mod(np.diff(along), perimeter)
         if steps.sum() < perimeter:
-            return Placed(
-                tuple(
-                    float(value) for value in along[0] + np.concatenate([[0.0], np.cumsum(steps)])
-                ),
-                way,
-            )
+            places = along[0] + np.concatenate([[0.0], np.cumsum(steps)])
+            return Placed(tuple(places.tolist()), way)
     way_text = {None: "", True: " clockwise", False: " counterclockwise"}[clockwise]
     raise GeometryError(
         f"electrodes: {len(points)} places are not in order along the rim{way_text}; give them one"
@@ -93,9 +89,8 @@ def by_marks(
     arc_mm, _ = nearest_on_rim(outline, middles)
     start, way = outline.arc_length_at_angle(start_angle_deg), bool(clockwise)
     along = np.mod(start - arc_mm if way else arc_mm - start, outline.perimeter_mm)
-    return by_points(
-        outline, middles[np.argsort(along, kind="stable")], start_angle_deg, way, snap_mm
-    )
+    order = np.argsort(along, kind="stable")
+    return by_points(outline, middles[order], start_angle_deg, way, snap_mm)
 
 
 def nearest_on_rim(outline: Outline, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -134,13 +134,10 @@ class Protocol:
                     " keep at most two"
                 )
         members = list(groups.values())
-        return Reciprocity(
-            first=np.array([rows[0] for rows in members], dtype=np.int64),
-            second=np.array(
-                [rows[1] if len(rows) == 2 else -1 for rows in members], dtype=np.int64
-            ),
-            sign=np.array([signs[rows[0]] * signs[rows[-1]] for rows in members], dtype=np.int64),
-        )
+        first = [rows[0] for rows in members]
+        second = [rows[1] if len(rows) == 2 else -1 for rows in members]
+        sign = [signs[rows[0]] * signs[rows[-1]] for rows in members]
+        return Reciprocity(*(np.array(one, dtype=np.int64) for one in (first, second, sign)))
 
 
 def adjacent(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
@@ -285,11 +282,7 @@ def _rows_of_table(toml_table: Mapping[str, Any], where: str) -> list[list[int]]
     if not isinstance(rows, list):
         raise ConfigError(f'{where}: kind = "table" needs table = [[I+, I-, V+, V-], ...]')
     for k, row in enumerate(rows):
-        if (
-            not isinstance(row, list)
-            or len(row) != 4
-            or any(type(value) is not int for value in row)
-        ):
+        if not (isinstance(row, list) and len(row) == 4 and {*map(type, row)} == {int}):
             raise ConfigError(
                 f"{where}: table row {k} (from 0) must be four whole numbers, not {row!r}"
             )

@@ -108,11 +108,9 @@ class Point:
     def macs(self, where: Conditions) -> tuple[float, float] | None:
         """Mean and most MACs of solve and touches there."""
         score = self.score(where)
-        return (
-            None
-            if score is None
-            else (score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"])
-        )
+        if score is None:
+            return None
+        return score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"]
 
     def cost(self, unit: str, board: str, where: Conditions, worst: bool = False) -> float | None:
         """Solve and touches of a frame in ``unit``: the mean (host: the median), or of the
@@ -138,11 +136,9 @@ class Point:
     def fits_f767(self) -> bool:
         """Whether flash and RAM of the NUCLEO-F767ZI hold model and workspace, and model and SOLVER
         command the settings."""
-        fits = (
-            self.costs["flash_bytes"] <= BANK_BYTES - RECORD_BYTES
-            and self.costs["ram_bytes"] <= F767_RAM
-        )
-        return bool(fits) and not unusual(self.configuration) - MODEL_HOLDS - board_takes()
+        fits = self.costs["flash_bytes"] <= BANK_BYTES - RECORD_BYTES
+        fits = bool(fits and self.costs["ram_bytes"] <= F767_RAM)
+        return fits and not unusual(self.configuration) - MODEL_HOLDS - board_takes()
 
 
 def unusual(one: Configuration) -> set[str]:
@@ -290,11 +286,7 @@ def check_wish(target: Target) -> Target:
         raise UsageError(f"--accuracy {target.accuracy:g} is an MIoU; use above 0 to below 1")
     if target.period_us is not None and not target.period_us > 0:
         raise UsageError("--period must be above 0")
-    if (
-        target.board == "host"
-        and target.budget is not None
-        and target.budget.unit == "instructions"
-    ):
+    if target.board == "host" and target.unit == "instructions":
         raise UsageError(
             "instructions are counted on the Cortex-M7; use a time or MACs for the host, or "
             " --board f767"
@@ -308,13 +300,10 @@ def choose(points: Iterable[Point], target: Target, what: str = "measured point"
     ``what`` names the points in the refusal."""
     known = []
     for one in points:
-        cost, accuracy = (
-            one.cost(target.unit, target.board, target.where, target.worst),
-            one.accuracy(target.where),
-        )
-        usable = one.configuration.touch_sweeps >= MIN_SWEEPS and (
-            target.board == "host" or one.fits_f767
-        )
+        cost = one.cost(target.unit, target.board, target.where, target.worst)
+        accuracy = one.accuracy(target.where)
+        fits = target.board == "host" or one.fits_f767
+        usable = fits and one.configuration.touch_sweeps >= MIN_SWEEPS
         if cost is not None and accuracy is not None and usable:
             known.append((cost, accuracy, one))
     if not known:
@@ -326,8 +315,7 @@ def choose(points: Iterable[Point], target: Target, what: str = "measured point"
     if not known:
         raise UsageError(
             f"no {what} measures a frame within {target.acquisition_us / 1000:g} ms; allow more"
-            f" with "
-            " --period"
+            " with  --period"
         )
     within = [row for row in known if target.budget is None or row[0] <= target.budget.value]
     if not within:
