@@ -18,6 +18,7 @@ from eitskin.core.results import (
     Options,
     Reconstruction,
     check_reference_frames,
+    check_shape,
     known_touch,
 )
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
@@ -239,11 +240,7 @@ class CoreEngine:
     ) -> list[Reconstruction | FrameError]:
         """Frames (k, m) volts, each as after :meth:`forget`, in one call of C, which runs without
         Python's lock; a frame that cannot be used gives its error, and the others are done."""
-        if frames.ndim != 2 or frames.shape[1] != self.n_rows:
-            raise FrameError(
-                f"frames: have shape {frames.shape}, but the model's protocol has {self.n_rows}"
-                " rows"
-            )
+        check_shape(frames, self.n_rows, "frames")
         count = len(frames)
         given = np.ascontiguousarray(frames, dtype=self.dtype)
         images, coefficients = (

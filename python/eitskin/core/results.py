@@ -55,6 +55,14 @@ def _check_number(name: str, value: Any, low: float, high: float, *, whole: bool
         raise UsageError(f"options: {name} = {value!r} is out of range; use {low:g} to {high:.10g}")
 
 
+def check_shape(frames: npt.NDArray[Any], n_rows: int, what: str, least: int = 0) -> None:
+    """Refuse ``frames``, ``what`` in the error, that are not (k, n_rows), k at ``least``."""
+    if frames.ndim != 2 or frames.shape[1] != n_rows or len(frames) < least:
+        raise FrameError(
+            f"{what}: of shape {frames.shape}, but the model's protocol has {n_rows} rows"
+        )
+
+
 def check_reference_frames(
     frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], saturation_v: float
 ) -> None:

@@ -62,7 +62,7 @@ def run_board_demo(url: str) -> BoardDemo:
         take_reference(device, TARE_FRAMES, streamed=True)
         began_us, _ = begin_scene(device)
         if began_us is not None:
-            truth.begin(began_us)
+            truth.began_us = began_us
         every = carried_every(device, EVERYTHING)
         for item in follow(device, EVERYTHING, every=every, frames=FRAMES):
             if isinstance(item, LiveFrame):

@@ -281,7 +281,7 @@ class Session:
         if hasattr(self.device.transport, "looking_on"):
             self.device.transport.looking_on = None
         if self.truth is not None and began_us is not None:
-            self.truth.begin(began_us)
+            self.truth.began_us = began_us
         events = Events()
         for item in meanwhile:
             for text in events.lines(item):
