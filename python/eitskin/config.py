@@ -1,5 +1,5 @@
 """TOML tables to dataclasses, strictly: an unknown key is an error that names the nearest known
-one."""
+one. What cannot be read raises ConfigError, with the file, the table and the key."""
 
 import difflib
 import re
@@ -43,18 +43,12 @@ def load_toml(path: str | Path, what: str) -> dict[str, Any]:
 
 
 def parse_toml(text: str, what: str, where: str) -> dict[str, Any]:
-    """The table in ``text``, a ``what``; ``where`` names it in errors.
-
-    Raises:
-        ConfigError: it is not TOML, or has keys of too many parts.
-    """
+    """The table in ``text``, a ``what``; ``where`` names it in errors."""
     try:
         if DEEP_KEY.search(text):
             raise ConfigError(f"{where}: not a {what}: a key of over {MAX_KEY_PARTS} parts")
         return tomllib.loads(text)
-    except (
-        ValueError
-    ) as error:  # TOMLDecodeError is one; whole numbers of thousands of digits are another
+    except ValueError as error:  # also of whole numbers of thousands of digits
         raise ConfigError(f"{where}: not valid TOML: {error}") from None
     except RecursionError:
         raise ConfigError(f"{where}: not a {what}: nested too deeply") from None
@@ -68,18 +62,14 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {close[0]!r}?" if close else f"known are: {listed(choices)}"
 
 
-def listed(items: Sequence[object], most: int = MAX_LISTED) -> str:
+def listed(items: Sequence[object]) -> str:
     """ "a, b, c", or of a long list its beginning and how many more there are."""
-    shown = ", ".join(map(str, items[:most]))
-    return shown if len(items) <= most else f"{shown} and {len(items) - most} more"
+    shown = ", ".join(map(str, items[:MAX_LISTED]))
+    return shown if len(items) <= MAX_LISTED else f"{shown} and {len(items) - MAX_LISTED} more"
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
-    """Refuse keys of ``table`` that are not ``known``; ``where`` says file and table.
-
-    Raises:
-        ConfigError: naming the key and the nearest known one.
-    """
+    """Refuse keys of ``table`` that are not ``known``; ``where`` says file and table."""
     allowed = set(known)
     for key in table:
         if key not in allowed:
@@ -98,11 +88,7 @@ def number(
     unit: str = "",
 ) -> float:
     """The number at ``key``, or ``default`` (None: required), within [low, high] ((low, high] with
-    ``open_low``); ``unit`` is said with the range.
-
-    Raises:
-        ConfigError: it is absent and required, no number, not finite, or out of range.
-    """
+    ``open_low``); ``unit`` is said with the range."""
     value = table.get(key, default)
     if value is None:
         raise ConfigError(f"{where}: the key {key!r} is required")
@@ -126,11 +112,7 @@ def number(
 def integer(
     table: Mapping[str, Any], key: str, default: int | None, where: str, *, low: int, high: int
 ) -> int:
-    """The whole number at ``key``, or ``default`` (None: required), within [low, high].
-
-    Raises:
-        ConfigError: it is absent and required, no whole number, or out of range.
-    """
+    """The whole number at ``key``, or ``default`` (None: required), within [low, high]."""
     value = number(table, key, default, where, low=low, high=high)
     if value != int(value):
         raise ConfigError(f"{where}: {key} = {value!r} must be a whole number")
@@ -138,11 +120,7 @@ def integer(
 
 
 def flag(table: Mapping[str, Any], key: str, default: bool | None, where: str) -> bool:
-    """The truth value at ``key``, or ``default`` (None: required).
-
-    Raises:
-        ConfigError: it is something else.
-    """
+    """The truth value at ``key``, or ``default`` (None: required)."""
     value = table.get(key, default)
     if not isinstance(value, bool):
         raise ConfigError(f"{where}: {key} must be true or false, not {value!r}")
@@ -150,11 +128,7 @@ def flag(table: Mapping[str, Any], key: str, default: bool | None, where: str) -
 
 
 def word(table: Mapping[str, Any], key: str, default: str | None, where: str) -> str:
-    """The text at ``key``, or ``default`` (None: required).
-
-    Raises:
-        ConfigError: it is something else.
-    """
+    """The text at ``key``, or ``default`` (None: required)."""
     value = table.get(key, default)
     if not isinstance(value, str):
         raise ConfigError(f"{where}: {key} must be text in quotes, not {value!r}")
@@ -162,11 +136,7 @@ def word(table: Mapping[str, Any], key: str, default: str | None, where: str) ->
 
 
 def subtable(table: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
-    """The table at ``key``, empty where there is none.
-
-    Raises:
-        ConfigError: it is something else.
-    """
+    """The table at ``key``, empty where there is none."""
     value = table.get(key, {})
     if not isinstance(value, Mapping):
         raise ConfigError(f"{where}: {key} must be a table: write [{key}]")
@@ -176,11 +146,7 @@ def subtable(table: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any
 def choice(
     table: Mapping[str, Any], key: str, default: str | None, known: Iterable[str], where: str
 ) -> str:
-    """The word at ``key``, or ``default`` (None: required), one of ``known``.
-
-    Raises:
-        ConfigError: it is absent and required, or not one of ``known``.
-    """
+    """The word at ``key``, or ``default`` (None: required), one of ``known``."""
     options = list(known)
     value = table.get(key, default)
     if value is None:

@@ -23,11 +23,7 @@ MOST_BYTES = 100_000_000
 
 def refuse_unwritable(*paths: str | Path | None) -> None:
     """Refuse before long work the outputs that ``write_beside`` would refuse after it; None stands
-    for no output.
-
-    Raises:
-        FileError: a path's folder does not exist or may not be written, or it is a folder itself.
-    """
+    for no output."""
     for path in (Path(given) for given in paths if given is not None):
         if not path.parent.is_dir():
             raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
@@ -47,9 +43,6 @@ def write_beside(path: str | Path) -> Iterator[Path]:
 
     A regular file is replaced by rename and keeps its mode; a link is followed. What is no regular
     file (a device, a FIFO) is never replaced: the content is written into it.
-
-    Raises:
-        FileError: the folder does not exist or cannot be written.
     """
     target = followed(path)
     special = target.exists() and not target.is_file()
@@ -79,11 +72,7 @@ def write_beside(path: str | Path) -> Iterator[Path]:
 
 
 def followed(path: str | Path) -> Path:
-    """Where links lead from ``path``; the file at the end need not exist.
-
-    Raises:
-        FileError: the links go in a circle, or a name is too long.
-    """
+    """Where links lead from ``path``; the file at the end need not exist."""
     path = Path(path)
     try:
         if path.exists() and not path.is_file():
@@ -152,11 +141,7 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def read_bytes(path: str | Path, what: str, most: int = MOST_BYTES) -> bytes:
-    """The content of ``path``; ``what`` names its kind in the error ("model", "frames file").
-
-    Raises:
-        FileError: it does not exist, cannot be read, or has over ``most`` bytes.
-    """
+    """The content of ``path``; ``what`` names its kind in the error ("model", "frames file")."""
     try:
         with Path(path).open("rb") as stream:
             content = stream.read(most + 1)
@@ -174,12 +159,7 @@ def read_bytes(path: str | Path, what: str, most: int = MOST_BYTES) -> bytes:
 
 
 def read_mat(path: str | Path) -> dict[str, Any]:
-    """The variables of a .mat file (MATLAB 5 to 7, Octave's -v7): structs as dicts.
-
-    Raises:
-        FileError: it cannot be read.
-        MissingExtraError: scipy is not installed.
-    """
+    """The variables of a .mat file (MATLAB 5 to 7, Octave's -v7): structs as dicts."""
     try:
         from scipy.io import loadmat
     except ImportError:
@@ -204,11 +184,7 @@ def read_mat(path: str | Path) -> dict[str, Any]:
 
 
 def parse_json(text: str | bytes) -> Any:
-    """The values of a JSON ``text``.
-
-    Raises:
-        ValueError: it is no JSON, not UTF-8, or nested too deeply.
-    """
+    """The values of a JSON ``text``."""
     try:
         return json.loads(text)
     except RecursionError:

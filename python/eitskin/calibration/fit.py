@@ -148,17 +148,12 @@ def places_of(place_mm: FloatArray) -> IntArray:
 def weights_of(force_n: FloatArray) -> FloatArray:
     """The different loads, ascending."""
     ascending = np.sort(force_n)
-    return np.asarray(
-        ascending[np.concatenate([[True], ascending[1:] > SAME_WEIGHT * ascending[:-1]])]
-    )
+    another = ascending[1:] > SAME_WEIGHT * ascending[:-1]
+    return np.asarray(ascending[np.concatenate([[True], another])])
 
 
 def check_presses(presses: Presses) -> None:
-    """Refuse what cannot fix a law.
-
-    Raises:
-        FrameError: too few presses or weights, or weights too much alike.
-    """
+    """Refuse what cannot fix a law."""
     if len(presses) < MIN_PRESSES:
         raise FrameError(
             f"calibration: {len(presses)} presses are too few; record at least {MIN_PRESSES} that"
@@ -199,20 +194,16 @@ def calibrate(
         )
     by_place = groups >= MIN_PRESSES
     fold = place if by_place else np.arange(len(presses))
-    forms = [
-        name
-        for name, shape in FORMS.items()
-        if len(weights_of(presses.force_n)) >= shape.least_weights
-    ]
+    different = len(weights_of(presses.force_n))
+    forms = [name for name, shape in FORMS.items() if different >= shape.least_weights]
     middle = min(max(orders), LAW_ORDER)
     tried = {(form, middle): _left_out(presses, radius_mm, fold, form, middle) for form in forms}
     form, _ = _best(tried)
-    others = {
-        order: _left_out(presses, radius_mm, fold, form, order)
-        for order in orders
-        if order != middle
-    }
-    tried = {(form, order): others.get(order, tried[form, middle]) for order in orders}
+    known = {middle: tried[form, middle]}
+    for order in orders:
+        if order != middle:
+            known[order] = _left_out(presses, radius_mm, fold, form, order)
+    tried = {(form, order): known[order] for order in orders}
     _, order = _best(tried)
     fitted = fit(presses, radius_mm, form, order)
     if _steepness(fitted, presses.force_n) < MIN_STEEPNESS:
@@ -242,11 +233,7 @@ def _steepness(fitted: FittedLaw, force_n: FloatArray) -> float:
 
 
 def fit(presses: Presses, radius_mm: float, form: str, order: int) -> FittedLaw:
-    """One law and order to all ``presses``.
-
-    Raises:
-        MissingExtraError: scipy is not installed.
-    """
+    """One law and order to all ``presses``."""
     try:
         from scipy.optimize import least_squares
     except ImportError:
@@ -270,12 +257,10 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> FittedLaw:
         gain = np.maximum(1 + terms @ p[count:], 0.05)
         jacobian = np.zeros((len(log_strength) + free, len(p)))
         for k in range(count):
-            step = (
-                np.exp(p[:count] + STEP * (np.arange(count) == k)),
-                np.exp(p[:count] - STEP * (np.arange(count) == k)),
-            )
+            step = STEP * (np.arange(count) == k)
             up, down = (
-                np.log(np.maximum(shape.strength(presses.force_n, *at), 1e-300)) for at in step
+                np.log(np.maximum(shape.strength(presses.force_n, *np.exp(at)), 1e-300))
+                for at in (p[:count] + step, p[:count] - step)
             )
             jacobian[: len(log_strength), k] = (down - up) / (2 * STEP)
         jacobian[: len(log_strength), count:] = terms / gain[:, None]
@@ -319,9 +304,8 @@ def _left_out(
         out = fold == number
         kept = presses.take(~out)
         law = law_of(fit(kept, radius_mm, form, order), kept, radius_mm, 0.0)
-        errors[out] = (
-            law.forces_at(presses.place_mm[out], presses.strength[out]) / presses.force_n[out] - 1
-        )
+        found = law.forces_at(presses.place_mm[out], presses.strength[out])
+        errors[out] = found / presses.force_n[out] - 1
     return errors
 
 

@@ -29,7 +29,6 @@ class Presses:
         return len(self.force_n)
 
     def take(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> "Presses":
-        """Some of them."""
         return Presses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
 
 
@@ -50,31 +49,19 @@ def find_presses(
     where: str,
 ) -> tuple[Presses, list[str]]:
     """The presses of ``weights`` in ``frames``, whose frames are counted by ``numbers``; and a line
-    for each that shows no touch.
-
-    Raises:
-        FrameError: a press has no frame here, or the quiet frames cannot be used.
-    """
+    for each that shows no touch."""
     at = {number: k for k, number in enumerate(numbers)}
     reconstructor.tare(frames.reference_voltage_v)
     seen: list[tuple[float, float, float, float]] = []
     unseen: list[str] = []
     for weight in weights:
-        rows = (
-            [at[number] for number in range(weight.first, weight.last + 1) if number in at]
-            if len(at)
-            else []
-        )
+        rows = [k for number, k in at.items() if weight.first <= number <= weight.last]
         name = f"{where}: frames {weight.first} to {weight.last}"
         if not rows:
-            raise FrameError(
-                f"{name} of the list of weights are not there; it has {_span(numbers)}"
-            )
-        touches = [
-            touch
-            for row in rows
-            if (touch := _pressed(reconstructor, frames.voltage_v[row], weight)) is not None
-        ]
+            held = f"frames {min(numbers)} to {max(numbers)}" if numbers else "no frames"
+            raise FrameError(f"{name} of the list of weights are not there; it has {held}")
+        shown = (_pressed(reconstructor, frames.voltage_v[row], weight) for row in sorted(rows))
+        touches = [touch for touch in shown if touch is not None]
         if 2 * len(touches) <= len(rows):
             unseen.append(f"{name}: {len(touches)} of {len(rows)} show the weight; left out")
             continue
@@ -82,10 +69,6 @@ def find_presses(
         seen.append((weight.force_n, *found.tolist()))
     table = np.array(seen, dtype=np.float64).reshape(-1, 4)
     return Presses(table[:, 0], table[:, 1], table[:, 2:]), unseen
-
-
-def _span(numbers: Sequence[int]) -> str:
-    return f"frames {min(numbers)} to {max(numbers)}" if len(numbers) else "no frames"
 
 
 def _pressed(reconstructor: Reconstructor, frame_v: FloatArray, weight: Weight) -> Touch | None:

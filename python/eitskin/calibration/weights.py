@@ -65,16 +65,9 @@ def _csv_rows(path: Path) -> list[tuple[Mapping[str, Any], str]]:
         where = f"{path}: row {k + 1} below the header"
         if len(cells) != len(head):
             raise ConfigError(f"{where}: {len(cells)} cells under {len(head)} names; give as many")
-        rows.append(
-            (
-                {
-                    name: _number(cell, name, where)
-                    for name, cell in zip(head, cells, strict=True)
-                    if cell.strip()
-                },
-                where,
-            )
-        )
+        named = zip(head, cells, strict=True)
+        row = {name: _number(cell, name, where) for name, cell in named if cell.strip()}
+        rows.append((row, where))
     return rows
 
 
@@ -95,15 +88,9 @@ def _weight(row: Mapping[str, Any], where: str) -> Weight:
         raise ConfigError(f"{where}: a place needs x_mm and y_mm; give both or none")
     first = integer(row, "first", None, where, low=0, high=MAX_FRAMES)
     last = integer(row, "last", first, where, low=first, high=MAX_FRAMES)
-    if "weight_g" in row:
-        force_n = NEWTONS_PER_GRAM * number(
-            row, "weight_g", None, where, low=0, high=MAX_FORCE_N / NEWTONS_PER_GRAM, open_low=True
-        )
-    else:
-        force_n = number(row, "force_n", None, where, low=0, high=MAX_FORCE_N, open_low=True)
-    place = (
-        (number(row, "x_mm", None, where), number(row, "y_mm", None, where))
-        if "x_mm" in row
-        else None
-    )
-    return Weight(first, last, force_n, place)
+    key, unit_n = ("weight_g", NEWTONS_PER_GRAM) if "weight_g" in row else ("force_n", 1.0)
+    load = number(row, key, None, where, low=0, high=MAX_FORCE_N / unit_n, open_low=True)
+    place = None
+    if "x_mm" in row:
+        place = number(row, "x_mm", None, where), number(row, "y_mm", None, where)
+    return Weight(first, last, unit_n * load, place)

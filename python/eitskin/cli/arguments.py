@@ -24,11 +24,7 @@ class Output(PosixPath):
 
 
 def refuse_named_twice(options: argparse.Namespace) -> None:
-    """Refuse an output that another option names too, before it is written over.
-
-    Raises:
-        UsageError: one is.
-    """
+    """Refuse an output that another option names too, before it is written over."""
     named = list(_files_of(options))
     for name, path in named:
         for other, file in named:

@@ -13,7 +13,6 @@ SCAN = ("samples", "full", "reciprocal")  # a preset chooses them, too
 
 
 def add_wish(parser: Any) -> None:
-    """Add them."""
     option(
         parser,
         "--preset",
@@ -26,11 +25,7 @@ def add_wish(parser: Any) -> None:
 
 
 def named_target(options: argparse.Namespace, board: str) -> Target | None:
-    """What they ask for where any is given; else None.
-
-    Raises:
-        UsageError: what cannot be, or a setting that they choose is given too.
-    """
+    """What they ask for where any is given; else None."""
     given = [name for name in WISHES if getattr(options, name) is not None]
     if not given:
         return None
@@ -49,11 +44,7 @@ def read_target(
     where: Conditions | None = None,
     period: str | None = None,
 ) -> Target:
-    """What ``--preset``, or ``--budget`` and ``--accuracy``, ask for.
-
-    Raises:
-        UsageError: nothing, or what cannot be.
-    """
+    """What ``--preset``, or ``--budget`` and ``--accuracy``, ask for."""
     if options.preset is not None:
         if options.budget is not None or options.accuracy is not None or period is not None:
             raise UsageError(

@@ -4,7 +4,7 @@ import argparse
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import add_device, open_named
-from eitskin.cli.printing import print_json, print_table
+from eitskin.cli.printing import answer, table
 from eitskin.device.wire.link_table import Setting
 
 SETTINGS = (  # bits of eits_setting, each with what sets and what clears it
@@ -27,7 +27,6 @@ SETTINGS = (  # bits of eits_setting, each with what sets and what clears it
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``board``."""
     parser.description = (
         "Show or change what a board's owner has set; the board keeps it over a loss of power."
         " A locked board takes changes only while its blue button is held."
@@ -48,7 +47,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Change what is named, and show all."""
     with open_named(options) as device:
         if options.clear_faults:
             device.clear_faults()
@@ -62,10 +60,6 @@ def run(options: argparse.Namespace) -> int:
             info = device.settings(wanted, options.limit_ua)
         url = device.transport.url
     facts = {"settings": info.setting_names, "current_limit_ua_rms": info.current_limit_ua_rms}
-    if options.json:
-        print_json({"device": url, **facts})
-    else:
-        limit = f"{info.current_limit_ua_rms} uA rms" if info.current_limit_ua_rms else "none"
-        print_table({"device": url, "settings": ", ".join(info.setting_names) or "none",
-                     "limit": limit})  # fmt: skip
-    return 0
+    limit = f"{info.current_limit_ua_rms} uA rms" if info.current_limit_ua_rms else "none"
+    shown = {"device": url, "settings": ", ".join(info.setting_names) or "none", "limit": limit}
+    return answer(options, {"device": url, **facts}, table(shown))

@@ -12,7 +12,7 @@ from eitskin.calibration.fit import FORMS, Calibration, calibrate
 from eitskin.calibration.presses import find_presses, joined
 from eitskin.calibration.weights import load_weights
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.printing import print_json
+from eitskin.cli.printing import answer
 from eitskin.core.results import force_text
 from eitskin.device.recordings.raw_frames import finite_only
 from eitskin.device.recordings.recording import frames_of
@@ -26,7 +26,6 @@ from eitskin.solve.reconstructor import Reconstructor
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``calibrate``."""
     parser.description = (
         "Fit the law that turns a touch's strength and place into its load to recordings of"
         " known weights, say how far it is to be trusted, and store it in a copy of the model."
@@ -54,7 +53,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Find the presses, fit, write, say."""
     if len(options.recordings) != len(options.weights):
         raise UsageError(
             f"calibrate: {len(options.recordings)} recordings and {len(options.weights)} lists of"
@@ -83,23 +81,11 @@ def run(options: argparse.Namespace) -> int:
     found = calibrate(joined(parts), radius_mm, options.seed)
     if options.output is not None:
         save_model(options.output, calibrated(model, found))
-    if options.json:
-        print_json(
-            {
-                "model": name,
-                "output": str(options.output or ""),
-                "left_out": unseen,
-                **found.as_dict(),
-            }
-        )
-    else:
-        print("\n".join(_lines(found)))
-        print(
-            f"{options.output}: {name} with this calibration"
-            if options.output
-            else "not stored; name a model with -o"
-        )
-    return 0
+    stored = "not stored; name a model with -o"
+    if options.output:
+        stored = f"{options.output}: {name} with this calibration"
+    facts = {"model": name, "output": str(options.output or ""), "left_out": unseen}
+    return answer(options, facts | found.as_dict(), *_lines(found), stored)
 
 
 def calibrated(model: Model, found: Calibration) -> Model:

@@ -7,7 +7,6 @@ from eitskin.errors import missing_extra
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``completion``."""
     parser.description = (
         "Print the script for your shell, such as with  eitskin completion bash >"
         " ~/.local/share/bash-completion/completions/eitskin ; zsh takes it as a file _eitskin"
@@ -18,11 +17,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the script.
-
-    Raises:
-        MissingExtraError: shtab is not installed.
-    """
     try:
         import shtab
     except ImportError:

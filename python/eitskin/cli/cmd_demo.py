@@ -3,7 +3,8 @@ the truth."""
 
 import argparse
 import sys
-from typing import Any
+from collections.abc import Callable
+from itertools import count
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.printing import print_json
@@ -17,7 +18,6 @@ BOARD = "emu:demo"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``demo``."""
     parser.description = (
         "Simulate three touches on the paper's skin (nonlinear forward model on another, finer"
         " mesh, noise), reconstruct them with the C core and the prebuilt model, and draw them;"
@@ -34,7 +34,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate, reconstruct, print, draw."""
     from eitskin.demo.demo import run_demo, to_json, to_text
     from eitskin.view.demo_picture import draw_demo
 
@@ -42,7 +41,12 @@ def run(options: argparse.Namespace) -> int:
     if not -20 <= options.snr_db <= 200 or options.seed < 0:
         raise UsageError("demo: --snr-db must be -20 to 200 and --seed at least 0")
     check_picture(options.picture)
-    step = _Steps(3 if options.no_board else 4)
+    numbers, total = count(1), 3 if options.no_board else 4
+
+    def step(text: str) -> None:
+        """Say on stderr which step starts, so that nobody waits before a silent terminal."""
+        print(f"{next(numbers)}/{total} {text}", file=sys.stderr, flush=True)
+
     demo = run_demo(options.seed, options.snr_db, step)
     if options.frames is not None:
         save_frames(options.frames, demo.frames)
@@ -52,25 +56,14 @@ def run(options: argparse.Namespace) -> int:
         print(f"{to_text(demo)}\npicture: {options.picture}", flush=True)
     board = None if options.no_board else _board(step)
     if options.json:
-        print_json({**to_json(demo), "picture": str(options.picture), "board": _board_json(board)})
+        told = None if board is None else demo_board.to_json(board)
+        print_json({**to_json(demo), "picture": str(options.picture), "board": told})
     elif board is not None:
         print(f"\n{demo_board.to_text(board)}")
     return 0
 
 
-class _Steps:
-    """Say on stderr which step starts, so that nobody waits before a silent terminal."""
-
-    def __init__(self, total: int) -> None:
-        self.total = total
-        self.count = 0
-
-    def __call__(self, text: str) -> None:
-        self.count += 1
-        print(f"{self.count}/{self.total} {text}", file=sys.stderr, flush=True)
-
-
-def _board(step: _Steps) -> demo_board.BoardDemo | None:
+def _board(step: Callable[[str], None]) -> demo_board.BoardDemo | None:
     """The same touches on the emulated board; None, with a word on stderr, where emulator or
     firmware are not installed."""
     step("the same by the firmware, on an emulated board; ten to thirty seconds")
@@ -79,7 +72,3 @@ def _board(step: _Steps) -> demo_board.BoardDemo | None:
     except (MissingExtraError, FileError) as error:
         print(f"eitskin: without the emulated board: {error}", file=sys.stderr)
         return None
-
-
-def _board_json(board: demo_board.BoardDemo | None) -> dict[str, Any] | None:
-    return None if board is None else demo_board.to_json(board)

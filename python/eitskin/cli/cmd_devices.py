@@ -4,8 +4,8 @@ named."""
 import argparse
 
 from eitskin.cli.arguments import option
-from eitskin.cli.printing import print_json
-from eitskin.device.discovery import FoundPort, discover
+from eitskin.cli.printing import answer
+from eitskin.device.open import FoundPort, discover
 from eitskin.device.source import source_schemes
 
 URLS = {
@@ -18,8 +18,10 @@ URLS = {
 }
 
 
+NO_PORT = "no serial port; without a board, play with  --device sim:two_touch"
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``devices``."""
     parser.description = (
         "List the serial ports of this computer and ask those that look like a board's what"
         " they are. Ports that do not are left alone: name one with  eitskin info --device"
@@ -31,20 +33,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """List, ask, print."""
     found = discover(ask=not options.quiet)
-    if options.json:
-        print_json({"ports": [port.as_dict() for port in found], "urls": URLS})
-        return 0
-    if not found:
-        print("no serial port; without a board, play with  --device sim:two_touch")
-    for port in found:
-        print(_line(port))
-    print("--device takes:")
     brought = {f"{scheme}:...": "a source that a package brings" for scheme in source_schemes()}
-    for url, meaning in (URLS | brought).items():
-        print(f"  {url:14} {meaning}")
-    return 0
+    return answer(
+        options,
+        {"ports": [port.as_dict() for port in found], "urls": URLS},
+        *(map(_line, found) if found else [NO_PORT]),
+        "--device takes:",
+        *(f"  {url:14} {meaning}" for url, meaning in (URLS | brought).items()),
+    )
 
 
 def _line(found: FoundPort) -> str:

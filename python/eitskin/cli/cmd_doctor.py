@@ -35,7 +35,6 @@ TOUCH_RADIUS_PER_SIZE = 0.05
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``doctor``."""
     parser.description = (
         "Say what is wrong with measured frames before an image is made of them: channel order,"
         " sign, numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains,"
@@ -73,7 +72,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, examine, say."""
     if (options.source is None) == (options.device is None):
         raise UsageError("doctor: name frames to examine, or a board: --device URL")
     ring_ohm = options.resistor_ring
@@ -157,12 +155,8 @@ def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subje
         values = floats(text, "--touch")
         if len(values) not in (2, 3):
             raise UsageError(f"--touch {text}: must be X,Y or X,Y,RADIUS in mm")
-        radius = (
-            values[2]
-            if len(values) == 3
-            else TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
-        )
-        touches.append((values[0], values[1], radius))
+        usual = TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
+        touches.append((values[0], values[1], values[2] if len(values) == 3 else usual))
     if not subject.skin.outline.contains([touch[:2] for touch in touches]).all():
         raise UsageError(
             "--touch: a touch lies outside the skin; give millimetres from the outline's centre"

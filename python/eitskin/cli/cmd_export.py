@@ -1,12 +1,12 @@
 """``eitskin export [FRAMES] -o OUT.mat``: model, frames and images for EIDORS."""
 
 import argparse
-import json
 from pathlib import Path
 
 import numpy as np
 
 from eitskin.cli.arguments import Output, option
+from eitskin.cli.printing import answer
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.eidors import save_eidors
 from eitskin.frames.frames import load_frames
@@ -15,7 +15,6 @@ from eitskin.solve.reconstructor import Reconstructor
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``export``."""
     parser.description = (
         "Write EIDORS structs that MATLAB and Octave load: fmdl with electrodes and patterns,"
         " img_bkgnd, the Jacobian J of its elements, c2f from our pixels to them; with frames"
@@ -30,7 +29,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reconstruct, mesh, write."""
     refuse_unwritable(options.output)
     model, blob, _ = load_or_prebuilt(options.model)
     frames, images = None, None
@@ -52,12 +50,8 @@ def run(options: argparse.Namespace) -> int:
         images_s_per_m=images,
     )
     count = 0 if frames is None else frames.n_frames
-    if options.json:
-        facts = {"written": str(options.output), "nodes": nodes, "elements": elements}
-        print(json.dumps(facts | {"frames": count}))
-        return 0
-    print(
-        f"{options.output}: fmdl of {nodes} nodes and {elements} elements, img_bkgnd, J, c2f"
-        + (f"; vh, vi and img of {count} frames" if frames is not None else "")
-    )
-    return 0
+    facts = {"written": str(options.output), "nodes": nodes, "elements": elements, "frames": count}
+    text = f"{options.output}: fmdl of {nodes} nodes and {elements} elements, img_bkgnd, J, c2f"
+    if frames is not None:
+        text += f"; vh, vi and img of {count} frames"
+    return answer(options, facts, text)

@@ -9,18 +9,15 @@ from hashlib import sha256
 from pathlib import Path
 
 from eitskin.cli.arguments import option
-from eitskin.device.flash import plan_flash, run_flash
+from eitskin.device.flash import TOOLS, plan_flash, run_flash
 from eitskin.errors import UsageError
 from eitskin.fileio import write_bytes
 from eitskin.firmware.prebuilt import BOARD, load_image
 from eitskin.model.eitm import load_model
 from eitskin.model.prebuilt import load_prebuilt
 
-TOOLS = ("openocd", "st-flash", "pyocd")
-
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``flash``."""
     parser.description = (
         "Put firmware on a NUCLEO-F767ZI through its ST-LINK, and a model into its first bank,"
         " by whichever of openocd, st-flash and pyocd is installed. The exact commands are"
@@ -37,7 +34,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Plan, print, run."""
     if options.no_model and options.model is not None:
         raise UsageError("flash: --model and --no-model contradict each other; give one of them")
     if options.json and not options.dry_run:

@@ -1,20 +1,18 @@
 """``eitskin import``: somebody else's measured frames to a frames file."""
 
 import argparse
-import json
-import sys
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.import_options import add_import_options, read_options, read_protocol, write_layout
+from eitskin.cli.printing import answer, say
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import save_frames
 from eitskin.frames.importer import import_frames
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``import``."""
     parser.description = (
         "Turn a text, NPY, NPZ or MAT file of measured voltages into a frames file, in the"
         " protocol's order, signed, in volts. Run  eitskin doctor SOURCE  first to learn which"
@@ -28,7 +26,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, repair, write."""
     refuse_unwritable(options.output, options.save_layout)
     protocol, skin, n_electrodes = read_protocol(options)
     named = read_options(options)
@@ -49,17 +46,13 @@ def run(options: argparse.Namespace) -> int:
         "notes": list(frames.meta.get("notes", ())),
     }
     for note in said["notes"]:
-        print(f"eitskin: {options.source}: {note}", file=sys.stderr)
-    if options.json:
-        print(json.dumps(said))
-        return 0
-    print(
+        say(f"{options.source}: {note}")
+    with_skin = "" if options.skin is None else f" --skin {options.skin}"
+    return answer(
+        options,
+        said,
         f"{options.output}: {said['frames']} frame(s) of {said['channels']} channels,"
         f" {said['quiet_frames']} quiet, {said['electrodes']} electrodes, {said['touches']} known"
-        f" touches; unit {said['unit']}"
+        f" touches; unit {said['unit']}",
+        f"next: eitskin doctor {options.output}{with_skin}",
     )
-    print(
-        f"next: eitskin doctor {options.output}"
-        + (f" --skin {options.skin}" if options.skin is not None else "")
-    )
-    return 0

@@ -5,13 +5,12 @@ from typing import Any
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import add_device, open_named
-from eitskin.cli.printing import print_json, print_table
+from eitskin.cli.printing import answer, table
 from eitskin.device.wire.packets import BoardInfo, BoardStats
 from eitskin.model.storage import STORAGES
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``info``."""
     parser.description = (
         "Ask a board what it is, which model it has, how it scans, which faults it reports and"
         " what it has counted."
@@ -22,34 +21,27 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask and print."""
     with open_named(options) as device:
         info, url = device.board, device.transport.url
         replays = device.transport.replays
         stats = None if replays else device.stats(reset=options.reset_statistics)
         hashes = device.hashes().as_dict()
-    if options.json:
-        counted = None if stats is None else stats.as_dict()
-        print_json(
-            {"device": url, "board": info.as_dict(), "sha256": hashes, "statistics": counted}
-        )
-        return 0
-    sums = {f"{name} SHA": one for name, one in hashes.items() if one}
-    print_table(_facts(info, url) | sums | ({} if stats is None else _counted(stats)))
-    if stats is not None:
-        print("stage         count   last us    p99 us  worst us")
-        for name, one in stats.stages.items():
-            print(f"{name:10} {one.count:8d} {one.last_us:9d} {one.p99_us:9d} {one.worst_us:9d}")
-    return 0
+    counted = None if stats is None else stats.as_dict()
+    facts = {"device": url, "board": info.as_dict(), "sha256": hashes, "statistics": counted}
+    shown = _facts(info, url) | {f"{name} SHA": one for name, one in hashes.items() if one}
+    if stats is None:
+        return answer(options, facts, table(shown))
+    stages = [
+        f"{name:10} {one.count:8d} {one.last_us:9d} {one.p99_us:9d} {one.worst_us:9d}"
+        for name, one in stats.stages.items()
+    ]
+    head = "stage         count   last us    p99 us  worst us"
+    return answer(options, facts, table(shown | _counted(stats)), head, *stages)
 
 
 def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
-    facts = {
-        "device": url,
-        "board": info.board,
-        "firmware": info.firmware_text,
-        "serial": info.serial,
-    }
+    facts = {"device": url, "board": info.board, "firmware": info.firmware_text}
+    facts["serial"] = info.serial
     facts["processor"] = f"{info.f_cpu_hz / 1e6:g} MHz" if info.f_cpu_hz else "none (simulated)"
     if info.has_model:
         storage = STORAGES[info.storage] if info.storage < len(STORAGES) else info.storage
@@ -104,10 +96,6 @@ def _used(used: int, room: int) -> str:
 
 
 def _counted(stats: BoardStats) -> dict[str, Any]:
-    link = (
-        f"{stats.link_packets} packets, {stats.link_crc_errors} bad checksums,"
-        f" {stats.link_framing_errors} broken, "
-    )
     return {
         "up": f"{stats.uptime_ms / 1e3:.1f} s",
         "frames": (
@@ -116,7 +104,10 @@ def _counted(stats: BoardStats) -> dict[str, Any]:
             " repeated"
         ),
         "sent": f"{stats.packets_sent} packets, {stats.packets_dropped} dropped for lack of room",
-        "received": f"{link}{stats.link_overruns} too long",
+        "received": (
+            f"{stats.link_packets} packets, {stats.link_crc_errors} bad checksums,"
+            f" {stats.link_framing_errors} broken, {stats.link_overruns} too long"
+        ),
         "stack": _used(stats.stack_used, stats.stack_bytes),
         "workspace": _used(stats.workspace_used, stats.workspace_bytes),
     }

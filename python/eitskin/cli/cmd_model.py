@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from eitskin.cli.arguments import RING_OHM, Output, option
 from eitskin.cli.device_options import DEVICE_HELP
-from eitskin.cli.printing import print_json
+from eitskin.cli.printing import answer, print_json
 from eitskin.cli.progress import bar
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import force_text
@@ -36,7 +36,6 @@ NUMPY_BOUND = 1e-4
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``model``."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
     option(
@@ -119,7 +118,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run_build(options: argparse.Namespace) -> int:
-    """Build and write a model."""
     from eitskin.frames.homogeneous_fem import transfer_by_elements
 
     their = read_eidors(options.skin) if _is_eidors(options) else None
@@ -183,7 +181,6 @@ def run_voltages(options: argparse.Namespace) -> int:
 
 
 def run_info(options: argparse.Namespace) -> int:
-    """Print what is in a model."""
     model, blob, name = load_or_prebuilt(options.model)
     _print_info(model, len(blob), name, options.json)
     return 0
@@ -229,8 +226,7 @@ def _calibration_text(model: Model) -> str:
     law = model.load
     return (
         f"loads to {force_text(law.force_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain"
-        f" of"
-        f" order {law.order}"
+        f" of order {law.order}"
     )
 
 
@@ -247,11 +243,10 @@ def _model_errors_text(model: Model) -> str:
 def run_verify(options: argparse.Namespace) -> int:
     """Run the golden frame; the float32 core must give the stored bits."""
     model, blob, name = load_or_prebuilt(options.model)
+    portable = CoreEngine(blob, "float32", prepared=False, portable=True)
     differences = {
         "C float32": CoreEngine(blob, "float32").self_test(),
-        "C float32, portable": (
-            CoreEngine(blob, "float32", prepared=False, portable=True).self_test()
-        ),
+        "C float32, portable": portable.self_test(),
         "C float64": CoreEngine(blob, "float64").self_test(),
     }
     try:
@@ -260,18 +255,16 @@ def run_verify(options: argparse.Namespace) -> int:
         print(f"eitskin: without numpy: {error}", file=sys.stderr)
     same_bits = differences["C float32"] == 0 and differences["C float32, portable"] == 0
     within = max(differences.values()) <= NUMPY_BOUND
-    if options.json:
-        print_json(
-            {
-                "model": name,
-                "difference_to_golden_over_peak": differences,
-                "ok": same_bits and within,
-            }
-        )
-    else:
-        print(f"{name}: golden frame, greatest difference to the stored image over its peak")
-        for engine, difference in differences.items():
-            print(f"  {engine:20} {'the same bits' if difference == 0 else f'{difference:.2e}'}")
+    facts = {"model": name, "difference_to_golden_over_peak": differences}
+    answer(
+        options,
+        facts | {"ok": same_bits and within},
+        f"{name}: golden frame, greatest difference to the stored image over its peak",
+        *(
+            f"  {engine:20} {'the same bits' if difference == 0 else f'{difference:.2e}'}"
+            for engine, difference in differences.items()
+        ),
+    )
     if not same_bits:
         raise VerificationError(
             f"{name}: the C core does not give the golden image's bits; rebuild the model with this"
@@ -310,12 +303,10 @@ def run_upload(options: argparse.Namespace) -> int:
 
             info = device.upload_model(blob, show)
         url = device.transport.url
-    if options.json:
-        facts = {"device": url, "model": str(options.model), "bytes": len(blob)}
-        print_json(facts | {"model_crc": f"{info.model_crc:08x}", "bank": info.bank})
-    else:
-        print(
-            f"{url}: {options.model} is in bank {info.bank}, {len(blob)} bytes, checksum"
-            f" {info.model_crc:08x}; tare again"
-        )
-    return 0
+    facts = {"device": url, "model": str(options.model), "bytes": len(blob)}
+    return answer(
+        options,
+        facts | {"model_crc": f"{info.model_crc:08x}", "bank": info.bank},
+        f"{url}: {options.model} is in bank {info.bank}, {len(blob)} bytes, checksum"
+        f" {info.model_crc:08x}; tare again",
+    )

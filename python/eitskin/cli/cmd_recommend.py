@@ -6,7 +6,7 @@ from pathlib import Path
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.budget_options import add_wish, read_target
-from eitskin.cli.printing import print_json
+from eitskin.cli.printing import answer
 from eitskin.cli.progress import bar
 from eitskin.errors import UsageError
 from eitskin.fileio import refuse_unwritable
@@ -17,7 +17,6 @@ from eitskin.tuning.recommend import Recommendation, write_model
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``recommend``."""
     parser.description = (
         "Choose from measured results: the most accurate point within --budget, or the cheapest"
         " that reaches --accuracy. The budget holds for solve and touches of the mean frame"
@@ -39,7 +38,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Choose, say why, and write the model."""
     target = read_target(
         options,
         options.board,
@@ -49,28 +47,20 @@ def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.output)
     if options.skin is not None and options.output is None:
         raise UsageError("--skin is for the model; name its file with  -o MODEL.eitm")
-    skin, protocol = (
-        (paper_skin(), adjacent(16)) if options.skin is None else load_skin(options.skin)
-    )
     front = load_front(options.front)
-    point = choose(
-        [one for one in front.points if options.warm or not one.configuration.warm_start], target
-    )
+    usable = [one for one in front.points if options.warm or not one.configuration.warm_start]
+    point = choose(usable, target)
     chosen = Recommendation(point, target)
-    size = None
+    facts, lines = chosen.as_dict() | {"front": front.where_from, "model": None}, [chosen.text()]
     if options.output is not None:
+        named = options.skin
+        skin, protocol = (paper_skin(), adjacent(16)) if named is None else load_skin(named)
         size = write_model(options.output, point, skin, protocol, bar("random skins"))
-    if options.json:
-        model = None if options.output is None else str(options.output)
-        facts = chosen.as_dict() | {"front": front.where_from, "model": model}
-        print_json(facts)
-        return 0
-    print(chosen.text())
-    if size is not None:
-        print(
+        facts["model"] = str(options.output)
+        lines.append(
             f"{options.output}: {size} bytes; its defaults are these settings, as far as a model"
             " holds them"
         )
-        if options.skin is not None:
-            print("the numbers are of the paper's skin; on another one they may differ")
-    return 0
+        if named is not None:
+            lines.append("the numbers are of the paper's skin; on another one they may differ")
+    return answer(options, facts, *lines)

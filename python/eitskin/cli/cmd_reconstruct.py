@@ -2,13 +2,13 @@
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.budget_options import add_wish, named_target
 from eitskin.cli.device_options import add_solver, named_solver
+from eitskin.cli.printing import say
 from eitskin.cli.progress import bar
 from eitskin.errors import FrameError, UsageError
 from eitskin.reconstruct.report import to_json, to_text
@@ -16,7 +16,6 @@ from eitskin.reconstruct.steps import ReconstructSettings, reconstruct_frames
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``reconstruct``."""
     parser.description = (
         "Turn frames into touches in millimetres and images. Where the frames carry the truth,"
         " the touches are compared with it."
@@ -96,12 +95,9 @@ def run(options: argparse.Namespace) -> int:
         progress=bar("frames"),
     )
     for note in outcome.notes:
-        print(f"eitskin: {note}", file=sys.stderr)
+        say(note)
     print(json.dumps(to_json(outcome), indent=2) if options.json else to_text(outcome))
     for number, reason in outcome.refused.items():
-        print(
-            f"eitskin: {options.frames}: frame {number} ({outcome.frames.frame_name[number]})"
-            f" refused: {reason}",
-            file=sys.stderr,
-        )
+        name = outcome.frames.frame_name[number]
+        say(f"{options.frames}: frame {number} ({name}) refused: {reason}")
     return FrameError.exit_code if outcome.refused else 0

@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from eitskin.cli.arguments import Output, above, option
 from eitskin.cli.device_options import add_device, add_scan, add_stream, read_mode, session_settings
-from eitskin.cli.printing import print_json, say, say_progress
+from eitskin.cli.printing import answer, say, say_progress
 from eitskin.device.events import Events
 from eitskin.device.live_frames import Item, LiveDrive, LiveFrame, LiveSummary
 from eitskin.device.wire.packets import Fault
@@ -17,7 +17,6 @@ from eitskin.live.session import Session
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``record``."""
     parser.description = (
         "Take the reference, then write every packet of a board to a file as it comes, the"
         " reference's raw frames included. A recording that is cut, even by kill -9, can be"
@@ -34,29 +33,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Record, then say how much."""
     settings = session_settings(options, read_mode(options.mode), record=options.output)
     with Session(options.device, settings, say=say, progress=say_progress) as session:
         items = session.items()
         try:
             _count(_until(items, options.seconds), session.summary, settings.frames)
         except KeyboardInterrupt:
-            print("eitskin: stopped", file=sys.stderr)
+            say("stopped")
         finally:
             items.close()
         summary, recorder = session.finish(), session.recorder
     assert recorder is not None
-    if options.json:
-        facts = {
-            "recording": str(options.output),
-            "packets": recorder.packets,
-            "bytes": recorder.bytes,
-        }
-        print_json(facts | summary.as_dict())
-    else:
-        print("\n".join(summary.lines()))
-        print(f"{options.output}: {recorder.packets} packets, {recorder.bytes} bytes")
-    return 0
+    facts = {"recording": str(options.output), "packets": recorder.packets, "bytes": recorder.bytes}
+    written = f"{options.output}: {recorder.packets} packets, {recorder.bytes} bytes"
+    return answer(options, facts | summary.as_dict(), *summary.lines(), written)
 
 
 def _until(items: Iterator[Item], seconds: float | None) -> Iterator[Item]:

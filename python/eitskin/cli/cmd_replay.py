@@ -2,13 +2,12 @@
 core."""
 
 import argparse
-import json
 from pathlib import Path
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import add_verbose, add_zones, read_mode, read_zones
 from eitskin.cli.live_output import check_drawn, show
-from eitskin.cli.printing import print_json, say
+from eitskin.cli.printing import answer, say
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.raw_frames import finite_only
 from eitskin.device.recordings.recording import frames_of
@@ -20,7 +19,6 @@ from eitskin.live.settings import SessionSettings
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``replay``."""
     parser.description = (
         "Show a recording as  eitskin stream  showed it; write its raw frames as a frames file;"
         " or put them through this host's core and compare every bit of the images and touches"
@@ -43,7 +41,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show, export or check."""
     refuse_unwritable(options.picture, options.frames)
     if options.check or options.frames is not None:
         shown = (options.mode, options.picture, options.film, options.first)
@@ -79,19 +76,12 @@ def _export(options: argparse.Namespace) -> None:
     frames = frames_of(options.recording, options.model)
     kept, left_out = finite_only(frames, str(options.recording))
     save_frames(options.frames, kept)
-    facts = {
-        "recording": str(options.recording),
-        "frames_file": str(options.frames),
-        "frames": kept.n_frames,
-    }
-    facts |= {"quiet_frames": len(kept.reference_voltage_v), "left_out": left_out}
-    if options.json:
-        print(json.dumps(facts))
-    else:
-        more = f"; {left_out} with rows that could not be measured left out" if left_out else ""
-        print(
-            f"{options.frames}: {kept.n_frames} frames, {len(kept.reference_voltage_v)} quiet{more}"
-        )
+    quiet = len(kept.reference_voltage_v)
+    facts = {"recording": str(options.recording), "frames_file": str(options.frames)}
+    counts = {"frames": kept.n_frames, "quiet_frames": quiet, "left_out": left_out}
+    more = f"; {left_out} with rows that could not be measured left out" if left_out else ""
+    text = f"{options.frames}: {kept.n_frames} frames, {quiet} quiet{more}"
+    answer(options, facts | counts, text)
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -101,14 +91,10 @@ def _check(options: argparse.Namespace) -> None:
             f"{options.recording}: nothing to compare: it takes a recording of raw frames and"
             " images or touches, from the tare on, as  eitskin record  makes by default"
         )
-    if options.json:
-        print_json({"recording": str(options.recording), "solver_noted": noted} | check.as_dict())
-    else:
-        print(check.text())
+    facts = {"recording": str(options.recording), "solver_noted": noted}
+    answer(options, facts | check.as_dict(), check.text())
     if check.different:
-        why = (
-            ""
-            if noted
-            else "; the recording does not note the solver's options, so the model's own were taken"
+        why = "; the recording does not note the solver's options, so the model's own were taken"
+        raise VerificationError(
+            f"{options.recording}: this host's images are not the board's{'' if noted else why}"
         )
-        raise VerificationError(f"{options.recording}: this host's images are not the board's{why}")

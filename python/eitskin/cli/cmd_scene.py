@@ -1,11 +1,9 @@
 """``eitskin scene run | plan | picture | list | effects``: simulated sessions."""
 
 import argparse
-import json
-from typing import Any
 
 from eitskin.cli.arguments import SCENE_HELP, Output, option
-from eitskin.cli.printing import print_json
+from eitskin.cli.printing import answer
 from eitskin.cli.progress import bar
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import save_frames
@@ -15,7 +13,6 @@ from eitskin.view.scene_pictures import draw_scene
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``scene``."""
     parser.description = (
         "A scene file says what happens on a skin and which imperfections take part;"
         " docs/guide/scenes.md."
@@ -52,7 +49,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run_scene(options: argparse.Namespace) -> int:
-    """Simulate and write."""
     from eitskin.scene.compiler import compile_scene
     from eitskin.scene.runner import run
 
@@ -61,103 +57,63 @@ def run_scene(options: argparse.Namespace) -> int:
     frames = run(compile_scene(scene), truth_pixels=options.truth_pixels, progress=bar("solving"))
     save_frames(options.output, frames)
     counters = frames.meta["counters"]
-    if options.json:
-        facts: dict[str, Any] = {
-            "scene": scene.name,
-            "frames": scene.frames,
-            "quiet_frames": scene.quiet_frames,
-        }
-        facts |= {
-            "effects": list(scene.effects),
-            "counters": counters,
-            "output": str(options.output),
-        }
-        print_json(facts)
-        return 0
-    print(
+    facts = {"scene": scene.name, "frames": scene.frames, "quiet_frames": scene.quiet_frames}
+    more = {"effects": list(scene.effects), "counters": counters, "output": str(options.output)}
+    return answer(
+        options,
+        facts | more,
         f"{scene.name}: {scene.frames} frames after {scene.quiet_frames} quiet ones ->"
-        f" {options.output}"
+        f" {options.output}",
+        f"effects: {', '.join(scene.effects) or 'none'}",
+        ", ".join(f"{value} {name.replace('_', ' ')}" for name, value in counters.items() if value),
     )
-    print(f"effects: {', '.join(scene.effects) or 'none'}")
-    print(
-        ", ".join(f"{value} {name.replace('_', ' ')}" for name, value in counters.items() if value)
-    )
-    return 0
 
 
 def run_plan(options: argparse.Namespace) -> int:
-    """Print the plan."""
     from eitskin.scene.compiler import compile_scene
 
     plan = compile_scene(find_scene(options.scene)).plan
-    print(json.dumps(plan.as_dict(), indent=2) if options.json else plan.text())
-    return 0
+    return answer(options, plan.as_dict(), plan.text())
 
 
 def run_picture(options: argparse.Namespace) -> int:
-    """Simulate and draw."""
     from eitskin.scene.compiler import compile_scene
     from eitskin.scene.runner import run
 
     refuse_unwritable(options.output)
     check_picture(options.output)
     scene = find_scene(options.scene)
-    draw_scene(
-        options.output, scene, run(compile_scene(scene), truth_pixels=0, progress=bar("solving"))
-    )
+    frames = run(compile_scene(scene), truth_pixels=0, progress=bar("solving"))
+    draw_scene(options.output, scene, frames)
     print(f"picture: {options.output}")
     return 0
 
 
 def run_list(options: argparse.Namespace) -> int:
-    """Print the library."""
     found = descriptions()
-    if options.json:
-        print_json(found)
-        return 0
-    for name, line in found.items():
-        print(f"{name:<16} {line}")
-    return 0
+    return answer(options, found, *(f"{name:<16} {line}" for name, line in found.items()))
 
 
 def run_effects(options: argparse.Namespace) -> int:
     """Print the effects without importing them, or one effect with its parameters."""
-    from eitskin.scene.effect_table import describe_parameters
-    from eitskin.scene.registry import Registry, summary_of
+    from eitskin.scene.registry import Registry, describe_parameters, summary_of
     from eitskin.scene.runner import plain
 
     registry = Registry()
     if options.name is None:
         rows = {name: summary_of(target) for name, target in registry.names().items()}
-        if options.json:
-            print_json(rows)
-            return 0
-        for name, line in rows.items():
-            print(f"{name:<18} {line}")
-        return 0
+        return answer(options, rows, *(f"{name:<18} {line}" for name, line in rows.items()))
     module = registry.load(options.name, "eitskin scene effects")
     parameters = plain(describe_parameters(module))
-    if options.json:
-        stage = module.STAGE.name.lower()
-        facts = {
-            "name": module.NAME,
-            "stage": stage,
-            "summary": module.SUMMARY,
-            "parameters": parameters,
-        }
-        print_json(facts)
-        return 0
-    print(f"[effects.{module.NAME}]   {module.SUMMARY}   (stage: {module.STAGE.name.lower()})")
+    facts = {"name": module.NAME, "stage": module.STAGE.name.lower(), "summary": module.SUMMARY}
+    lines = [f"[effects.{module.NAME}]   {module.SUMMARY}   (stage: {facts['stage']})"]
     for one in parameters:
-        bounds = (
-            f"[{one.get('low', '')} .. {one.get('high', '')}]"
-            if "low" in one or "high" in one
-            else ""
-        )
-        allowed = f"one of {', '.join(one['choices'])}" if "choices" in one else bounds
-        unit = one.get("unit", "")
-        print(
-            f"  {one['name']:<24} {one['default']!s:<12} {unit:<8} {allowed:<18}"
-            f" {one.get('doc', '')}".rstrip()
-        )
-    return 0
+        allowed = ""
+        if "choices" in one:
+            allowed = f"one of {', '.join(one['choices'])}"
+        elif "low" in one or "high" in one:
+            allowed = f"[{one.get('low', '')} .. {one.get('high', '')}]"
+        unit, doc = one.get("unit", ""), one.get("doc", "")
+        line = f"  {one['name']:<24} {one['default']!s:<12} {unit:<8} {allowed:<18} {doc}"
+        lines.append(line.rstrip())
+    return answer(options, facts | {"parameters": parameters}, *lines)

@@ -22,7 +22,6 @@ from eitskin.live.session import Session
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``stream``."""
     parser.description = (
         "Follow a board: its touches as a table on standard output, with a line a gesture,"
         " faults and events of the"
@@ -44,7 +43,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Set up, follow, sum up."""
     mode = read_mode(options.mode)
     drawn = options.picture is not None or options.film is not None
     needs = "an image" if mode & Stream.IMAGE else "a picture" if drawn else ""

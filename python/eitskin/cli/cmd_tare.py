@@ -1,16 +1,14 @@
 """``eitskin tare``: the reference from the untouched skin."""
 
 import argparse
-import json
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import TARE_FRAMES, add_device, open_named
-from eitskin.cli.printing import say
-from eitskin.device.settings import check_tare_frames
+from eitskin.cli.device_options import add_device, open_named
+from eitskin.cli.printing import answer, say
+from eitskin.device.client import TARE_FRAMES, check_tare_frames
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``tare``."""
     parser.description = (
         "Take a board's reference frame from its untouched skin; four frames or more also tell"
         " it the noise. It is kept until the board is reset, the scan is changed or another"
@@ -22,15 +20,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Tare and say so."""
     check_tare_frames(options.frames)
     with open_named(options) as device:
         if not device.transport.synchronous:
             say(f"leave the skin untouched: taking the reference from {options.frames} frames")
         device.tare(options.frames)
         url = device.transport.url
-    if options.json:
-        print(json.dumps({"device": url, "frames": options.frames, "tared": True}))
-    else:
-        print(f"{url}: reference taken from {options.frames} frames")
-    return 0
+    facts = {"device": url, "frames": options.frames, "tared": True}
+    return answer(options, facts, f"{url}: reference taken from {options.frames} frames")

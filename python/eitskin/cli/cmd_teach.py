@@ -8,7 +8,6 @@ ACTIONS = ("plan", "record", "fit", "update", "check")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``teach``."""
     parser.description = (
         "Learn a skin's model from presses at known places: no sign, gain, order of"
         " channels or exact geometry is needed. docs/guide/teaching.md shows how."

@@ -33,7 +33,6 @@ PORT = 8470
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of ``view``."""
     parser.description = (
         "Serve a page that shows a board live, and say its address. Simulated and recorded"
         " frames come at the speed that they were scanned at, or as ?speed=2 or ?speed=max"
@@ -77,7 +76,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Listen, follow, serve."""
     load_server()
     if options.token is not None and len(options.token) < MIN_TOKEN:
         raise UsageError(f"--token: a word of at least {MIN_TOKEN} characters")

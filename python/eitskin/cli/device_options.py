@@ -10,9 +10,9 @@ from eitskin.cli.printing import say
 from eitskin.config import nearest
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.core.gestures import Zone
-from eitskin.device.client import Device
+from eitskin.device.client import TARE_FRAMES, Device, check_tare_frames
 from eitskin.device.open import open_with_files
-from eitskin.device.settings import ScanSettings, SolverSettings, check_tare_frames
+from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
@@ -28,7 +28,6 @@ DEVICE_HELP = (
     " file:RUN.eits (a recording); SCENE is a file or a scene of  eitskin scene list; after the"
     " last three, ?speed=1&loop=1"
 )
-TARE_FRAMES = 16
 MAX_U32 = 2**32 - 1
 
 
@@ -143,7 +142,6 @@ def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def add_every(parser: argparse.ArgumentParser) -> None:
-    """How many of the frames."""
     text = "every N-th frame (default: as many as the line carries)"
     option(parser, "--every N", text, within=(1, 0xFFFF))
 
@@ -161,12 +159,10 @@ def add_report(parser: argparse.ArgumentParser) -> None:
 
 
 def add_verbose(parser: argparse.ArgumentParser) -> None:
-    """How much is said of each frame."""
     option(parser, "-v --verbose", "all that is known of a frame, the solver's numbers included")
 
 
 def add_outputs(parser: argparse.ArgumentParser) -> None:
-    """``--to``."""
     option(
         parser,
         "--to URL",
@@ -178,7 +174,6 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
 
 
 def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
-    """The sinks of ``--to``, open."""
     transport, board = session.device.transport, session.device.board
     model = None if session.known is None else session.known.model
     source = Source(transport.url, board.board, model, getattr(options, "overwrite", False))
@@ -186,7 +181,6 @@ def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
 
 
 def add_zones(parser: argparse.ArgumentParser) -> None:
-    """``--zones``."""
     option(
         parser, "--zones FILE.toml", "named keys, pads and rings whose presses are reported", Path
     )
@@ -194,10 +188,7 @@ def add_zones(parser: argparse.ArgumentParser) -> None:
 
 def read_zones(path: Path | None) -> tuple[Zone, ...]:
     """The zones of ``--zones``."""
-    if path is None:
-        return ()
-
-    return load_zones(path)
+    return () if path is None else load_zones(path)
 
 
 def read_mode(text: str) -> Stream:
@@ -206,11 +197,7 @@ def read_mode(text: str) -> Stream:
 
 
 def read_scan(options: argparse.Namespace) -> ScanSettings:
-    """What is named of the scan.
-
-    Raises:
-        UsageError: every frame would be checked.
-    """
+    """What is named of the scan."""
     if options.reciprocal == 1:
         raise UsageError(
             "--reciprocal 1 would check every frame, which is a full scan; use --full, or at least"
@@ -239,11 +226,7 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
 
 def read_ignored(text: str | None) -> int | None:
     """The diagnostics that are left, bit k of ``core.diagnostics.DIAGNOSTICS``, without those in
-    "outlier,electrode-noisy" or "all"; None for None.
-
-    Raises:
-        UsageError: one is unknown.
-    """
+    "outlier,electrode-noisy" or "all"; None for None."""
     if text is None:
         return None
     names = [name.replace(" ", "-") for name in DIAGNOSTICS]
@@ -256,11 +239,7 @@ def read_ignored(text: str | None) -> int | None:
 
 
 def check_recording(path: Path | None, overwrite: bool) -> None:
-    """Refuse a recording that could not be written, before a device is opened.
-
-    Raises:
-        FileError: its folder is not there, or it exists and may not be written over.
-    """
+    """Refuse a recording that could not be written, before a device is opened."""
     refuse_unwritable(path)
     if path is not None and path.is_file() and not overwrite:
         raise FileError(

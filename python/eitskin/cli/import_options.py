@@ -127,11 +127,7 @@ def _over(base: Any, given: Any) -> Any:
 
 
 def whole_numbers(text: str | None, option: str) -> tuple[int, ...]:
-    """ "3,17,20:24" as numbers (a range without its end), empty for None.
-
-    Raises:
-        UsageError: it is no such list; ``option`` is named.
-    """
+    """ "3,17,20:24" as numbers (a range without its end), empty for None."""
     numbers: list[int] = []
     for part in () if text is None else text.split(","):
         first, colon, last = part.partition(":")
@@ -144,11 +140,7 @@ def whole_numbers(text: str | None, option: str) -> tuple[int, ...]:
 
 
 def floats(text: str, option: str) -> tuple[float, ...]:
-    """ "1.5,-2" as numbers.
-
-    Raises:
-        UsageError: it is no list of finite numbers; ``option`` is named.
-    """
+    """ "1.5,-2" as numbers."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:

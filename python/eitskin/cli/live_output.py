@@ -96,11 +96,7 @@ def _happened(frame: Frame) -> list[str]:
 
 def show(options: argparse.Namespace, session: Session, outputs: Outputs | None = None) -> None:
     """Print every frame and all news of ``session``, give them to ``outputs``, draw ``--picture``
-    and ``--film``, print the summary; Ctrl-C ends it in good order.
-
-    Raises:
-        EitskinError: what ended the stream, after everything up to then was summed up.
-    """
+    and ``--film``, print the summary; Ctrl-C ends it in good order."""
     album, broken = Album(), None
     rows = Rows(options.verbose, session.truth is not None)
     frames = session.frames()

@@ -1,5 +1,6 @@
-"""What commands print: lines for whoever looks on, tables, and JSON for programs."""
+"""What commands print: lines for whoever looks on, and what they found, as JSON for programs."""
 
+import argparse
 import json
 import sys
 from typing import Any
@@ -16,13 +17,20 @@ def say_progress(text: str) -> None:
         say(text)
 
 
-def print_table(facts: dict[str, Any]) -> None:
+def table(facts: dict[str, Any]) -> str:
     """Names and values in two columns."""
     width = max(len(name) for name in facts) + 2
-    for name, value in facts.items():
-        print(f"{name.replace('_', ' '):{width}}{value}")
+    return "\n".join(f"{name.replace('_', ' '):{width}}{value}" for name, value in facts.items())
 
 
 def print_json(facts: Any) -> None:
-    """Facts for programs."""
     print(json.dumps(facts, indent=2))
+
+
+def answer(options: argparse.Namespace, facts: Any, *lines: str) -> int:
+    """End a command: ``facts`` with ``--json``, else ``lines``; returns its exit code."""
+    if options.json:
+        print_json(facts)
+    else:
+        print("\n".join(lines))
+    return 0

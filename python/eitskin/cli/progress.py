@@ -24,6 +24,11 @@ def bar(what: str) -> Callable[..., Iterable[Any]]:
     return shown
 
 
+def named_bar(items: Iterable[Any], what: str) -> Iterable[Any]:
+    """``items`` with a bar of ``what``."""
+    return bar(what)(items)
+
+
 def lines(
     items: Iterable[Any],
     what: str,

@@ -2,7 +2,6 @@
 skin alone."""
 
 import argparse
-import json
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
@@ -11,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from eitskin.cli.arguments import option
-from eitskin.cli.device_options import TARE_FRAMES, add_device
+from eitskin.cli.device_options import add_device
+from eitskin.cli.printing import answer
 from eitskin.cli.teach_record import raw_session
+from eitskin.device.client import TARE_FRAMES
 from eitskin.device.known_model import scanned_protocol
 from eitskin.device.live_frames import LiveFrame
 from eitskin.errors import DeviceError
@@ -30,7 +31,6 @@ REMEDY = {
 
 
 def add_parser(actions: Any) -> None:
-    """Add ``check``."""
     parser = actions.add_parser(
         "check",
         help="whether a taught model still fits, from the untouched skin alone",
@@ -55,19 +55,16 @@ def add_parser(actions: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Look, say."""
     model, _ = load_model(options.model)
     untouched, protocol = _of_board(options) if options.frames is None else _of_file(options.frames)
     found = still_fits(model, untouched, protocol, where=str(options.model))
-    if options.json:
-        print(json.dumps({"frames": len(untouched), **asdict(found)}))
-    else:
-        print(f"{options.model}: {found.verdict} ({found.rule}); {REMEDY[found.verdict]}")
-        print(
-            f"correlation with the frame taught {found.correlation:.4f}, distance"
-            f" {found.distance:.2f} presses, {len(untouched)} frames"
-        )
-    return 0
+    return answer(
+        options,
+        {"frames": len(untouched), **asdict(found)},
+        f"{options.model}: {found.verdict} ({found.rule}); {REMEDY[found.verdict]}",
+        f"correlation with the frame taught {found.correlation:.4f}, distance"
+        f" {found.distance:.2f} presses, {len(untouched)} frames",
+    )
 
 
 def _of_file(path: Path) -> tuple[np.ndarray, Protocol]:

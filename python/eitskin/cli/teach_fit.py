@@ -1,13 +1,12 @@
 """``eitskin teach fit PRESSES -o MODEL``: the model and its report."""
 
 import argparse
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.printing import print_json
-from eitskin.cli.progress import bar
+from eitskin.cli.printing import answer
+from eitskin.cli.progress import named_bar
 from eitskin.config import parse_toml
 from eitskin.errors import ConfigError, FrameError
 from eitskin.fileio import refuse_unwritable
@@ -18,9 +17,10 @@ from eitskin.teaching.teach import teach
 from eitskin.view.panels import check_picture
 from eitskin.view.taught_picture import draw_taught
 
+NEXT = "{}: tare, then touches; eitskin model upload sends it to a board"
+
 
 def add_parser(actions: Any) -> None:
-    """Add ``fit``."""
     parser = actions.add_parser("fit", help="presses to a model, with what it is worth")
     option(parser, "presses PRESSES.npz", "from  eitskin teach record", Path)
     option(parser, "-o --output MODEL.eitm", None, Output, required=True)
@@ -43,15 +43,11 @@ def add_parser(actions: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit, write, say."""
     refuse_unwritable(options.output, options.picture)
     if options.picture is not None:
         check_picture(options.picture)
     presses = load_presses(options.presses)
     skin = described_skin(presses, options.skin)
-
-    def progress(items: Iterable[Any], what: str) -> Iterable[Any]:
-        return bar(what)(items)
 
     try:
         taught = teach(
@@ -59,19 +55,15 @@ def run(options: argparse.Namespace) -> int:
             skin,
             place_sd_mm=options.place_sd,
             reference_age=options.reference_age,
-            progress=progress,
+            progress=named_bar,
         )
     except FrameError as error:
         raise FrameError(f"{options.presses}: {error}") from None
     if options.picture is not None:
         draw_taught(options.picture, taught)
     save_model(options.output, taught.model)
-    if options.json:
-        print_json({"output": str(options.output), **taught.report})
-    else:
-        print("\n".join(report_lines(taught.report)))
-        print(f"{options.output}: tare, then touches; eitskin model upload sends it to a board")
-    return 0
+    facts = {"output": str(options.output), **taught.report}
+    return answer(options, facts, *report_lines(taught.report), NEXT.format(options.output))
 
 
 def described_skin(presses: Presses, path: Path | None) -> Skin | None:

@@ -14,7 +14,6 @@ from eitskin.view.template_picture import check_template, draw_template
 
 
 def add_parser(actions: Any) -> None:
-    """Add ``plan``."""
     parser = actions.add_parser(
         "plan",
         help="where to press, and a template in true size to lay on the skin",
@@ -38,7 +37,6 @@ def add_parser(actions: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Choose, draw, write, print."""
     refuse_unwritable(options.output, options.picture, options.practice)
     if options.picture is not None:
         check_template(options.picture)

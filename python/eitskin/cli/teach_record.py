@@ -34,7 +34,6 @@ TimedFrames = Iterator[tuple[np.ndarray, float]]
 
 
 def add_parser(actions: Any) -> None:
-    """Add ``record``."""
     parser = actions.add_parser(
         "record",
         help="press where the plan says; each good press goes to the file at once",
@@ -70,7 +69,6 @@ def add_parser(actions: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Guide; say what came of it."""
     if options.plan.suffix == ".toml" or not (options.plan.suffix or options.plan.exists()):
         plan, text = plan_of_scene(str(options.plan))
     else:

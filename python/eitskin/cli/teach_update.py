@@ -1,13 +1,13 @@
 """``eitskin teach update MODEL PRESSES -o NEW``: a taught model after remounting or drying."""
 
 import argparse
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.printing import print_json
-from eitskin.cli.progress import bar
+from eitskin.cli.printing import answer
+from eitskin.cli.progress import named_bar
+from eitskin.cli.teach_fit import NEXT
 from eitskin.errors import FrameError
 from eitskin.fileio import refuse_unwritable
 from eitskin.model.eitm import load_model, save_model
@@ -16,7 +16,6 @@ from eitskin.teaching.update import update
 
 
 def add_parser(actions: Any) -> None:
-    """Add ``update``."""
     parser = actions.add_parser(
         "update",
         help="adapt a taught model by a few new presses",
@@ -35,25 +34,17 @@ def add_parser(actions: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Adapt, write, say."""
     refuse_unwritable(options.output)
     model, _ = load_model(options.model)
     presses = load_presses(options.presses)
 
-    def progress(items: Iterable[Any], what: str) -> Iterable[Any]:
-        return bar(what)(items)
-
     try:
-        updated = update(model, presses, where=str(options.model), progress=progress)
+        updated = update(model, presses, where=str(options.model), progress=named_bar)
     except FrameError as error:
         raise FrameError(f"{options.presses}: {error}") from None
     save_model(options.output, updated.model)
-    if options.json:
-        print_json({"output": str(options.output), **updated.report})
-    else:
-        print("\n".join(report_lines(updated.report)))
-        print(f"{options.output}: tare, then touches; eitskin model upload sends it to a board")
-    return 0
+    facts = {"output": str(options.output), **updated.report}
+    return answer(options, facts, *report_lines(updated.report), NEXT.format(options.output))
 
 
 CHOSEN = {

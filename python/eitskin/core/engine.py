@@ -18,6 +18,7 @@ from eitskin.core.results import (
     Options,
     Reconstruction,
     check_reference_frames,
+    check_shape,
     known_touch,
 )
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
@@ -26,11 +27,7 @@ WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
 
 
 def load_core(width: str) -> Any:
-    """The compiled module of ``width`` ("float32" or "float64").
-
-    Raises:
-        UsageError: it was not built.
-    """
+    """The compiled module of ``width`` ("float32" or "float64")."""
     try:
         return importlib.import_module(f"eitskin.core.{WIDTHS[width]}")
     except ImportError as error:
@@ -116,11 +113,6 @@ class CoreEngine:
         return f"{text} (C core, status {int(status)})"
 
     def set_options(self, options: Options) -> None:
-        """Replace the options.
-
-        Raises:
-            UsageError: one is out of its range; the old ones stay.
-        """
         values = asdict(options)
         try:
             values |= {name: known.index(values[name]) for name, known in CHOICES.items()}
@@ -207,11 +199,7 @@ class CoreEngine:
     def reconstruct(
         self, frame: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> Reconstruction:
-        """One frame (m,) volts to image and touches.
-
-        Raises:
-            FrameError: the frame cannot be used.
-        """
+        """One frame (m,) volts to image and touches."""
         if frame.shape != (self.n_rows,):
             raise FrameError(
                 f"frame: has shape {frame.shape}, but the model's protocol has {self.n_rows} rows"
@@ -251,16 +239,8 @@ class CoreEngine:
         self, frames: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> list[Reconstruction | FrameError]:
         """Frames (k, m) volts, each as after :meth:`forget`, in one call of C, which runs without
-        Python's lock; a frame that cannot be used gives its error, and the others are done.
-
-        Raises:
-            FrameError: frames of another length than the model's.
-        """
-        if frames.ndim != 2 or frames.shape[1] != self.n_rows:
-            raise FrameError(
-                f"frames: have shape {frames.shape}, but the model's protocol has {self.n_rows}"
-                " rows"
-            )
+        Python's lock; a frame that cannot be used gives its error, and the others are done."""
+        check_shape(frames, self.n_rows, "frames")
         count = len(frames)
         given = np.ascontiguousarray(frames, dtype=self.dtype)
         images, coefficients = (
@@ -341,7 +321,6 @@ def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
 
 
 def _bits(word: int) -> tuple[int, ...]:
-    """The places of the bits that are set."""
     return tuple(bit for bit in range(64) if word >> bit & 1) if word else ()
 
 

@@ -38,11 +38,7 @@ class AlignedFrame:
 
 
 class FastCore:
-    """The fast path beside a core ``engine``, whose reference and options it takes.
-
-    Raises:
-        UsageError: the model has no fields, or a drive too many rows.
-    """
+    """The fast path beside a core ``engine``, whose reference and options it takes."""
 
     def __init__(self, engine: CoreEngine) -> None:
         self._engine, (self._lib, self._ffi, model, context) = engine, engine.handles

@@ -76,7 +76,6 @@ class GestureEvent:
         }
 
     def text(self) -> str:
-        """In a line."""
         said = [self.name]
         if self.phase != EventPhase.ONCE and self.kind != EventKind.PRESS:
             said.append(
@@ -107,11 +106,7 @@ class Zone:
 
 class Gestures:
     """Makes events of each frame's tracked touches; ``zones`` are evaluated beside. ``options``
-    replace the usual ones of eits_gesture_options by name.
-
-    Raises:
-        UsageError: an option is unknown or out of range, a zone cannot be, or there are too many.
-    """
+    replace the usual ones of eits_gesture_options by name."""
 
     def __init__(
         self, zones: Sequence[Zone] = (), *, width: str = "float32", **options: float
@@ -134,11 +129,7 @@ class Gestures:
         self.reset()
 
     def reset(self) -> None:
-        """Begin again: no finger is down, nothing is pressed and nothing is told of it.
-
-        Raises:
-            UsageError: an option is out of range.
-        """
+        """Begin again: no finger is down, nothing is pressed and nothing is told of it."""
         if self._lib.eits_gestures_init(self._state, self._options):
             raise UsageError("gestures: every length and fraction must be a number, at least 0")
         if self._zones is not None:

@@ -30,11 +30,7 @@ _OPTION_KINDS = get_type_hints(Options)
 
 
 def check_options(o: Options) -> None:
-    """Refuse what eits_set_options in the C core refuses, naming the option.
-
-    Raises:
-        UsageError: one is out of its range, or of the wrong type.
-    """
+    """Refuse what eits_set_options in the C core refuses, naming the option."""
     for name, kind in _OPTION_KINDS.items():
         value = getattr(o, name)
         if name in RANGES:
@@ -59,15 +55,19 @@ def _check_number(name: str, value: Any, low: float, high: float, *, whole: bool
         raise UsageError(f"options: {name} = {value!r} is out of range; use {low:g} to {high:.10g}")
 
 
+def check_shape(frames: npt.NDArray[Any], n_rows: int, what: str, least: int = 0) -> None:
+    """Refuse ``frames``, ``what`` in the error, that are not (k, n_rows), k at ``least``."""
+    if frames.ndim != 2 or frames.shape[1] != n_rows or len(frames) < least:
+        raise FrameError(
+            f"{what}: of shape {frames.shape}, but the model's protocol has {n_rows} rows"
+        )
+
+
 def check_reference_frames(
     frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], saturation_v: float
 ) -> None:
     """Refuse quiet ``frames`` (k, m) with an unusable voltage in a row that is not ``masked`` (m,);
-    0: no saturation.
-
-    Raises:
-        FrameError: naming the first such frame and row.
-    """
+    0: no saturation."""
     values = np.where(masked, 0.0, frames)
     unusable = ~np.isfinite(values) | ((saturation_v > 0) & (np.abs(values) >= saturation_v))
     if unusable.any():

@@ -55,12 +55,10 @@ class Demo:
         against = "numpy" if "numpy" in self.results else "c64"
         image = self.results[against].image
         peak = np.abs(image).max() or 1.0
+        others = {k: one.image for k, one in self.results.items() if k != against}
         return {
-            f"{ENGINE_NAMES[engine]} to {ENGINE_NAMES[against]}": float(
-                np.abs(result.image - image).max() / peak
-            )
-            for engine, result in self.results.items()
-            if engine != against
+            f"{ENGINE_NAMES[k]} to {ENGINE_NAMES[against]}": float(np.abs(one - image).max() / peak)
+            for k, one in others.items()
         }
 
 
@@ -69,9 +67,8 @@ def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
     with the prebuilt model; ``step`` gets a line for each step as it starts."""
     step("simulating three touches: mesh, electrodes, forward model, noise")
     touches = TouchSet("demo", seed, (TouchScene("demo", TOUCHES),))
-    frames = simulate(
-        paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=snr_db)
-    ).as_frames()
+    measurement = Measurement(snr_db=snr_db)
+    frames = simulate(paper_skin(), adjacent(16), touches, measurement=measurement).as_frames()
     step("finding them: C core in float32 and float64, numpy")
     model, blob = load_prebuilt()
     results = {}

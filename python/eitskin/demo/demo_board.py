@@ -2,7 +2,6 @@
 bit."""
 
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -45,8 +44,8 @@ class BoardDemo:
     seconds: float
 
 
-def run_board_demo(url: str, frames: int = FRAMES, *, image: Path | None = None) -> BoardDemo:
-    """Tare the board behind ``url`` (sim: or emu:) and let it solve ``frames`` frames of its scene.
+def run_board_demo(url: str) -> BoardDemo:
+    """Tare the board behind ``url`` (sim: or emu:) and let it solve a few frames of its scene.
 
     Raises:
         DeviceError: it gives no frame.
@@ -55,7 +54,7 @@ def run_board_demo(url: str, frames: int = FRAMES, *, image: Path | None = None)
     start = perf_counter()
     truth, summary, host = truth_of(url), LiveSummary(), None
     assert truth is not None
-    with open_device(url, image=image) as device:
+    with open_device(url) as device:
         known = need_model(device.board, None, device.transport.name, "the comparison")
         options = set_up(device, ScanSettings(), SolverSettings(), known)
         assert options is not None
@@ -63,10 +62,9 @@ def run_board_demo(url: str, frames: int = FRAMES, *, image: Path | None = None)
         take_reference(device, TARE_FRAMES, streamed=True)
         began_us, _ = begin_scene(device)
         if began_us is not None:
-            truth.begin(began_us)
-        for item in follow(
-            device, EVERYTHING, every=carried_every(device, EVERYTHING), frames=frames
-        ):
+            truth.began_us = began_us
+        every = carried_every(device, EVERYTHING)
+        for item in follow(device, EVERYTHING, every=every, frames=FRAMES):
             if isinstance(item, LiveFrame):
                 summary.add(item)
         log.stop()
@@ -83,18 +81,9 @@ def run_board_demo(url: str, frames: int = FRAMES, *, image: Path | None = None)
         raise DeviceError(f"{url}: the board solved no frame")
     true, found = truth.touches(last.board_us), last.touches.touches
     matching = truth.matching(true, [(t.x_mm, t.y_mm) for t in found])
-    return BoardDemo(
-        url,
-        info,
-        last,
-        found,
-        host.touches,
-        true,
-        matching,
-        twin.check,
-        summary,
-        perf_counter() - start,
-    )
+    touches = (found, host.touches, true)
+    seconds = perf_counter() - start
+    return BoardDemo(url, info, last, *touches, matching, twin.check, summary, seconds)
 
 
 def to_json(demo: BoardDemo) -> dict[str, Any]:
@@ -127,23 +116,18 @@ def to_text(demo: BoardDemo) -> str:
         ),
         "        board x      y  radius |   host x      y  radius | error mm",
     ]
-    true_of = {
-        found: d
-        for (_, found), d in zip(demo.matching.pairs, demo.matching.distances_mm, strict=True)
-    }
+    off_mm = dict(zip(demo.matching.pairs, demo.matching.distances_mm, strict=True))
     place = {found: true for true, found in demo.matching.pairs}
-    for n, k in enumerate(
-        sorted(range(len(demo.board)), key=lambda k: place.get(k, len(demo.true)))
-    ):
+    in_order = sorted(range(len(demo.board)), key=lambda k: place.get(k, len(demo.true)))
+    for n, k in enumerate(in_order):
         touch = demo.board[k]
         row = f"touch {n + 1} {touch.x_mm:7.2f} {touch.y_mm:6.2f} {touch.radius_mm:7.2f} |"
-        other = demo.host[k] if k < len(demo.host) else None
-        row += (
-            "      none               |"
-            if other is None
-            else f" {other.x_mm:8.2f} {other.y_mm:6.2f} {other.radius_mm:7.2f} |"
-        )
-        lines.append(row + (f" {true_of[k]:8.2f}" if k in true_of else "    false"))
+        if k < len(demo.host):
+            other = demo.host[k]
+            row += f" {other.x_mm:8.2f} {other.y_mm:6.2f} {other.radius_mm:7.2f} |"
+        else:
+            row += "      none               |"
+        lines.append(row + (f" {off_mm[place[k], k]:8.2f}" if k in place else "    false"))
     if demo.matching.misses:
         lines.append(f"{demo.matching.misses} touches not found")
     lines.append(f"{demo.check.text()} ({demo.seconds:.1f} s)")

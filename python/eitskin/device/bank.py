@@ -30,11 +30,7 @@ def record_bytes(model: bytes, generation: int) -> bytes:
 
 def bank_bytes(model: bytes, generation: int, bank_bytes: int = BANK_BYTES) -> bytes:
     """A whole bank of ``bank_bytes`` with ``model`` and its record; what lies between is as erased
-    flash reads, 0xFF.
-
-    Raises:
-        DeviceError: the model is longer than the bank's room.
-    """
+    flash reads, 0xFF."""
     room = record_offset(bank_bytes)
     if len(model) > room:
         raise DeviceError(

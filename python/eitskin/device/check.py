@@ -6,9 +6,9 @@ from pathlib import Path
 
 from eitskin import __version__
 from eitskin.device.link import Link
-from eitskin.device.wire.codec import LinkCounters
 from eitskin.device.wire.link_table import LINK_VERSION
 from eitskin.device.wire.packets import BoardInfo
+from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import load_model
 from eitskin.model.model import Model
@@ -23,11 +23,7 @@ def host_major() -> int:
 
 
 def check_board(info: BoardInfo, name: str) -> None:
-    """Refuse a board whose firmware is of another major version.
-
-    Raises:
-        DeviceError: saying which versions, and what to do.
-    """
+    """Refuse a board whose firmware is of another major version."""
     if info.firmware[0] != host_major():
         newer = info.firmware[0] > host_major()
         raise DeviceError(
@@ -75,11 +71,7 @@ def no_answer(link: Link, before: LinkCounters, what: str, waited_s: float) -> s
 
 
 def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
-    """Refuse to read a board's frames with another model than it scans and solves with.
-
-    Raises:
-        DeviceError: the protocol or the model differs.
-    """
+    """Refuse to read a board's frames with another model than it scans and solves with."""
     if not info.has_model:
         raise DeviceError(
             f"{name}: the board has no model; upload one with  eitskin model upload MODEL.eitm"

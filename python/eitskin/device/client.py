@@ -27,6 +27,13 @@ def _asked_millihz(info: BoardInfo) -> int:
     return periods * rate_millihz // info.samples
 
 
+def check_tare_frames(frames: int) -> int:
+    """``frames`` if a board can take its reference from so many; UsageError else."""
+    if frames != 1 and not 4 <= frames <= 1024:
+        raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to 1024")
+    return frames
+
+
 class Device(CommandExchange):
     """All that a board can be told and asked; ``open_device`` makes one from a URL. Raises as
     ``CommandExchange``."""
@@ -46,10 +53,8 @@ class Device(CommandExchange):
             UsageError: another number of frames.
             DeviceError: the board refuses, or its core the frames.
         """
-        if frames != 1 and not 4 <= frames <= 1024:
-            raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to 1024")
-        frame_us = max(self.board.frame_us, 1000)
-        self.command(commands.Tare(frames), 3.0 + 2e-6 * frame_us * (frames + 4))
+        wait_s = 3.0 + 2e-6 * max(self.board.frame_us, 1000) * (frames + 4)
+        self.command(commands.Tare(check_tare_frames(frames)), wait_s)
         self.board = replace(self.board, tared=1)
 
     def start_scene(self) -> None:

@@ -3,7 +3,6 @@ itself."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, scanned_protocol
@@ -45,18 +44,17 @@ def measure(
     ``before_touches`` was called. A recording gives its own quiet frames, where it has some."""
     first = collect(device, 0 if device.transport.replays else frames)
     if device.transport.replays:
-        quiet = _with_frames(first, first.quiet or first.frames[:frames])
-        after = _with_frames(first, first.frames if first.quiet else first.frames[frames:])
+        quiet = replace(first, frames=first.quiet or first.frames[:frames])
+        after = replace(first, frames=first.frames if first.quiet else first.frames[frames:])
         return MeasuredBoard(quiet, after if touched else RawRun(), device.board, None)
     after = RawRun()
     if touched:
         before_touches()
         begin_scene(device)
         after = collect(device, frames)
-    ended = device.link.ended
-    return MeasuredBoard(
-        first, after, device.board if ended else device.info(), None if ended else device.stats()
-    )
+    if device.link.ended:
+        return MeasuredBoard(first, after, device.board, None)
+    return MeasuredBoard(first, after, device.info(), device.stats())
 
 
 def board_subject(
@@ -66,14 +64,8 @@ def board_subject(
     protocol = scanned_protocol(measured.info, known, device.transport.name)
     if skin is None and known is not None:
         skin = known.model.skin
-    frames = as_frames(
-        measured.quiet.frames,
-        measured.touched.frames,
-        protocol,
-        measured.info,
-        known,
-        allow_nonfinite=True,
-    )
+    quiet, touched = measured.quiet.frames, measured.touched.frames
+    frames = as_frames(quiet, touched, protocol, measured.info, known, allow_nonfinite=True)
     remarks = () if measured.info.check_every == 1 else (
         "reciprocity of every row: the board measures one of each pair; scan fully with"
         "  eitskin stream --full",
@@ -94,14 +86,8 @@ def board_findings(report: Report, measured: MeasuredBoard) -> Report:
     own += [_standing(code) for code in measured.info.fault_codes if code not in codes]
     missing = measured.quiet.missing + measured.touched.missing
     if missing:
-        own.append(
-            Finding(
-                "board-link",
-                NOTE,
-                f"{missing} packets were lost between board and host",
-                {"missing": missing},
-            )
-        )
+        text = f"{missing} packets were lost between board and host"
+        own.append(Finding("board-link", NOTE, text, {"missing": missing}))
     if measured.stats is not None and measured.stats.slots_repeated:
         count = measured.stats.slots_repeated
         text = f"{count} measurements were repeated because the multiplexers were switched too late"
@@ -125,12 +111,8 @@ def _name(code: int) -> str:
 
 def _finding(fault: Fault) -> Finding:
     evidence = {"frame": fault.frame, "index": fault.index, "value": fault.value}
-    return Finding(
-        _name(fault.code),
-        _severity(fault.code),
-        f"the board reports: {fault_text(fault)}",
-        evidence,
-    )
+    text = f"the board reports: {fault_text(fault)}"
+    return Finding(_name(fault.code), _severity(fault.code), text, evidence)
 
 
 def _standing(code: FaultCode) -> Finding:
@@ -139,8 +121,3 @@ def _standing(code: FaultCode) -> Finding:
         " look again"
     )
     return Finding(_name(code), _severity(code), text)
-
-
-def _with_frames(run: RawRun, frames: list[Any]) -> RawRun:
-    """``run`` with other frames."""
-    return RawRun(run.quiet, frames, run.faults, run.missing, run.left_out)

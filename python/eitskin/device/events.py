@@ -35,9 +35,8 @@ class Events:
     """Turns what a stream gives into lines, as it comes."""
 
     def __init__(self) -> None:
-        self._clean: dict[
-            Key, int
-        ] = {}  # what has been said to be there: frames in a row without it
+        # what has been said to be there: frames in a row without it
+        self._clean: dict[Key, int] = {}
         self._shown: dict[Key, int] = {}  # what the last frame showed: how many in a row
 
     def lines(self, item: Item) -> list[str]:
@@ -92,12 +91,10 @@ def _keys(fault: Fault) -> list[Key]:
     name = _NAMES[FaultCode(fault.code)]
     if name not in _OF_ELECTRODES:
         return [(name, -1)]
-    partner = (
-        [(name, fault.value)]
-        if fault.code == FaultCode.BRIDGED and fault.raised and fault.value >= 0
-        else []
-    )
-    return [(name, fault.index), *partner]
+    keys = [(name, fault.index)]
+    if fault.code == FaultCode.BRIDGED and fault.raised and fault.value >= 0:
+        keys.append((name, fault.value))
+    return keys
 
 
 def _plain(key: Key) -> str:

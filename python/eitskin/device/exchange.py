@@ -11,7 +11,7 @@ from typing import TypeVar
 from eitskin.device.check import check_board, no_answer
 from eitskin.device.link import Link, LinkEvent, PumpedLink, Reconnect, Tap, ThreadedLink
 from eitskin.device.transport import Transport
-from eitskin.device.wire.codec import LinkCounters, Packet
+from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.explain import command_name, reply_text
 from eitskin.device.wire.layout import Command
 from eitskin.device.wire.link_table import GetInfo, Keepalive, PacketType, ReplyStatus
@@ -28,6 +28,7 @@ from eitskin.device.wire.packets import (
     SolvedTouches,
 )
 from eitskin.device.wire.payloads import MalformedPacket, parse
+from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError, EitskinError, UsageError
 
 Answer = Reply | BoardInfo | BoardStats | BoardHashes
@@ -185,11 +186,8 @@ class CommandExchange:
             self._put(item)
             return None
         if item.lost:
-            self._put(
-                LinkEvent(
-                    "gap", item.lost, "lost on the way, or dropped by the board for lack of room"
-                )
-            )
+            why = "lost on the way, or dropped by the board for lack of room"
+            self._put(LinkEvent("gap", item.lost, why))
         try:
             content = parse(item.type, item.payload)
         except MalformedPacket:

@@ -41,12 +41,7 @@ class FlashPlan:
 
 def find_tool(wanted: str | None = None, *, installed: bool = True) -> str:
     """The programmer's tool: ``wanted``, or the first of ``TOOLS`` that is installed; where it need
-    not be ``installed``, else the first of them.
-
-    Raises:
-        UsageError: it is not a known one.
-        DeviceError: it is not installed, or none of them is.
-    """
+    not be ``installed``, else the first of them."""
     if wanted is not None and wanted not in TOOLS:
         raise UsageError(f"--tool {wanted}: use one of {', '.join(TOOLS)}")
     choice = [wanted] if wanted else list(TOOLS)
@@ -79,10 +74,8 @@ def plan_flash(
     pieces = [(path, FIRMWARE_ADDRESS)]
     bank_file = None
     if model is not None:
-        bank_file, no_record = (
-            folder / f"eitskin-bank-{zlib.crc32(model):08x}.bin",
-            folder / "eitskin-no-record.bin",
-        )
+        bank_file = folder / f"eitskin-bank-{zlib.crc32(model):08x}.bin"
+        no_record = folder / "eitskin-no-record.bin"
         write_bytes(bank_file, bank_bytes(model, 1))
         write_bytes(no_record, bytes([ERASED]) * RECORD_BYTES)
         # the other bank may hold a model of a later generation, which would win
@@ -91,11 +84,7 @@ def plan_flash(
 
 
 def check_image(path: Path, image: bytes) -> None:
-    """Refuse what cannot be this board's firmware.
-
-    Raises:
-        DeviceError: it is too long, an .elf, or does not begin with a Cortex-M's vectors.
-    """
+    """Refuse what cannot be this board's firmware."""
     if image[:4] == b"\x7fELF":
         raise DeviceError(f"{path}: this is an .elf; give the .bin beside it")
     if len(image) > FIRMWARE_ROOM:
@@ -114,12 +103,7 @@ def check_image(path: Path, image: bytes) -> None:
 
 def run_flash(plan: FlashPlan, echo: Callable[[str], None] | None = None) -> None:
     """Run the plan; ``echo`` gets each command before it runs. The tool's own output goes where it
-    likes.
-
-    Raises:
-        DeviceError: a command fails; the firmware may then be half written, and flashing again
-            repairs it.
-    """
+    likes."""
     for command, line in zip(plan.commands, plan.lines(), strict=True):
         if echo is not None:
             echo(line)
@@ -152,21 +136,10 @@ def _st_flash(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tu
 
 
 def _pyocd(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tuple[str, ...]]:
-    which = ("--uid", serial) if serial is not None else ()
+    load = ["pyocd", "load", "--target", "stm32f767zi", "--no-wait"]
+    load += [] if serial is None else ["--uid", serial]
     return [
-        (
-            "pyocd",
-            "load",
-            "--target",
-            "stm32f767zi",
-            "--no-wait",
-            *which,
-            "--format",
-            "bin",
-            "--base-address",
-            f"0x{address:08x}",
-            str(path),
-        )
+        (*load, "--format", "bin", "--base-address", f"0x{address:08x}", str(path))
         for path, address in pieces
     ]
 

@@ -34,9 +34,8 @@ def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | No
     if path is not None:
         return KnownModel(*model_of(info, path, name))
     model, blob = load_prebuilt()
-    return (
-        KnownModel(model, blob) if info.has_model and zlib.crc32(blob) == info.model_crc else None
-    )
+    theirs = info.has_model and zlib.crc32(blob) == info.model_crc
+    return KnownModel(model, blob) if theirs else None
 
 
 def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> KnownModel:
@@ -60,11 +59,7 @@ def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> Know
 
 
 def scanned_protocol(info: BoardInfo, known: KnownModel | None, name: str) -> Protocol:
-    """The protocol that a board scans: its model's, or the usual one that has the same hash.
-
-    Raises:
-        DeviceError: it is none of the usual ones, and the model is not known.
-    """
+    """The protocol that a board scans: its model's, or the usual one that has the same hash."""
     if known is not None:
         return known.model.protocol
     for protocol in _usual(info.n_electrodes):

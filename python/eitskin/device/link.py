@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from eitskin.device.transport import Transport
-from eitskin.device.wire.codec import Decoder, LinkCounters, Packet, encode
+from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import Keepalive, PacketType
 from eitskin.device.wire.packets import BoardHashes
+from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError, EitskinError
 
 FRAME_PACKETS = frozenset((PacketType.RAW, PacketType.IMAGE, PacketType.TOUCHES, PacketType.EVENTS))

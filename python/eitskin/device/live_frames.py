@@ -49,11 +49,8 @@ class LiveFrame:
     @property
     def refused(self) -> str | None:
         """Why the board's core refused the frame; None where it did not."""
-        return (
-            status_text(self.solved.status)
-            if self.solved is not None and self.solved.status
-            else None
-        )
+        solved = self.solved
+        return status_text(solved.status) if solved is not None and solved.status else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +78,6 @@ class LiveSummary:
     board: BoardStats | None = None
 
     def add(self, frame: LiveFrame) -> None:
-        """Count a frame."""
         if not self.frames:
             self.first_us = frame.time_us
         self.frames += 1
@@ -105,7 +101,6 @@ class LiveSummary:
         return self.solve_us.quantile(0.5), self.solve_us.quantile(0.99)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         quantiles = self.solve_quantiles_us or (None, None)
         return {
             "frames": self.frames,
@@ -120,14 +115,11 @@ class LiveSummary:
         }
 
     def lines(self) -> list[str]:
-        """For reading."""
         rate = "" if self.rate_hz is None else f", {self.rate_hz:.1f} a second of the board's time"
         link = self.link
-        text = (
-            f"{self.frames} frames{rate}; {link.get('gaps', 0)} gaps ({link.get('missing', 0)}"
-            " packets missing)"
-        )
-        text += f", {link.get('dropped', 0)} dropped here"
+        gaps, missing, dropped = (link.get(name, 0) for name in ("gaps", "missing", "dropped"))
+        text = f"{self.frames} frames{rate}; {gaps} gaps ({missing} packets missing)"
+        text += f", {dropped} dropped here"
         if link.get("lines_skipped"):
             text += f", {link['lines_skipped']} lines skipped"
         if self.board is not None:

@@ -3,7 +3,9 @@ and what packages bring (``source``). The same frames, commands and errors behin
 emu: and file: ``?speed=1&loop=1`` (``timing``)."""
 
 import re
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from eitskin.config import nearest
 from eitskin.device.check import check_model
@@ -13,7 +15,8 @@ from eitskin.device.ports import BAUD, Port, SerialTransport, only_board, ports
 from eitskin.device.source import open_source, source_schemes
 from eitskin.device.timing import split_timing
 from eitskin.device.transport import Transport
-from eitskin.errors import UsageError, missing_checkout
+from eitskin.device.wire.packets import BoardInfo
+from eitskin.errors import EitskinError, UsageError, missing_checkout
 
 AS_IN = {
     "serial": "serial:/dev/ttyACM0",
@@ -138,6 +141,35 @@ def _emulated(scene: str, model: bytes | None, image: Path | None, loop: bool) -
 def list_devices() -> list[Port]:
     """Every serial port, boards first."""
     return sorted(ports(), key=lambda port: (not port.is_board, port.path))
+
+
+@dataclass(frozen=True)
+class FoundPort:
+    """A port; the ``board`` that answered on it, or ``why`` none did; neither where it was not
+    asked."""
+
+    port: Port
+    board: BoardInfo | None = None
+    why: str | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        board = None if self.board is None else self.board.as_dict()
+        port = {"url": f"serial:{self.port.path}", **asdict(self.port)}
+        return port | {"is_board": self.port.is_board, "board": board, "why": self.why}
+
+
+def discover(*, ask: bool = True) -> list[FoundPort]:
+    """All serial ports, boards first; where ``ask``, those that look like a board's are asked what
+    they are."""
+    return [_asked(port) if ask and port.is_board else FoundPort(port) for port in list_devices()]
+
+
+def _asked(port: Port) -> FoundPort:
+    try:
+        with open_device(f"serial:{port.path}") as device:
+            return FoundPort(port, device.board)
+    except EitskinError as error:
+        return FoundPort(port, why=str(error))
 
 
 def _path_and_baud(url: str, rest: str) -> tuple[str, int]:

@@ -52,20 +52,14 @@ def ports() -> list[Port]:
 
 def listing(found: list[Port]) -> str:
     """The ports in one line."""
-    return (
-        ", ".join(
-            f"{port.path} ({port.description})" if port.description else port.path for port in found
-        )
-        or "none"
+    told = (
+        f"{port.path} ({port.description})" if port.description else port.path for port in found
     )
+    return ", ".join(told) or "none"
 
 
 def only_board() -> Port:
-    """The one port that is a board's.
-
-    Raises:
-        DeviceError: none is, or several are.
-    """
+    """The one port that is a board's."""
     found = ports()
     boards = [port for port in found if port.is_board]
     if len(boards) == 1:
@@ -108,11 +102,8 @@ class SerialTransport:
                 port.timeout = timeout_s
             first = port.read(1)
             return bytes(first + port.read(port.in_waiting)) if first else b""
-        except (
-            OSError,
-            TypeError,
-            ValueError,
-        ) as error:  # pyserial's own is an OSError; a port just closed gives the others
+        except (OSError, TypeError, ValueError) as error:
+            # pyserial's own is an OSError; a port just closed gives the others
             raise DeviceError(f"{self.name}: the port is gone ({_reason(error)})") from None
 
     def write(self, data: bytes) -> None:
@@ -166,11 +157,6 @@ class _NotNow(DeviceError):
 
 
 def open_port(path: str, baud: int) -> Any:
-    """A pyserial port.
-
-    Raises:
-        DeviceError: saying why not, and what to do.
-    """
     import serial
 
     try:
@@ -185,16 +171,14 @@ def open_port(path: str, baud: int) -> Any:
             raise _NotNow(
                 f"{path}: another program uses it; close that (find it with  fuser {path} )"
             ) from None
-        if code in (errno.ENOTTY, errno.EINVAL, errno.EISDIR) or code is None:
-            raise DeviceError(
-                f"{path}: no serial port that does {baud} baud ({_reason(error)}); see  eitskin"
-                " devices"
-            ) from None
-        raise _NotNow(f"{path}: cannot open it ({_reason(error)})") from None
+        if code not in (errno.ENOTTY, errno.EINVAL, errno.EISDIR, None):
+            raise _NotNow(f"{path}: cannot open it ({_reason(error)})") from None
+        reason = _reason(error)
     except Exception as error:  # termios.error, which is no OSError
-        raise DeviceError(
-            f"{path}: no serial port that does {baud} baud ({_reason(error)}); see  eitskin devices"
-        ) from None
+        reason = _reason(error)
+    raise DeviceError(
+        f"{path}: no serial port that does {baud} baud ({reason}); see  eitskin devices"
+    )
 
 
 def _close(port: Any) -> None:

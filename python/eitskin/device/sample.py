@@ -19,7 +19,6 @@ class Sample:
         self.count, self.largest = 0, float("-inf")
 
     def add(self, value: float) -> None:
-        """One more."""
         self.count += 1
         self.largest = max(self.largest, value)
         if len(self.values) < self._size:

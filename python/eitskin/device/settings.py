@@ -7,14 +7,19 @@ from eitskin.core.results import Options
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
 from eitskin.device.wire.packets import BoardInfo
-from eitskin.errors import UsageError
 from eitskin.model.model import Model
-
-MAX_TARE = 1024
 
 
 @dataclass(frozen=True)
-class ScanSettings:
+class _Settings:
+    @property
+    def named(self) -> dict[str, Any]:
+        """What is to be changed."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
+class ScanSettings(_Settings):
     """How frames are scanned; None stays as it is. ``check_every`` as in ``commands.Scan``: 1 scans
     every row, n > 1 one of each reciprocal pair with every n-th frame whole, 0 never whole."""
 
@@ -25,14 +30,9 @@ class ScanSettings:
     check_every: int | None = None
     frame_period_us: int | None = None
 
-    @property
-    def named(self) -> dict[str, Any]:
-        """What is to be changed."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
-
 
 @dataclass(frozen=True)
-class SolverSettings:
+class SolverSettings(_Settings):
     """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at
     none, ``diagnostics`` at all, ``track`` at on."""
 
@@ -47,26 +47,10 @@ class SolverSettings:
     diagnostics: int | None = None
     track: bool | None = None
 
-    @property
-    def named(self) -> dict[str, Any]:
-        """What is to be changed."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
-
     def applied(self, model: Model, board: BoardInfo) -> Options:
         """The options that ``board`` with ``model`` starts with, with these changes."""
         changes = {name: value for name, value in self.named.items() if name != "track"}
         return replace(board_options(model, board, track=self.track is not False), **changes)
-
-
-def check_tare_frames(frames: int) -> int:
-    """``frames`` if a board can take its reference from so many.
-
-    Raises:
-        UsageError: it cannot.
-    """
-    if frames != 1 and not 4 <= frames <= MAX_TARE:
-        raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to {MAX_TARE}")
-    return frames
 
 
 def apply_scan(device: Device, scan: ScanSettings) -> None:

@@ -224,7 +224,6 @@ class SimTransport:
 
     @property
     def ended(self) -> bool:
-        """The scene is over."""
         return self.board.ended and not self._loop
 
     def read(self, timeout_s: float) -> bytes:

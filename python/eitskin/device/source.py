@@ -90,11 +90,7 @@ class Source:
 
 class SourceTransport:
     """The bytes of the application that is given a source's frames. ``model`` goes into its first
-    bank (None: the prebuilt one).
-
-    Raises:
-        EitskinError: the model is none, or the source cannot give its rows.
-    """
+    bank (None: the prebuilt one)."""
 
     replays = False
 

@@ -61,7 +61,6 @@ _KIND: dict[type, Stream] = {
 
 
 def stream(device: CommandExchange, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
-    """See ``Device.stream``."""
     if device.transport.replays:
         yield from _replay(device, what, every, frames)
         return

@@ -8,7 +8,6 @@ import stat
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
 
 from eitskin.device.ports import SerialTransport
 from eitskin.errors import DeviceError, FileError, UsageError
@@ -18,54 +17,38 @@ CONNECT_S = 5.0
 TCP = "socket://"
 
 
-class LinePort(Protocol):
+class LinePort:
     """Bytes of an instrument. ``waits``: they come when the instrument sends, not when they are
     read. ``keeps``: what is not read yet waits. ``cut``: the first line may be the end of one.
-    ``ended``: nothing will come again."""
+    ``ended``: nothing will come again. DeviceError: the port is gone."""
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def waits(self) -> bool: ...
-    @property
-    def keeps(self) -> bool: ...
-    @property
-    def cut(self) -> bool: ...
-    @property
-    def ended(self) -> bool: ...
+    name: str
+    waits, keeps, cut, ended = True, False, False, False
 
     def read(self, timeout_s: float) -> bytes:
-        """What has come within ``timeout_s``.
-
-        Raises:
-            DeviceError: the port is gone.
-        """
+        """What has come within ``timeout_s``."""
+        raise NotImplementedError
 
     def send(self, data: bytes) -> None:
-        """Send ``data`` to the instrument.
-
-        Raises:
-            DeviceError, UsageError: the port is gone, or takes nothing.
-        """
+        """Send ``data`` to the instrument; UsageError where it takes nothing."""
+        raise UsageError(f"{self.name}: takes no bytes; leave  send  out of the layout")
 
     def reopen(self) -> bool:
         """Try once to open it again."""
+        return False
 
     def close(self) -> None:
         """Let go of it."""
 
 
-class SerialLines:
+class SerialLines(LinePort):
     """A serial port."""
 
-    waits, keeps, cut, ended = True, False, True, False
+    cut = True
 
     def __init__(self, path: str, baud: int) -> None:
         self._port = SerialTransport(path, baud)
-
-    @property
-    def name(self) -> str:
-        return self._port.name
+        self.name = self._port.name
 
     def read(self, timeout_s: float) -> bytes:
         return self._port.read(timeout_s)
@@ -74,19 +57,21 @@ class SerialLines:
         self._port.write(data)
 
     def reopen(self) -> bool:
-        return self._port.reopen()
+        found = self._port.reopen()
+        self.name = self._port.name  # it may have come back under another
+        return found
 
     def close(self) -> None:
         self._port.close()
 
 
-class FileLines:
+class FileLines(LinePort):
     """A file: its lines come as fast as they are asked for."""
 
-    waits, keeps, cut = False, True, False
+    waits, keeps = False, True
 
     def __init__(self, path: str) -> None:
-        self.name, self.ended = path, False
+        self.name = path
         try:
             self._file = Path(path).open("rb")  # noqa: SIM115
         except OSError as error:
@@ -103,20 +88,17 @@ class FileLines:
     def send(self, data: bytes) -> None:
         """A file takes nothing."""
 
-    def reopen(self) -> bool:
-        return False
-
     def close(self) -> None:
         self._file.close()
 
 
-class PipeLines:
+class PipeLines(LinePort):
     """Standard input ("-") or a FIFO. A FIFO that nobody writes to yet is waited for."""
 
-    waits, keeps, cut = True, True, False
+    keeps = True
 
     def __init__(self, path: str) -> None:
-        self.name, self.ended = "standard input" if path == "-" else path, False
+        self.name = "standard input" if path == "-" else path
         try:
             self._fd = (
                 os.dup(sys.stdin.fileno())
@@ -139,12 +121,6 @@ class PipeLines:
         self.ended = self._begun and not data
         return data
 
-    def send(self, data: bytes) -> None:
-        raise UsageError(f"{self.name}: takes no bytes; leave  send  out of the layout")
-
-    def reopen(self) -> bool:
-        return False
-
     def close(self) -> None:
         if self._fd >= 0:
             with suppress(OSError):
@@ -152,10 +128,8 @@ class PipeLines:
             self._fd = -1
 
 
-class SocketLines:
+class SocketLines(LinePort):
     """A TCP connection, "socket://host:port"."""
-
-    waits, keeps, cut, ended = True, False, False, False
 
     def __init__(self, url: str) -> None:
         host, colon, port = url.removeprefix(TCP).rpartition(":")
@@ -205,11 +179,6 @@ class SocketLines:
 
 
 def open_port(path: str, baud: int) -> LinePort:
-    """The port behind ``path``.
-
-    Raises:
-        DeviceError, FileError, UsageError: it cannot be opened.
-    """
     if path.startswith(TCP):
         return SocketLines(path)
     if path == "-":

@@ -85,11 +85,7 @@ class TextSource(Source):
         return found
 
     def await_frames(self, count: int, wait_s: float) -> None:
-        """Wait until ``count`` frames have come; they are given on later.
-
-        Raises:
-            DeviceError: they do not come within ``wait_s``; the text says what came instead.
-        """
+        """Wait until ``count`` frames have come; they are given on later."""
         end = time.monotonic() + wait_s
         came = 0
         while len(self._parsed) < count and not self._drained:

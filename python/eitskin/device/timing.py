@@ -5,7 +5,6 @@ import math
 import threading
 import time
 from dataclasses import dataclass
-from typing import Protocol
 
 from eitskin.errors import UsageError
 
@@ -25,11 +24,7 @@ class Timing:
 
 def split_timing(url: str) -> tuple[str, Timing]:
     """A device's URL without what follows '?', and what that says. Of other schemes than sim, emu
-    and file the URL stays as it is.
-
-    Raises:
-        UsageError: it says something else than speed and loop, or a number cannot be.
-    """
+    and file the URL stays as it is."""
     scheme, _, _ = url.partition(":")
     bare, mark, query = url.rpartition("?")
     if scheme not in TIMED or not mark:
@@ -47,11 +42,7 @@ def split_timing(url: str) -> tuple[str, Timing]:
 
 
 def read_speed(text: str, where: str) -> float:
-    """The speed in "2", "0.5" or "max" (0).
-
-    Raises:
-        UsageError: it cannot be.
-    """
+    """The speed in "2", "0.5" or "max" (0)."""
     try:
         speed = 0.0 if text == "max" else float(text)
     except ValueError:
@@ -63,25 +54,15 @@ def read_speed(text: str, where: str) -> float:
     return speed
 
 
-class WaitingClock(Protocol):
-    """Where a pacer has its time from."""
+class WallClock:
+    """Where a pacer has its time from: this computer's."""
 
     def now_s(self) -> float:
         """Seconds from any beginning."""
-        ...
-
-    def wait(self, changed: threading.Condition, timeout_s: float | None) -> None:
-        """Wait on ``changed``, which is held, at most ``timeout_s``."""
-        ...
-
-
-class WallClock:
-    """This computer's time."""
-
-    def now_s(self) -> float:
         return time.monotonic()
 
     def wait(self, changed: threading.Condition, timeout_s: float | None) -> None:
+        """Wait on ``changed``, which is held, at most ``timeout_s``."""
         changed.wait(timeout_s)
 
 
@@ -89,7 +70,7 @@ class Pacer:
     """Holds each frame until it is due; may be paused, stepped and set to another speed from any
     thread. What comes late is given on at once, and far behind time begins anew from there."""
 
-    def __init__(self, speed: float = 0.0, clock: WaitingClock | None = None) -> None:
+    def __init__(self, speed: float = 0.0, clock: WallClock | None = None) -> None:
         self._speed, self._clock = speed, clock or WallClock()
         self._changed = threading.Condition()
         self._paused, self._steps, self._woken = False, 0, False
@@ -141,7 +122,6 @@ class Pacer:
         self._change(paused=True)
 
     def play(self) -> None:
-        """Go on."""
         self._change(paused=False)
 
     def step(self) -> None:
@@ -176,7 +156,7 @@ class Slowness:
 
     AFTER_S = 0.5
 
-    def __init__(self, clock: WaitingClock | None = None) -> None:
+    def __init__(self, clock: WallClock | None = None) -> None:
         self._clock, self._told = clock or WallClock(), False
         self._start: tuple[float, int] | None = None
 

@@ -27,7 +27,6 @@ GOING_BACK = 10
 def upload(
     device: CommandExchange, model: str | Path | bytes, progress: Callable[[int, int], None] | None
 ) -> None:
-    """See ``Device.upload_model``."""
     blob = _checked(device, model)
     name, crc = device.transport.name, zlib.crc32(blob)
     done = 0

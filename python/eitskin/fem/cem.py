@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import BoolArray, FloatArray, IntArray
+from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from eitskin.errors import ProtocolError, UsageError, missing_extra
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.patterns import Patterns, patterns_for
@@ -72,8 +72,8 @@ class System:
     indptr: npt.NDArray[np.int32]
     filling: csr_matrix
 
-    def matrix(self, conductivity: FloatArray, impedance: FloatArray) -> csc_matrix:
-        """The symmetric positive definite matrix, (size, size) in S."""
+    def matrix(self, conductivity: AnyArray, impedance: AnyArray) -> csc_matrix:
+        """The symmetric matrix, (size, size) in S; positive definite where all is real."""
         admittance = np.divide(1.0, impedance, out=np.zeros_like(impedance), where=~self.shunted)
         values = self.filling @ np.concatenate([conductivity, admittance])
         return csc_matrix((values, self.indices, self.indptr), shape=(self.size, self.size))
@@ -125,9 +125,6 @@ class ForwardModel:
 
         ``contact_impedance_ohm_m2`` replaces the model's for this call; changing which are 0 makes
         a new pattern.
-
-        Raises:
-            UsageError: a shape is wrong, or a value not finite and above 0 (impedances may be 0).
         """
         conductivity = self._checked_conductivity(conductivity_s_per_m)
         impedance = self._impedance
@@ -181,10 +178,14 @@ class ForwardModel:
 
     def _make_system(self, shunted: BoolArray) -> System:
         self.counters.patterns += 1
+        return _system(self.mesh, shunted, self.element_stiffness(), self.thickness_m)
+
+    def element_stiffness(self) -> FloatArray:
+        """Each element's matrix per unit of conductivity, (E, 3, 3) in m."""
+        x, y = self.gradients_per_m[..., 0], self.gradients_per_m[..., 1]
+        products = x[:, :, None] * x[:, None, :] + y[:, :, None] * y[:, None, :]
         volumes_m3 = self.mesh.areas_mm2 * (1e-6 * self.thickness_m)
-        return _system(
-            self.mesh, shunted, _stiffness(self.gradients_per_m, volumes_m3), self.thickness_m
-        )
+        return np.asarray(products * volumes_m3[:, None, None])
 
 
 def factorise(matrix: csc_matrix) -> Any:
@@ -216,13 +217,6 @@ def _checked_impedance(given: npt.ArrayLike, count: int) -> FloatArray:
             "forward model: every contact impedance must be finite and at least 0 ohm m2"
         )
     return impedance.copy()
-
-
-def _stiffness(gradients_per_m: FloatArray, volumes_m3: FloatArray) -> FloatArray:
-    """Each element's matrix per unit of conductivity, (E, 3, 3) in m."""
-    x, y = gradients_per_m[..., 0], gradients_per_m[..., 1]
-    products = x[:, :, None] * x[:, None, :] + y[:, :, None] * y[:, None, :]
-    return np.asarray(products * volumes_m3[:, None, None])
 
 
 def _number_unknowns(mesh: Mesh, shunted: BoolArray) -> tuple[IntArray, int]:

@@ -22,9 +22,6 @@ def electrode_fields(
 
     Only differences between electrodes have a meaning: the field of a pair is that of its first
     less that of its second.
-
-    Raises:
-        UsageError: the conductivity has a wrong shape, or a value not finite and above 0.
     """
     fields = element_fields(forward, forward.solve(conductivity_s_per_m))
     by_pixel = element_to_pixel(forward.mesh, grid).tocsc()

@@ -38,7 +38,6 @@ class Grid:
 
     @property
     def pixel_area_mm2(self) -> float:
-        """One pixel's area."""
         return self.pixel_mm**2
 
     @cached_property
@@ -54,11 +53,7 @@ class Grid:
         return np.asarray(np.asarray(self.origin_mm) + (self.index + 0.5) * self.pixel_mm)
 
     def image(self, values: npt.ArrayLike) -> FloatArray:
-        """``values`` (n,) as an image (ny, nx), row 0 the lowest y, nan outside.
-
-        Raises:
-            UsageError: the number of values is not n.
-        """
+        """``values`` (n,) as an image (ny, nx), row 0 the lowest y, nan outside."""
         flat = np.asarray(values, dtype=np.float64)
         if flat.shape != (self.n_pixels,):
             raise UsageError(
@@ -70,11 +65,7 @@ class Grid:
         return picture
 
     def values(self, image: npt.ArrayLike) -> FloatArray:
-        """The kept pixels of an ``image`` (ny, nx), (n,): the inverse of ``image``.
-
-        Raises:
-            UsageError: the image's shape is not (ny, nx).
-        """
+        """The kept pixels of an ``image`` (ny, nx), (n,): the inverse of ``image``."""
         picture = np.asarray(image, dtype=np.float64)
         if picture.shape != (self.ny, self.nx):
             raise UsageError(
@@ -84,10 +75,8 @@ class Grid:
 
     def locate(self, points_mm: npt.ArrayLike) -> IntArray:
         """The kept pixel in which each of ``points_mm`` (k, 2) lies, (k,); -1 outside of all."""
-        cell = np.floor(
-            (np.asarray(points_mm, dtype=np.float64).reshape(-1, 2) - self.origin_mm)
-            / self.pixel_mm
-        )
+        points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
+        cell = np.floor((points - self.origin_mm) / self.pixel_mm)
         known = (cell >= 0).all(axis=1) & (cell[:, 0] < self.nx) & (cell[:, 1] < self.ny)
         ix, iy = np.where(known[:, None], cell, 0).astype(np.int64).T
         return np.asarray(np.where(known, self.number[iy, ix], -1))
@@ -95,11 +84,7 @@ class Grid:
 
 def grid_for(outline: Outline, pixels_across: int = 32) -> Grid:
     """The grid with ``pixels_across`` pixels along the bounding box's longer side; the shorter
-    side's cover is centred.
-
-    Raises:
-        UsageError: ``pixels_across`` is not within 4 to 512.
-    """
+    side's cover is centred."""
     if not 4 <= pixels_across <= MAX_PIXELS_ACROSS:
         raise UsageError(
             f"grid: {pixels_across} pixels across is out of range; use 4 to {MAX_PIXELS_ACROSS}"

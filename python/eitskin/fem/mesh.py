@@ -79,17 +79,13 @@ def build_mesh(
         UsageError: a size is not above 0, or so small that the mesh would be enormous.
         MissingExtraError: netgen is not installed.
     """
-    size = (
-        electrode_size_mm
-        if electrode_size_mm is not None
-        else min(max_size_mm, skin.electrodes.width_mm / 4)
-    )
+    size = electrode_size_mm
+    if size is None:
+        size = min(max_size_mm, skin.electrodes.width_mm / 4)
     if not (0 < max_size_mm < float("inf") and 0 < size < float("inf")):
         raise UsageError(f"mesh: sizes of {max_size_mm:g} and {size:g} mm; both must be above 0")
-    if (
-        skin.outline.area_mm2 / max_size_mm**2 > MAX_ELEMENTS
-        or skin.outline.perimeter_mm / size > MAX_ELEMENTS
-    ):
+    outline = skin.outline
+    if max(outline.area_mm2 / max_size_mm**2, outline.perimeter_mm / size) > MAX_ELEMENTS:
         raise UsageError(
             f"mesh: sizes of {max_size_mm:g} and {size:g} mm would give over {MAX_ELEMENTS}"
             " elements; use larger ones"
@@ -99,7 +95,7 @@ def build_mesh(
     return _checked_mesh(skin, arrays, owner)
 
 
-def mesh_for_elements(skin: Skin, elements: int = 3000, *, timeout_s: float = 60.0) -> Mesh:
+def mesh_for_elements(skin: Skin, elements: int = 3000) -> Mesh:
     """A mesh of about ``elements`` triangles: within 15 %, or the nearest of four tries where the
     electrodes need more.
 
@@ -114,12 +110,8 @@ def mesh_for_elements(skin: Skin, elements: int = 3000, *, timeout_s: float = 60
     aim, best = float(elements), None
     for _ in range(4):
         max_size_mm = _size_for(skin, aim)
-        mesh = build_mesh(
-            skin,
-            max_size_mm=max_size_mm,
-            electrode_size_mm=_electrode_size(skin, max_size_mm),
-            timeout_s=timeout_s,
-        )
+        electrode_size_mm = _electrode_size(skin, max_size_mm)
+        mesh = build_mesh(skin, max_size_mm=max_size_mm, electrode_size_mm=electrode_size_mm)
         if best is None or abs(mesh.n_elements - elements) < abs(best.n_elements - elements):
             best = mesh
         if abs(mesh.n_elements - elements) <= COUNT_TOLERANCE * elements:
@@ -131,12 +123,7 @@ def mesh_for_elements(skin: Skin, elements: int = 3000, *, timeout_s: float = 60
 
 def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[npt.NDArray[Any]]:
     """Run mesh_worker.py on ``request``, killing it after ``timeout_s``; returns its four arrays.
-    ``name``: the skin.
-
-    Raises:
-        GeometryError: it failed or was killed.
-        MissingExtraError: netgen is not installed.
-    """
+    ``name``: the skin."""
     if importlib.util.find_spec("netgen") is None:
         raise missing_extra("model", "netgen-mesher")
     package_root = str(Path(eitskin.__file__).parents[1])
@@ -159,12 +146,9 @@ def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[npt
                 " the outline, use a larger element size or allow more time"
             ) from None
         if done.returncode != 0:
-            lines = done.stderr.decode(errors="replace").strip().splitlines() or [
-                f"exit status {done.returncode}"
-            ]
-            raise GeometryError(
-                f"skin {name!r}: the mesher failed ({lines[-1]}); simplify the outline"
-            )
+            said = done.stderr.decode(errors="replace").strip().splitlines()
+            why = said[-1] if said else f"exit status {done.returncode}"
+            raise GeometryError(f"skin {name!r}: the mesher failed ({why}); simplify the outline")
         with reply.open("rb") as arrays:
             return [np.load(arrays) for _ in range(4)]
 

@@ -59,9 +59,6 @@ def sensitivity(
 
     ``rows`` picks rows of the protocol, such as one of each reciprocal pair. ``weights`` is
     ``element_to_pixel`` of the same mesh and grid, for those who call repeatedly.
-
-    Raises:
-        UsageError: the conductivity has a wrong shape, or a value not finite and above 0.
     """
     if weights is None:
         weights = element_to_pixel(forward.mesh, grid)
@@ -71,11 +68,7 @@ def sensitivity(
 def element_sensitivity(
     forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """As ``sensitivity``, with the mesh's elements for pixels: (m, E) and (m,).
-
-    Raises:
-        UsageError: the conductivity has a wrong shape, or a value not finite and above 0.
-    """
+    """As ``sensitivity``, with the mesh's elements for pixels: (m, E) and (m,)."""
     each = identity(forward.mesh.n_elements, format="csr")
     return _sensitivity(forward, conductivity_s_per_m, each, None)
 

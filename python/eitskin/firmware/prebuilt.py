@@ -27,11 +27,7 @@ class Manifest:
 
 
 def load_image() -> tuple[bytes, Manifest]:
-    """The shipped image and its manifest.
-
-    Raises:
-        FileError: the package was installed without it, or the two do not belong together.
-    """
+    """The shipped image and its manifest."""
     folder = resources.files("eitskin.firmware")
     try:
         image = folder.joinpath(IMAGE).read_bytes()
@@ -68,11 +64,7 @@ def describe(root: Path, image: bytes, compiler: str) -> Manifest:
 
 
 def ship(root: Path, built: Path, compiler: str) -> Manifest:
-    """Copy the image ``built`` and its manifest into the package of the checkout at ``root``.
-
-    Raises:
-        FileError: the image is not there, or the package's folder cannot be written.
-    """
+    """Copy the image ``built`` and its manifest into the package of the checkout at ``root``."""
     image = read_bytes(built, "firmware image")
     manifest = describe(root, image, compiler)
     folder = root / "python" / "eitskin" / "firmware"

@@ -28,11 +28,7 @@ def read_npz(
 ) -> dict[str, NDArray[Any]]:
     """All arrays of an .npz, without pickle; ``what`` names its kind in errors. Arrays of objects
     are left out; those that are not ``wanted`` (None: all are) are not unpacked and come out empty.
-    At most ``most_bytes`` are unpacked.
-
-    Raises:
-        FileError: it cannot be read, is no .npz, or unpacks to far more than an .npz of numbers.
-    """
+    At most ``most_bytes`` are unpacked."""
     try:
         with Path(path).open("rb") as stream:
             archive = np.load(stream, allow_pickle=False)
@@ -84,11 +80,7 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
 
 
 def pick(arrays: Mapping[str, NDArray[Any]], key: str, option: str, where: str) -> NDArray[Any]:
-    """The array ``key``; ``option`` is the option that named it.
-
-    Raises:
-        FrameError: it is not there; the text lists the arrays that are.
-    """
+    """The array ``key``; ``option`` is the option that named it."""
     if key not in arrays:
         raise FrameError(f"{where}: no array {key!r} for {option}; it holds {listing(arrays)}")
     return arrays[key]

@@ -123,11 +123,7 @@ def touch_transfer(
 
 def electrode_angles_rad(skin: Skin) -> FloatArray:
     """Angle of each electrode's centre about the centre of a disk, (count,), counterclockwise from
-    x.
-
-    Raises:
-        GeometryError: the skin is no disk.
-    """
+    x."""
     if skin.outline.diameter_mm is None:
         raise GeometryError(f"skin {skin.name!r} is no disk")
     x, y = skin.electrode_centres_mm().T

@@ -52,9 +52,6 @@ def import_frames(
     ``n_electrodes``); ``skin`` gives numbering direction and prediction where known. An eitskin
     frames file may be repaired again. ``lenient`` is for examination: NaN and Inf pass, and where
     no quiet frames are named the first frame is taken.
-
-    Raises:
-        EitskinError: each of its kinds, for what cannot be read or does not fit.
     """
     if Path(path).suffix.lower() == ".mat":
         options, n_electrodes = with_eidors_defaults(path, options, protocol, n_electrodes)
@@ -73,21 +70,13 @@ def import_frames(
     voltage, reference = raw.voltage[:, index] * sign, quiet[:, index] * sign
     n = _count(protocol, n_electrodes)
     rows = relabel(rows, swap_map(n, options.swaps))
-    prediction = (
-        homogeneous(skin, n).voltages(rows)
-        if options.sign == "magnitude" or options.equalise
-        else None
-    )
+    predicted = options.sign == "magnitude" or options.equalise
+    prediction = homogeneous(skin, n).voltages(rows) if predicted else None
     keep = kept_channels(rows, n, options.drop_channels, options.drop_electrodes)
-    voltage, reference = (
-        imputed(
-            flipped(signed(values, options.sign, prediction), options.flip_channels),
-            rows,
-            n,
-            options.impute_channels,
-        )[:, keep]
-        for values in (voltage, reference)
-    )
+    for_all = (rows, n, options.impute_channels)
+    signs = (signed(values, options.sign, prediction) for values in (voltage, reference))
+    turned = (flipped(values, options.flip_channels) for values in signs)
+    voltage, reference = (imputed(values, *for_all)[:, keep] for values in turned)
     if options.equalise and prediction is not None:
         gain = equalising_gains(reference.mean(axis=0), prediction[keep])
         voltage, reference = voltage * gain, reference * gain
@@ -151,11 +140,7 @@ def _check_protocol(path: str | Path, frames: Frames, protocol: Protocol | None)
 def accepted_counts(
     options: ImportOptions, protocol: Protocol | None
 ) -> tuple[tuple[int, ...], str]:
-    """How many rows a source frame may have, and the words that say why.
-
-    Raises:
-        UsageError: neither a protocol nor a table is given.
-    """
+    """How many rows a source frame may have, and the words that say why."""
     if options.source.protocol_table is not None:
         return (), "its table"
     if options.table is not None:

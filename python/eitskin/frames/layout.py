@@ -131,11 +131,7 @@ def save_layout(path: str | Path, layout: Layout) -> None:
 def layout_of(
     raw: RawFrames, options: ImportOptions, protocol: Protocol | None, where: str
 ) -> Layout:
-    """The layout of a file that ``options`` read as ``raw``, with all that was found in it.
-
-    Raises:
-        UsageError: its frames are not lines of text.
-    """
+    """The layout of a file that ``options`` read as ``raw``, with all that was found in it."""
     read = raw.text
     if read is None:
         raise UsageError(
@@ -175,11 +171,7 @@ class BadLine(EitskinError):
 
 
 class LineParser:
-    """Turns rows of cells into frames, as ``layout`` says.
-
-    Raises:
-        UsageError: the columns that it names cannot be.
-    """
+    """Turns rows of cells into frames, as ``layout`` says."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout, self.cells = layout, layout.options.source.cells
@@ -189,11 +181,6 @@ class LineParser:
             self._choose(self.cells)
 
     def frame(self, row: Row) -> LineFrame:
-        """The frame of ``row``.
-
-        Raises:
-            BadLine: it has another number of cells, or hardly any of them is a number.
-        """
         cells = row.cells
         if self.cells is None:
             if not any(parse_cell(cell) is not None for cell in cells):

@@ -30,9 +30,6 @@ class LineFormat:
     each has N digits after its point. ``label``: only lines that begin with it are frames; a
     number, a colon or an equals sign may follow it. A line that is the label alone begins a frame
     whose numbers stand in the lines after it. ``comment``: lines that begin so are passed over.
-
-    Raises:
-        UsageError: the delimiter is none.
     """
 
     delimiter: str

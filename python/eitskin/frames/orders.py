@@ -37,10 +37,6 @@ def source_table(order: str, protocol: Protocol) -> IntArray:
     "fixed": for each drive the measuring pairs ascend from electrode 0 (this project's order).
     "rotating": they ascend from the drive's I+ onwards, modulo the number of electrodes. "-all":
     pairs that touch a driving electrode, too.
-
-    Raises:
-        UsageError: an unknown order, or "-all" for a protocol whose measuring pairs are not all of
-            one step.
     """
     if order not in ORDERS:
         raise UsageError(
@@ -63,9 +59,6 @@ def match_rows(source: IntArray, wanted: IntArray) -> RowMatch:
 
     A row that is not in the source is taken from its reciprocal (drive and measuring pair
     exchanged) if that is there.
-
-    Raises:
-        FrameError: a wanted row, and its reciprocal, is absent.
     """
     place: dict[tuple[int, int, int, int], tuple[int, int]] = {}
     for columns, sign in PREFERENCE:
@@ -92,11 +85,7 @@ def electrode_map(n: int, rotate: int = 0, mirror: bool = False) -> IntArray:
 
 
 def swap_map(n: int, pairs: Iterable[Sequence[int]]) -> IntArray:
-    """The (n,) map that exchanges the electrodes of one pair, then those of the next, and so on.
-
-    Raises:
-        UsageError: a pair is not two different electrodes.
-    """
+    """The (n,) map that exchanges the electrodes of one pair, then those of the next, and so on."""
     mapped = np.arange(n, dtype=np.int64)
     for pair in pairs:
         if len(set(pair)) != 2 or not all(0 <= electrode < n for electrode in pair):

@@ -47,11 +47,7 @@ def kind_of(name: str) -> str | None:
 
 def refuse_parts(names: Sequence[str], option: str) -> None:
     """Refuse columns that the header calls phases or imaginary parts, where no complex part is
-    asked for.
-
-    Raises:
-        UsageError: naming the first.
-    """
+    asked for."""
     for name in names:
         kind = kind_of(name)
         if kind in A_PART:
@@ -67,11 +63,7 @@ def all_magnitudes(names: Sequence[str]) -> bool:
 
 
 def paired(names: Sequence[str], values: NDArray[Any], how: str | None, option: str) -> Paired:
-    """How the columns of ``values`` (rows, c), with these ``names`` (empty: no header), are pairs.
-
-    Raises:
-        UsageError: they are none, header and ``how`` disagree, or nothing says what they are.
-    """
+    """How the columns of ``values`` (rows, c) with these ``names`` (empty: no header) are pairs."""
     count = values.shape[1]
     if count % 2:
         raise UsageError(f"{option}: with --complex-part columns come in pairs; {count} are named")

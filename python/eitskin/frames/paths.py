@@ -17,9 +17,6 @@ class Paths:
     ``path_touch`` numbers the touch, ascending; ``path_time_s`` ascends within a touch, on the axis
     of the frames' ``time_s``; ``path_xy_mm`` (i, 2), ``path_radius_mm`` and ``path_strength`` are
     as the frames' touch fields. A touch is there from its first point to its last.
-
-    Raises:
-        FrameError: shapes disagree, a value is not finite, or points do not ascend.
     """
 
     path_touch: IntArray

@@ -1,7 +1,6 @@
 """Where each channel of a frame comes from, in a source's own order: electrodes renumbered, rows in
 a protocol's order, signs."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +18,7 @@ from eitskin.frames.orders import (
     swap_map,
     touching,
 )
-from eitskin.frames.repair import check_range, partners
+from eitskin.frames.repair import check_range, good_reciprocals
 from eitskin.frames.source import electrode_table
 from eitskin.frames.tables import read_table
 from eitskin.model.model import Model
@@ -36,12 +35,7 @@ def source_rows(
     where: str,
 ) -> IntArray:
     """The rows [I+, I-, V+, V-] of a source in its own order, in our numbers, (rows, 4). ``own``:
-    the source's own table.
-
-    Raises:
-        FrameError: a table names electrodes that are not there, or is none.
-        UsageError: neither a protocol nor a table is given.
-    """
+    the source's own table."""
     given = table_rows(options)
     given = own if given is None else given
     if given is None:
@@ -62,11 +56,7 @@ def source_rows(
 
 
 def table_rows(options: ImportOptions) -> IntArray | None:
-    """The source's rows as the options themselves, or the file that they name, list them.
-
-    Raises:
-        FrameError: the file is no table of four columns of whole numbers.
-    """
+    """The source's rows as the options themselves, or the file that they name, list them."""
     if options.table is not None:
         return np.asarray(options.table, dtype=np.int64).reshape(-1, 4)
     if options.table_file is None:
@@ -102,11 +92,7 @@ class Placement:
 
 def place(options: ImportOptions, protocol: Protocol | None, model: Model, where: str) -> Placement:
     """How frames that stand as ``options`` say come to the rows of ``model``; ``protocol``: the
-    source's, None: the model's.
-
-    Raises:
-        EitskinError: the options are of files only, or the model has rows that the source has not.
-    """
+    source's, None: the model's."""
     if options.equalise:
         raise UsageError(
             f"{where}: equalise needs a whole file; take it out, or calibrate:  eitskin calibrate"
@@ -134,28 +120,15 @@ def place(options: ImportOptions, protocol: Protocol | None, model: Model, where
         sign = -sign
     check_range(options.flip_channels, len(measured), "--flip-channels")
     sign[list(options.flip_channels)] *= -1
-    index = _filled(options.impute_channels, measured, n, match.index.copy(), sign)
+    index = match.index.copy()
+    check_range(options.impute_channels, len(measured), "--impute-channels")
+    filled = good_reciprocals(options.impute_channels, measured, n)
+    for channel, (other, between) in filled.items():
+        index[channel], sign[channel] = index[other], between * sign[other]
     check_range(options.drop_channels, len(measured), "--drop-channels")
     blank = touching(measured, options.drop_electrodes)
     blank[list(options.drop_channels)] = True
     return Placement(len(rows), index, sign, blank, magnitude)
-
-
-def _filled(
-    channels: Sequence[int], rows: IntArray, n: int, index: IntArray, sign: NDArray[np.float64]
-) -> IntArray:
-    """``index``, and ``sign`` in place, with ``channels`` taken from their reciprocals."""
-    check_range(channels, len(rows), "--impute-channels")
-    partner = partners(rows, n) if channels else {}
-    for channel in channels:
-        if channel not in partner or partner[channel][0] in channels:
-            raise UsageError(
-                f"--impute-channels {channel}: {rows[channel].tolist()} has no good reciprocal; use"
-                " --drop-channels"
-            )
-        other, between = partner[channel]
-        index[channel], sign[channel] = index[other], between * sign[other]
-    return index
 
 
 def _expected(model: Model) -> NDArray[np.float64]:

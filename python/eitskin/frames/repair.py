@@ -17,11 +17,7 @@ MIN_GAIN = 0.05
 
 def signed(values: FloatArray, sign: str, prediction: FloatArray | None) -> FloatArray:
     """``values`` (n, m) as they are, negated, or their magnitudes with the signs of ``prediction``
-    (m,).
-
-    Raises:
-        UsageError: an unknown sign.
-    """
+    (m,)."""
     if sign not in SIGNS:
         raise UsageError(f"--sign {sign}: use one of {', '.join(SIGNS)}")
     if sign == "magnitude" and prediction is not None:
@@ -54,11 +50,7 @@ def kept_channels(
     rows: IntArray, n_electrodes: int, drop_channels: Sequence[int], drop_electrodes: Sequence[int]
 ) -> NDArray[np.bool_]:
     """Which channels (m,) stay when ``drop_channels`` and all channels that use ``drop_electrodes``
-    go.
-
-    Raises:
-        UsageError: a number is out of range, or nothing stays.
-    """
+    go."""
     check_range(drop_electrodes, n_electrodes, "--drop-electrodes")
     check_range(drop_channels, len(rows), "--drop-channels")
     keep = ~touching(rows, drop_electrodes)
@@ -71,32 +63,30 @@ def kept_channels(
 def imputed(
     values: FloatArray, rows: IntArray, n_electrodes: int, channels: Sequence[int]
 ) -> FloatArray:
-    """``values`` (n, m) with ``channels`` replaced by their reciprocal channels of ``rows`` (m, 4).
-
-    Raises:
-        UsageError: a channel is out of range, or its reciprocal is absent or to be replaced, too.
-    """
+    """``values`` (n, m) with ``channels`` replaced by their reciprocals among ``rows`` (m, 4)."""
     check_range(channels, len(rows), "--impute-channels")
-    if not channels:
-        return values
-    filled, partner = values.copy(), partners(rows, n_electrodes)
+    filled = values.copy()
+    for channel, (other, sign) in good_reciprocals(channels, rows, n_electrodes).items():
+        filled[:, channel] = sign * values[:, other]
+    return filled
+
+
+def good_reciprocals(
+    channels: Sequence[int], rows: IntArray, n_electrodes: int
+) -> dict[int, tuple[int, int]]:
+    """For each of ``channels`` the one that fills it, which is none of them, and the sign."""
+    partner = partners(rows, n_electrodes) if channels else {}
     for channel in channels:
         if channel not in partner or partner[channel][0] in channels:
             raise UsageError(
                 f"--impute-channels {channel}: {rows[channel].tolist()} has no good reciprocal; use"
                 " --drop-channels"
             )
-        other, sign = partner[channel]
-        filled[:, channel] = sign * values[:, other]
-    return filled
+    return {channel: partner[channel] for channel in channels}
 
 
 def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArray:
-    """Gains (m,), of median 1, that make ``reference`` (m,) a multiple of ``prediction`` (m,).
-
-    Raises:
-        FrameError: a channel has less than 5 % of what is predicted, or the opposite sign.
-    """
+    """Gains (m,), of median 1, that make ``reference`` (m,) a multiple of ``prediction`` (m,)."""
     ratio = reference / prediction
     relative = ratio / np.median(ratio)
     weak = np.flatnonzero(~(relative > MIN_GAIN))
@@ -110,11 +100,7 @@ def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArra
 
 
 def check_range(numbers: Iterable[int], count: int, option: str) -> None:
-    """Refuse ``numbers`` that are not 0 to ``count`` - 1.
-
-    Raises:
-        UsageError: naming the first, and ``option``.
-    """
+    """Refuse ``numbers`` that are not 0 to ``count`` - 1."""
     for number in numbers:
         if not 0 <= number < count:
             raise UsageError(f"{option} {number}: out of range; there are 0 to {count - 1}")

@@ -124,11 +124,7 @@ def read_source(
 
 def electrode_table(rows: NDArray[Any], base: int, where: str) -> IntArray:
     """A source's protocol table as (rows, 4) electrodes from 0; ``base`` is the source's number of
-    its first electrode.
-
-    Raises:
-        FrameError: it is not (rows, 4) whole numbers.
-    """
+    its first electrode."""
     table = np.asarray(rows)
     if (
         table.ndim != 2
@@ -145,11 +141,6 @@ def electrode_table(rows: NDArray[Any], base: int, where: str) -> IntArray:
 
 
 def refuse_nonfinite(raw: RawFrames, where: str) -> None:
-    """Refuse NaN and Inf.
-
-    Raises:
-        FrameError: naming the first such value.
-    """
     for what, values in (("frames", raw.voltage), ("reference", raw.reference)):
         bad = np.argwhere(~np.isfinite(values)) if values is not None else np.zeros((0, 2))
         if values is not None and len(bad):
@@ -271,11 +262,8 @@ def _from_arrays(
     path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
 ) -> RawFrames:
     kind = Path(path).suffix[1:].upper()
-    _refuse(
-        options,
-        ("columns", "reference_columns", "delimiter", "header_rows", "label", "pairs"),
-        kind,
-    )
+    of_text = ("columns", "reference_columns", "delimiter", "header_rows", "label", "pairs")
+    _refuse(options, of_text, kind)
     arrays, where = read_arrays(path), str(path)
     if options.voltage is None and list(arrays) == ["array"]:
         options = replace(options, voltage="array")
@@ -294,19 +282,17 @@ def _from_arrays(
     )
     reference = None
     if options.reference is not None:
-        frames_in = (
-            options.frames_in if in_rows is None else FRAMES_IN[1] if in_rows else FRAMES_IN[2]
-        )
+        frames_in = options.frames_in
+        if in_rows is not None:
+            frames_in = "rows" if in_rows else "columns"
         counts = (voltage.shape[1],)
         reference, _ = _frames_of(
             arrays, options.reference, "--reference", counts, frames_in, where, "the frames"
         )
     names: tuple[str, ...] = ()
     if options.names is not None:
-        names = tuple(
-            str(name)
-            for name in np.atleast_1d(pick(arrays, options.names, "--names", where)).ravel()
-        )
+        given = pick(arrays, options.names, "--names", where)
+        names = tuple(map(str, np.atleast_1d(given).ravel()))
     times = None
     if options.time is not None:
         times = _times(pick(arrays, options.time, "--time", where), f"{where}: {options.time}")

@@ -42,16 +42,11 @@ class TextTable:
 
     @property
     def n_columns(self) -> int:
-        """The number of columns."""
         return len(self.cells[0])
 
     def numbers(self, columns: Sequence[int]) -> NDArray[Any]:
         """The chosen ``columns`` as numbers, (rows, len(columns)), complex where a cell is like
-        1.5-2j, else float.
-
-        Raises:
-            FrameError: a cell is empty or no number, named by line and column.
-        """
+        1.5-2j, else float."""
         values: list[list[complex]] = []
         for cells, line in zip(self.cells, self.line, strict=True):
             row = []
@@ -184,11 +179,7 @@ def _even(rows: list[Row], cells: int | None, notes: list[str]) -> list[Row]:
 
 def chosen(spec: str, count: int, names: Sequence[str], option: str) -> tuple[int, ...]:
     """The indices that ``spec`` names among ``count``: "2", "0,2", "1:209", "0:416:2", "3:" or
-    names from a header, by commas.
-
-    Raises:
-        UsageError: a name is not there or an index is out of range; ``option`` is named.
-    """
+    names from a header, by commas."""
     indices: list[int] = []
     for part in (piece.strip() for piece in spec.split(",")):
         if part in names:

@@ -54,7 +54,8 @@ def _touches(
         "truth-radius": options.touch_radius,
     }
     extra = {"truth-strength": options.touch_strength, "truth-sign": options.touch_sign}
-    if not any((needed | extra).values()):
+    keys = needed | extra
+    if not any(keys.values()):
         return {}
     absent = [name for name, key in needed.items() if key is None]
     if absent:
@@ -62,9 +63,7 @@ def _touches(
             f"touches need --{absent[0]} too (--truth-frame, --truth-xy and --truth-radius)"
         )
     picked = {
-        name: pick(arrays, key, f"--{name}", where)
-        for name, key in (needed | extra).items()
-        if key is not None
+        name: pick(arrays, key, f"--{name}", where) for name, key in keys.items() if key is not None
     }
     frame = picked["truth-frame"]
     if frame.dtype.kind in "US":
@@ -77,22 +76,20 @@ def _touches(
         frame = np.array([list(names).index(str(name)) for name in frame], dtype=np.int64)
     elif frame.dtype.kind == "f" and (frame == np.round(frame)).all():
         frame = frame.astype(np.int64)
-    fields: dict[str, Any] = {
-        "touch_frame": frame,
-        "touch_xy_mm": _scaled(
-            picked["truth-xy"], options.touch_unit_mm, f"{where}: {options.touch_xy}"
-        ),
-        "touch_radius_mm": _scaled(
-            picked["truth-radius"], options.touch_unit_mm, f"{where}: {options.touch_radius}"
-        ),
-    }
+
+    def scaled(name: str, unit: float = 1.0) -> NDArray[np.float64]:
+        values = picked[name]
+        if values.dtype.kind not in "fiub":
+            raise FrameError(f"{where}: {keys[name]}: holds {values.dtype}, no numbers")
+        return np.asarray(values, dtype=np.float64) * unit
+
+    fields: dict[str, Any] = {"touch_frame": frame}
+    fields["touch_xy_mm"] = scaled("truth-xy", options.touch_unit_mm)
+    fields["touch_radius_mm"] = scaled("truth-radius", options.touch_unit_mm)
     if "truth-strength" in picked:
-        fields["touch_strength"] = _scaled(
-            picked["truth-strength"], 1.0, f"{where}: {options.touch_strength}"
-        )
+        fields["touch_strength"] = scaled("truth-strength")
     if "truth-sign" in picked:
-        sign = _scaled(picked["truth-sign"], 1.0, f"{where}: {options.touch_sign}")
-        fields["touch_sign"] = np.where(sign > 0, 1, -1).astype(np.int8)
+        fields["touch_sign"] = np.where(scaled("truth-sign") > 0, 1, -1).astype(np.int8)
     return fields
 
 
@@ -115,9 +112,3 @@ def _mask(
     if options.mask_top_first:
         mask = mask[:, ::-1]
     return {"truth_mask": mask, "truth_mask_extent_mm": extent}
-
-
-def _scaled(values: NDArray[Any], unit: float, where: str) -> NDArray[np.float64]:
-    if values.dtype.kind not in "fiub":
-        raise FrameError(f"{where}: holds {values.dtype}, no numbers")
-    return np.asarray(values, dtype=np.float64) * unit

@@ -32,7 +32,6 @@ class Notice:
     time_unix_s: float | None = None
 
     def message(self) -> dict[str, Any]:
-        """For programs (docs/reference/message.md)."""
         return head("notice") | asdict(self)
 
 
@@ -59,7 +58,6 @@ class Report:
         return self.live.followed.touches
 
     def message(self) -> dict[str, Any]:
-        """For programs (docs/reference/message.md)."""
         head, times = self.live.followed.head, (self.time_s, self.time_unix_s)
         message = report_table(head.frame, head.drive, *times, self.touches)
         return message | {"board_us": self.live.board_us, "age_us": head.age_us}

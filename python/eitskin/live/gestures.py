@@ -8,11 +8,7 @@ from eitskin.device.live_frames import LiveFrame
 
 
 class GestureTeller:
-    """Takes the frames of a stream in their order.
-
-    Raises:
-        UsageError: there are too many zones, or one cannot be.
-    """
+    """Takes the frames of a stream in their order."""
 
     def __init__(self, zones: Sequence[Zone] = ()) -> None:
         self._gestures = Gestures(zones)

@@ -90,7 +90,6 @@ def known(value: Any) -> Any:
 
 
 def true_table(touch: TrueTouch) -> dict[str, float]:
-    """A true touch."""
     return {
         "x_mm": touch.x_mm,
         "y_mm": touch.y_mm,

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 from eitskin.core.results import Options
 from eitskin.device.bandwidth import carried_every
-from eitskin.device.client import Device
+from eitskin.device.client import TARE_FRAMES, Device
 from eitskin.device.events import Events
 from eitskin.device.known_model import KnownModel, find_model, need_model
 from eitskin.device.link import LinkEvent, Reconnect
@@ -33,7 +33,7 @@ from eitskin.device.open import open_with_files
 from eitskin.device.recordings.recording import Recorder, read_head, recorded_options
 from eitskin.device.set_up import begin_scene, set_up, take_reference
 from eitskin.device.settings import ScanSettings, SolverSettings
-from eitskin.device.timing import Pacer, Slowness, WaitingClock, split_timing
+from eitskin.device.timing import Pacer, Slowness, WallClock, split_timing
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.device.wire.packets import Fault
 from eitskin.errors import EitskinError
@@ -45,7 +45,6 @@ from eitskin.scoring.matching import match
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore, truth_of
 from eitskin.scoring.stream_check import Watcher
 
-TARE_FRAMES = 16
 KEPT_ON = (
     "the board's owner has set keep-drive: current flows on when this program ends;  eitskin board"
     " --no-keep-drive  changes that"
@@ -69,10 +68,6 @@ class Session:
         summary, score: what the frames amounted to so far.
         recorder: where every packet is recorded.
         pacer: holds what is simulated, emulated or recorded until it is due; not a real board.
-
-    Raises:
-        EitskinError: as ``open_device``; a setting cannot be, the board refuses it, or a recording
-            cannot be written.
     """
 
     def __init__(
@@ -84,7 +79,7 @@ class Session:
         progress: Say = lambda text: None,
         reconnect: Reconnect | None = None,
         speed: float = 0.0,
-        clock: WaitingClock | None = None,
+        clock: WallClock | None = None,
     ) -> None:
         self.url, self.settings, self._say = url, settings or SessionSettings(), say
         self._progress = progress
@@ -286,7 +281,7 @@ class Session:
         if hasattr(self.device.transport, "looking_on"):
             self.device.transport.looking_on = None
         if self.truth is not None and began_us is not None:
-            self.truth.begin(began_us)
+            self.truth.began_us = began_us
         events = Events()
         for item in meanwhile:
             for text in events.lines(item):

@@ -21,11 +21,7 @@ Say: TypeAlias = Callable[[str], None]
 
 
 def kinds_of(text: str, name: str) -> Stream:
-    """The kinds in "raw,touches"; ``name`` is the option that gave them.
-
-    Raises:
-        UsageError: one is unknown.
-    """
+    """The kinds in "raw,touches"; ``name`` is the option that gave them."""
     what = Stream(0)
     for kind in text.split(","):
         if kind not in KINDS:
@@ -91,11 +87,7 @@ class SessionSettings:
         return scan, replace(SolverSettings(**kept), **own)
 
     def refuse_of_recording(self, name: str) -> None:
-        """A recording takes no settings.
-
-        Raises:
-            UsageError: one is named.
-        """
+        """A recording takes no settings."""
         named: dict[str, Any] = {**self.scan.named, **self.solver.named}
         if self.target is not None:
             named["preset, budget or accuracy"] = True

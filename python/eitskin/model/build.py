@@ -205,11 +205,9 @@ def build_model(
     if jacobian is not None:
         linear = replace(linear, jacobian=jacobian)
     model = make_model(skin, protocol, linear, chosen)
-    return (
-        model
-        if asked is None
-        else with_model_errors(model, skin, asked, chosen.elements, progress=progress)
-    )
+    if asked is None:
+        return model
+    return with_model_errors(model, skin, asked, chosen.elements, progress=progress)
 
 
 def with_model_errors(

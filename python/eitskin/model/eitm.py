@@ -55,11 +55,7 @@ def _assemble(sections: Sections, protocol_hash: int, taught: bool) -> bytes:
 
 
 def decode_model(blob: bytes, where: str) -> Model:
-    """The model in ``blob``; ``where`` names it in errors.
-
-    Raises:
-        ModelError: it is truncated, corrupted, newer or foreign.
-    """
+    """The model in ``blob``; ``where`` names it in errors."""
     sections = _split(blob, where)
     try:
         return decode_sections(sections, _header(blob, where)[7], where)

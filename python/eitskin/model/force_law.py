@@ -67,7 +67,6 @@ class LoadLaw:
 
 
 def encode_load(law: LoadLaw) -> bytes:
-    """The section's bytes."""
     head = HEAD.pack(len(law.strength), law.order, law.radius_mm, law.reach, law.uncertainty)
     content = head + b"".join(
         part.astype("<f4").tobytes() for part in (law.strength, law.force_n, law.gain)
@@ -77,11 +76,7 @@ def encode_load(law: LoadLaw) -> bytes:
 
 
 def decode_load(content: bytes, where: str) -> LoadLaw:
-    """The section LOAD; ``where`` names its file in errors.
-
-    Raises:
-        ModelError: a length or number is out of range.
-    """
+    """The section LOAD; ``where`` names its file in errors."""
     wrong = ModelError(
         f"{where}: holds a calibration (section 'LOAD') that is out of range; calibrate again"
     )

@@ -16,11 +16,7 @@ NAME = "paper.eitm"
 
 
 def load_prebuilt() -> tuple[Model, bytes]:
-    """The model of the paper's skin, and its bytes.
-
-    Raises:
-        FileError: the package was installed without it.
-    """
+    """The model of the paper's skin, and its bytes."""
     try:
         blob = resources.files("eitskin.model").joinpath(NAME).read_bytes()
     except OSError:

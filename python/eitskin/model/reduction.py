@@ -55,12 +55,7 @@ def reduce_jacobian(
     column_power: float = DEFAULT_COLUMN_POWER,
 ) -> Reduction:
     """Reduce a folded Jacobian (k, n) to ``rank`` rows (``regularisation`` is mu, ``column_power``
-    is p; both without unit).
-
-    Raises:
-        UsageError: the rank is not within 1 to min(k, n), the Jacobian is zero or not finite, mu or
-            p out of range.
-    """
+    is p; both without unit)."""
     j = np.asarray(jacobian, dtype=np.float64)
     if j.ndim != 2 or not np.isfinite(j).all():
         raise UsageError(

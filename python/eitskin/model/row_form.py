@@ -40,7 +40,6 @@ class RowForm:
     square: Float32s
 
     def encode(self) -> bytes:
-        """The section's bytes."""
         rows = np.zeros((4, stride_for(len(self.scale))), dtype="<f4")
         rows[:, : len(self.scale)] = self.scale, self.strength, self.energy, self.square
         return HEAD.pack(self.mu, self.s1, self.s1_square) + rows.tobytes()
@@ -72,12 +71,7 @@ def _near(values: npt.ArrayLike, wanted: npt.ArrayLike, tolerance: float) -> boo
 
 
 def decode_row_form(content: bytes, projection: Float32s, where: str) -> RowForm:
-    """The section's numbers, of a model with P = ``projection`` (r, k).
-
-    Raises:
-        ModelError: it has another length than the rank asks for, or its numbers do not fit P or
-            each other.
-    """
+    """The section's numbers, of a model with P = ``projection`` (r, k)."""
     rank = len(projection)
     stride = stride_for(rank)
     if len(content) != HEAD.size + 16 * stride:

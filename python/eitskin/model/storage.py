@@ -41,11 +41,7 @@ class StoredMatrix:
 
 def store(matrix: npt.ArrayLike, storage: str) -> StoredMatrix:
     """Store ``matrix`` (r, n) as ``storage``; integers are rounded to the nearest of their column's
-    steps.
-
-    Raises:
-        UsageError: a number does not fit.
-    """
+    steps."""
     wide = np.asarray(matrix, dtype=np.float64)
     rank, n = wide.shape
     padded = np.zeros((n, stride_for(rank)))

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from eitskin.device.client import Device
+from eitskin.device.client import TARE_FRAMES, Device
 from eitskin.device.known_model import KnownModel
 from eitskin.device.link import Reconnect
 from eitskin.device.recordings.recording import Recorder
@@ -24,7 +24,7 @@ from eitskin.device.wire.packets import RawFrame
 from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.errors import DeviceError, EitskinError, UsageError
 from eitskin.live.frame import Frame, Notice, Report
-from eitskin.live.session import TARE_FRAMES, Session
+from eitskin.live.session import Session
 from eitskin.live.settings import KINDS, SessionSettings
 from eitskin.model.eitm import decode_model
 from eitskin.page.teacher import Teacher
@@ -101,7 +101,6 @@ class Follower:
         self._thread = threading.Thread(target=self._run, name="eitskin view", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -193,11 +192,7 @@ class Follower:
     # ---- commands, from any thread ----
 
     def live(self) -> PageSession:
-        """The session under way.
-
-        Raises:
-            DeviceError: there is none.
-        """
+        """The session under way."""
         session = self.session
         if session is None:
             raise DeviceError("nothing is being followed; press  Start again")
@@ -213,7 +208,6 @@ class Follower:
         return session.ask(run)
 
     def tare(self) -> Future[str]:
-        """The reference again."""
         session = self._board("tare")
 
         def action(device: Device) -> str:
@@ -223,11 +217,7 @@ class Follower:
         return self._changed(session, action)
 
     def mode(self, kinds: list[str]) -> Future[str]:
-        """What is streamed.
-
-        Raises:
-            UsageError: nothing, or something unknown.
-        """
+        """What is streamed."""
         session = self.live()
         if not kinds or not set(kinds) <= set(KINDS):
             raise UsageError(f"mode: choose from {', '.join(KINDS)}")
@@ -242,7 +232,6 @@ class Follower:
         return self._changed(session, action)
 
     def solver(self, **changes: Any) -> Future[str]:
-        """Sign or iterations."""
         session = self._board("the solver")
         named = replace(session.settings.solver, **changes)
 
@@ -256,11 +245,7 @@ class Follower:
         return self._changed(session, action)
 
     def preset(self, name: str) -> Future[str]:
-        """Scan and solver by name, and the reference for them.
-
-        Raises:
-            UsageError: there is none of that name.
-        """
+        """Scan and solver by name, and the reference for them."""
         session, target = self._board("a preset"), preset(name, "f767")
 
         def action(device: Device) -> str:
@@ -292,11 +277,7 @@ class Follower:
         return self._changed(session, action)
 
     def teach(self, what: str) -> Future[str] | str:
-        """ "back", "skip"; "fit": a thread of its own makes the model, then the board gets it.
-
-        Raises:
-            UsageError: nothing is taught here.
-        """
+        """ "back", "skip"; "fit": a thread of its own makes the model, then the board gets it."""
         teacher = self.teacher
         if teacher is None:
             raise UsageError("teach: start  eitskin view --teach PLAN.csv")
@@ -338,11 +319,7 @@ class Follower:
         return self._changed(session, action)
 
     def pace(self, what: str, speed: float | None = None) -> str:
-        """ "play", "pause", "step" or "speed".
-
-        Raises:
-            UsageError: it is a real board, whose time cannot be held.
-        """
+        """ "play", "pause", "step" or "speed"."""
         if what == "play" and self.session is None:
             self.again()
             return "starting again"

@@ -77,11 +77,9 @@ class Hub:
         return len(self.pages)
 
     def offer(self, frame: Outgoing) -> None:
-        """A frame to all."""
         for page in self.pages:
             page.offer(frame)
 
     def tell(self, text: str) -> None:
-        """A message to all."""
         for page in self.pages:
             page.tell(text)

@@ -50,11 +50,7 @@ NO_TOKEN, NO_ORIGIN = 4401, 4403  # codes that close a WebSocket
 
 
 def load_server() -> tuple[Any, Any]:
-    """starlette and uvicorn.
-
-    Raises:
-        MissingExtraError: they are not installed.
-    """
+    """starlette and uvicorn."""
     try:
         import starlette
         import uvicorn
@@ -65,11 +61,7 @@ def load_server() -> tuple[Any, Any]:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket on ``host`` and ``port``, 0 for any that is free.
-
-    Raises:
-        UsageError: it is taken, or cannot be.
-    """
+    """A socket on ``host`` and ``port``, 0 for any that is free."""
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         return socket.create_server((host, port), family=family)
@@ -127,11 +119,7 @@ class PageServer:
         return f"http://{name}:{self.port}/"
 
     def serve(self) -> None:
-        """Until Ctrl-C or ``stop``.
-
-        Raises:
-            EitskinError: the device or a sink could not be opened at all.
-        """
+        """Until Ctrl-C or ``stop``."""
         config = self._uvicorn.Config(
             self._app(),
             log_level="warning",
@@ -358,11 +346,7 @@ class PageServer:
         return text_of("answer", ok=True, text=done)
 
     def _do(self, said: dict[str, Any]) -> Future[str] | str:
-        """What a page asks for.
-
-        Raises:
-            EitskinError: it cannot be.
-        """
+        """What a page asks for."""
         what, value, follower = said.get("do"), said.get("value"), self.follower
         if what in ("play", "pause", "step"):
             return follower.pace(what)

@@ -47,7 +47,6 @@ class Teacher:
         self.on_event(self.facts())
 
     def take(self, frame: Frame) -> None:
-        """The next frame."""
         if frame.voltage_v is None:
             return
         with self._lock:
@@ -75,11 +74,7 @@ class Teacher:
         }
 
     def go(self, what: str) -> str:
-        """``back`` to the press before, or ``skip`` this place.
-
-        Raises:
-            UsageError: nothing is being taught yet.
-        """
+        """``back`` to the press before, or ``skip`` this place."""
         with self._lock:
             if self._guide is None or self._file is None:
                 raise UsageError("teach: the board is not there yet")
@@ -95,11 +90,7 @@ class Teacher:
         return event.text
 
     def fit(self) -> tuple[bytes, str]:
-        """The taught model's bytes, also in a file beside the presses, and what it is worth.
-
-        Raises:
-            EitskinError: the presses cannot teach.
-        """
+        """The taught model's bytes, also in a file beside the presses, and what it is worth."""
         presses = None if self._file is None else self._file.presses
         if presses is None:
             raise UsageError("teach: no press is there yet")

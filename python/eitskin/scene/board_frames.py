@@ -43,11 +43,7 @@ class BoardFrames:
 
 class SceneRows:
     """All frames of ``scene``, quiet ones first, made as they are asked for; the same values in
-    whatever order. Of a long scene only the last ``WINDOW_FRAMES`` are kept.
-
-    Raises:
-        ConfigError, MissingExtraError: the scene cannot be simulated (also from the methods).
-    """
+    whatever order. Of a long scene only the last ``WINDOW_FRAMES`` are kept."""
 
     def __init__(self, scene: Scene) -> None:
         from eitskin.scene.compiler import prepare_scene

@@ -225,8 +225,9 @@ def compile_frames(prepared: Prepared, frames: range) -> Compiled:
         known = {
             k: electrodes for k, s in enumerate(states) if electrodes is not None and not s.touches
         }
-    functions = _functions(steps, phase)
     gone = any(state.contacts.detached.any() for state in states)
+    loaded = any(isinstance(step, LoadedStep) for step in steps)
+    solved, factorised = (len(states), len(known)), base_factors is not None
     return Compiled(
         scene=scene,
         skin=skin,
@@ -241,25 +242,14 @@ def compile_frames(prepared: Prepared, frames: range) -> Compiled:
         mixes=mixes,
         known=known,
         base_factors=base_factors,
-        functions=functions,
-        needs_whole_reader=bool(pairs)
-        or gone
-        or any(isinstance(step, LoadedStep) for step in steps),
+        functions=_functions(steps, phase),
+        needs_whole_reader=bool(pairs) or gone or loaded,
         bridge_pairs=pairs,
         method=method,
         reach=reach,
         counted=counted,
         plan=make_plan(
-            scene,
-            model,
-            steps,
-            len(states),
-            len(known),
-            method,
-            len(reach),
-            work,
-            base_factors is not None,
-            len(mixes),
+            scene, model, steps, *solved, method, len(reach), work, factorised, len(mixes)
         ),
         work=work,
     )
@@ -270,10 +260,6 @@ def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
 
     Steps before the first that varies are applied once, here; the others for each state, at the
     time of its frame.
-
-    Raises:
-        ConfigError: an effect leaves a conductivity that is not finite and above 0 (here, and from
-            the function).
     """
     scene, times, start = compiled.scene, compiled.times_s(), compiled.frames.start
     materials = [step for step in compiled.steps if isinstance(step, MaterialStep)]
@@ -395,12 +381,8 @@ def _choose_method(
     """How to solve, the unknowns that touches reach (for the update), and the count that decided
     it."""
     nothing = np.zeros(0, np.int64)
-    varying = [
-        step.name
-        for step in steps
-        if isinstance(step, DeformationStep)
-        or (isinstance(step, MaterialStep | ContactStep) and step.varies)
-    ]
+    changing = (DeformationStep, MaterialStep, ContactStep)
+    varying = [step.name for step in steps if isinstance(step, changing) and step.varies]
     if varying and scene.solver == "update":
         raise ConfigError(
             f'{scene.where} [scene]: solver = "update" needs sheet and contacts that stay, but'
@@ -421,12 +403,9 @@ def _choose_method(
 def _functions(steps: Sequence[Step], phase: PhaseStep | None) -> tuple[VoltageFunction, ...]:
     """The per-frame line from true voltages to recorded ones; a phase step's readout stands before
     the digitising."""
-    before = [
-        _function(step) for step in steps if _is_voltage(step) and step.stage < Stage.DIGITISE
-    ]
-    after = [
-        _function(step) for step in steps if _is_voltage(step) and step.stage >= Stage.DIGITISE
-    ]
+    of_volts = [step for step in steps if _is_voltage(step)]
+    before = [_function(step) for step in of_volts if step.stage < Stage.DIGITISE]
+    after = [_function(step) for step in of_volts if step.stage >= Stage.DIGITISE]
     readout = [] if phase is None else [_readout(phase)]
     return (*before, *readout, *after)
 

@@ -6,7 +6,7 @@ schema: docs/guide/scenes.md.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,11 +38,8 @@ SCENE_KEYS = (
     "elements",
     "solver",
 )
-TOUCH_KEYS = {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_s"} | {
-    "shape",
-    "aspect",
-    "angle_deg",
-}
+TOUCH_KEYS = {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_s"}
+TOUCH_KEYS |= {"shape", "aspect", "angle_deg"}
 SCAN_KEYS = ("frozen", "row_us")
 SOLVERS = ("auto", "factorise", "update")
 ROW_US = 100.0  # from row to row on the board with its default settings
@@ -162,10 +159,9 @@ def load_scene(path: str | Path) -> Scene:
         FileError: it, or the skin that it names, cannot be read.
         ConfigError, GeometryError, ProtocolError: what it describes cannot be.
     """
+    path = Path(path)
     table = load_toml(path, "scene")
-    return scene_from_table(
-        table, str(path), Path(path).parent, Path(path).read_text(encoding="utf-8")
-    )
+    return scene_from_table(table, str(path), path.parent, path.read_text(encoding="utf-8"))
 
 
 def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: str = "") -> Scene:
@@ -196,6 +192,9 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
             raise ConfigError(
                 f"{where} [effects]: {name} = {one!r} must be a table: write [effects.{name}]"
             )
+    row_us = None
+    if "row_us" in scan:
+        row_us = number(scan, "row_us", None, f"{where} [scan]", low=0, high=1e6, open_low=True)
     return Scene(
         name=word(head, "name", Path(where).stem, place),
         description=word(head, "description", "", place),
@@ -208,9 +207,7 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
         rate_hz=number(head, "rate_hz", 20.0, place, low=0, high=1e6, open_low=True),
         solver=choice(head, "solver", "auto", SOLVERS, place),
         frozen=flag(scan, "frozen", False, f"{where} [scan]"),
-        row_us=number(scan, "row_us", None, f"{where} [scan]", low=0, high=1e6, open_low=True)
-        if "row_us" in scan
-        else None,
+        row_us=row_us,
         where=where,
         dataset=subtable(table, "dataset", where),
         text=text,
@@ -288,20 +285,15 @@ def _standing(
     table: Mapping[str, Any], driving: str, where: str
 ) -> tuple[tuple[Keyframe, ...], bool]:
     """A touch without a path: there from from_s to to_s, or always."""
-    start = (
-        number(table, "from_s", 0.0, where, low=-MAX_TIME_S, high=MAX_TIME_S)
-        if "from_s" in table
-        else ALWAYS_S[0]
-    )
+    start = ALWAYS_S[0]
+    if "from_s" in table:
+        start = number(table, "from_s", 0.0, where, low=-MAX_TIME_S, high=MAX_TIME_S)
     first = _keyframe({**table, "t_s": 0.0}, driving, where)
-    keys = [Keyframe(start, first.x_mm, first.y_mm, first.radius_mm, first.drive)]
-    if "to_s" in table:
-        begin = max(start, -MAX_TIME_S)
-        end = number(table, "to_s", None, where, low=begin, high=MAX_TIME_S, open_low=True)
-        keys = [
-            Keyframe(t, first.x_mm, first.y_mm, first.radius_mm, first.drive) for t in (begin, end)
-        ]
-    return tuple(keys), "to_s" not in table
+    if "to_s" not in table:
+        return (replace(first, t_s=start),), True
+    begin = max(start, -MAX_TIME_S)
+    end = number(table, "to_s", None, where, low=begin, high=MAX_TIME_S, open_low=True)
+    return (replace(first, t_s=begin), replace(first, t_s=end)), False
 
 
 def _keyframe(table: Mapping[str, Any], driving: str, where: str) -> Keyframe:

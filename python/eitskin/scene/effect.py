@@ -26,7 +26,7 @@ once is drawn in ``make`` from ``session.stream(NAME)`` (index 0) or ``session.s
 part")``. Several parts: several names.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Protocol, TypeAlias, runtime_checkable
@@ -37,6 +37,7 @@ import numpy.typing as npt
 from eitskin.arrays import BoolArray as BoolArray  # for effects
 from eitskin.arrays import ComplexArray as ComplexArray
 from eitskin.arrays import FloatArray as FloatArray
+from eitskin.errors import ConfigError
 from eitskin.fem.mesh import Mesh
 from eitskin.scene.deformation import Deformation
 from eitskin.skin.protocol import Protocol as ScanProtocol
@@ -125,6 +126,29 @@ class EffectSession:
         """A generator keyed by (seed, ``name``, ``index``); ``name`` begins with the effect's."""
         return self.make_stream(name, index)
 
+    def limit_v(self, given_v: float | None, headroom: float | None) -> float:
+        """A limit in V: as given, or ``headroom`` (None: 1.25) times the largest of ``v0_v``."""
+        if given_v is not None:
+            return given_v
+        return (1.25 if headroom is None else headroom) * float(np.abs(self.v0_v()).max())
+
+    def refuse_absent(self, electrodes: Iterable[int]) -> None:
+        """Refuse electrodes that the skin has not, as those of a key ``electrodes``."""
+        count = self.skin.electrodes.count
+        for electrode in electrodes:
+            if not 0 <= electrode < count:
+                raise ConfigError(
+                    f"electrodes: {electrode} does not exist; the skin's are 0 to {count - 1}"
+                )
+
+
+def part_at(time_s: float, at_s: float, rise_s: float) -> float:
+    """The part of a change after the tare that has happened at ``time_s``: 0 before ``at_s``, then
+    in proportion to time until it is whole ``rise_s`` later (0: at once)."""
+    if time_s < at_s:
+        return 0.0
+    return 1.0 if rise_s <= 0 else min(1.0, (time_s - at_s) / rise_s)
+
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
@@ -191,6 +215,7 @@ class DeformationStep:
     cost: EffectCost
     note: str
     apply: Callable[[float, int], Deformation]
+    varies: bool = True
     stage: Stage = Stage.MATERIAL
 
 

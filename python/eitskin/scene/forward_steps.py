@@ -17,7 +17,6 @@ from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csc_matrix
 
 from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.fem.cem import ForwardModel, System, factorise
@@ -97,9 +96,8 @@ class FactoriseComplex:
         """As :class:`Forward`, complex."""
         impedance = self.phase.contact(impedance_ohm_m2)
         system = self.model.system_for(np.asarray(impedance == 0))
-        factors = factorise(
-            _matrix(system, self.phase.admittivity(touched(background, change)), impedance)
-        )
+        admittivity = self.phase.admittivity(touched(background, change))
+        factors = factorise(system.matrix(admittivity, impedance))
         loads = _loads(self.model, system).astype(np.complex128)
         self.work.complex_factorisations += 1
         self.work.factorisations += 1
@@ -139,13 +137,11 @@ class Update:
             self._factorise_base(background, impedance_ohm_m2)
         if not len(change.elements):
             return _zero_mean(self._base_electrodes)
-        conductivity = touched(background, change)
-        values = (
-            self._admittivity(conductivity)[change.elements] - self._base_values[change.elements]
-        )
-        stiffness = self._stiffness[change.elements]
+        elements = change.elements
+        values = self._admittivity(touched(background, change)) - self._base_values
+        stiffness = self._stiffness[elements]
         unknowns, dense = _dense_change(
-            self.model, self._system, stiffness, change.elements, values
+            self.model, self._system, stiffness, elements, values[elements]
         )
         if not np.isin(unknowns, self.reach).all():
             self.reach = np.union1d(self.reach, unknowns)
@@ -169,11 +165,11 @@ class Update:
         self._system = system = model.system_for(np.asarray(impedance == 0))
         self._base_values = self._admittivity(background)
         if self._factors is None:
-            self._factors = factorise(_matrix(system, self._base_values, impedance))
+            self._factors = factorise(system.matrix(self._base_values, impedance))
             self.work.factorisations += 1
             self.work.complex_factorisations += int(self.phase is not None)
         self._dtype = np.result_type(self._base_values, impedance)
-        self._stiffness = element_stiffness(model)
+        self._stiffness = model.element_stiffness()
         self._solve_base()
         self._ready = True
 
@@ -206,13 +202,6 @@ class Update:
                 self._known[place] = True
 
 
-def _matrix(system: System, values: AnyArray, impedance: AnyArray) -> csc_matrix:
-    admittance = np.zeros(len(impedance), dtype=impedance.dtype)
-    admittance[~system.shunted] = 1.0 / impedance[~system.shunted]
-    stored = system.filling @ np.concatenate([values, admittance])
-    return csc_matrix((stored, system.indices, system.indptr), shape=(system.size, system.size))
-
-
 def _loads(model: ForwardModel, system: System) -> FloatArray:
     currents = model.patterns.right_hand_sides(len(system.shunted))
     loads = np.zeros((system.size + 1, currents.shape[1]))
@@ -222,13 +211,6 @@ def _loads(model: ForwardModel, system: System) -> FloatArray:
 
 def _zero_mean(electrodes: AnyArray) -> AnyArray:
     return np.asarray(electrodes - electrodes.mean(axis=0))
-
-
-def element_stiffness(model: ForwardModel) -> FloatArray:
-    """Each element's matrix per unit of conductivity, (E, 3, 3) in m."""
-    volumes_m3 = model.mesh.areas_mm2 * (1e-6 * model.thickness_m)
-    products = np.einsum("eik,ejk->eij", model.gradients_per_m, model.gradients_per_m)
-    return np.asarray(products * volumes_m3[:, None, None])
 
 
 def _dense_change(

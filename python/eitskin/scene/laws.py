@@ -21,7 +21,7 @@ A law gives the contrast, the conductivity under the touch divided by the sheet'
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -30,24 +30,6 @@ from eitskin.arrays import FloatArray
 from eitskin.config import number
 from eitskin.errors import ConfigError
 
-LAW_KEYS: dict[str, tuple[str, ...]] = {
-    "short_circuit": ("contrast",),
-    "piezoresistive": ("sensitivity_per_gram", "saturation_contrast"),
-    "press_and_conduct": (
-        "contrast",
-        "contact_grams",
-        "sensitivity_per_gram",
-        "saturation_contrast",
-    ),
-    "insulating": ("contrast",),
-}
-LAWS = tuple(LAW_KEYS)
-DRIVING_KEY = {
-    "short_circuit": "press",
-    "piezoresistive": "grams",
-    "press_and_conduct": "grams",
-    "insulating": "press",
-}
 MAX_CONTRAST = 1e4
 
 
@@ -105,6 +87,11 @@ KINDS: dict[str, type[Law]] = {
     "press_and_conduct": PressAndConduct,
     "insulating": Insulating,
 }
+LAWS = tuple(KINDS)
+LAW_KEYS = {name: tuple(one.name for one in fields(kind)) for name, kind in KINDS.items()}
+DRIVING_KEY = {
+    name: "press" if issubclass(kind, ShortCircuit) else "grams" for name, kind in KINDS.items()
+}
 LEAST = {"saturation_contrast": 1.0}  # exclusive; others 0
 MOST = {
     "sensitivity_per_gram": 10.0,
@@ -116,11 +103,7 @@ MOST = {
 
 def law_from_table(table: Mapping[str, Any], name: str, where: str) -> Law:
     """The law called ``name`` with its parameters in ``table``; other keys of the table are not
-    looked at.
-
-    Raises:
-        ConfigError: a parameter is out of range, or belongs to another law.
-    """
+    looked at."""
     own = (*LAW_KEYS[name], DRIVING_KEY[name])
     for other, keys in LAW_KEYS.items():
         for key in (*keys, DRIVING_KEY[other]):
@@ -128,18 +111,9 @@ def law_from_table(table: Mapping[str, Any], name: str, where: str) -> Law:
                 raise ConfigError(
                     f'{where}: {key} goes with law = "{other}", but the law is "{name}"; remove one'
                 )
-    kind = KINDS[name]
-    return kind(
-        **{
-            key: number(
-                table,
-                key,
-                getattr(kind(), key),
-                where,
-                low=LEAST.get(key, 0),
-                high=1.0 if kind is Insulating else MOST[key],
-                open_low=True,
-            )
-            for key in LAW_KEYS[name]
-        }
-    )
+    kind, given = KINDS[name], {}
+    for key in LAW_KEYS[name]:
+        low, high = LEAST.get(key, 0), 1.0 if kind is Insulating else MOST[key]
+        usual = getattr(kind(), key)
+        given[key] = number(table, key, usual, where, low=low, high=high, open_low=True)
+    return kind(**given)

@@ -23,11 +23,7 @@ def descriptions() -> dict[str, str]:
 
 
 def scene_path(name: str) -> Path:
-    """The file of ``name``: a path as given, or a library scene with or without ".toml".
-
-    Raises:
-        FileError: neither exists.
-    """
+    """The file of ``name``: a path as given, or a library scene with or without ".toml"."""
     path, known = Path(name), library()
     if path.exists():
         return path

@@ -56,7 +56,6 @@ class Plan:
     method: str
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
         return {
             "scene": self.scene,
             "steps": [
@@ -130,14 +129,12 @@ def make_plan(
     patterns, total = len(model.patterns.solved), scene.n_frames
     if method == "update":
         factorisations, solves = int(not factorised), patterns + reach
-        note = (
-            f"the untouched skin once, then low-rank updates on {reach} unknowns that touches reach"
-        )
+        note = "the untouched skin once, then low-rank updates on"
+        note += f" {reach} unknowns that touches reach"
     else:
         factorisations, solves = states - known, (states - known) * patterns
-        note = f"a factorisation for each distinct state, {states}" + (
-            f", of which V0 is {known}" if known else ""
-        )
+        note = f"a factorisation for each distinct state, {states}"
+        note += f", of which V0 is {known}" if known else ""
     solve = EffectCost(
         factorisations_per_frame=factorisations / total,
         solves_per_frame=solves / total,
@@ -145,14 +142,9 @@ def make_plan(
     )
     mesh = model.mesh
     sheet = f"{scene.skin.conductivity_s_per_m:g} S/m, {scene.skin.thickness_mm:g} mm"
+    size = f"{mesh.n_elements} elements, {mesh.n_nodes} nodes"
     base = [
-        PlanStep(
-            "mesh",
-            Stage.GEOMETRY,
-            f"{mesh.n_elements} elements, {mesh.n_nodes} nodes",
-            EffectCost(),
-            False,
-        ),
+        PlanStep("mesh", Stage.GEOMETRY, size, EffectCost(), False),
         PlanStep("sheet", Stage.MATERIAL, sheet, EffectCost(), False),
     ]
     touches = []
@@ -173,23 +165,15 @@ def make_plan(
         )
         cost = EffectCost(vector_passes_per_frame=4 * moving / total)
         forward.append(PlanStep("scan", Stage.BOUNDARY, note, cost, False))
-    forward.append(
-        PlanStep("read", Stage.BOUNDARY, f"{scene.protocol.n_rows} voltages", read, False)
-    )
+    rows = f"{scene.protocol.n_rows} voltages"
+    forward.append(PlanStep("read", Stage.BOUNDARY, rows, read, False))
 
     def of(*kind: type) -> list[PlanStep]:
         return [line for line in own if isinstance(kinds[line], kind)]
 
-    before = of(GeometryStep, DeformationStep, MaterialStep, ContactStep, PhaseStep)
-    lines = [
-        *of(GeometryStep),
-        *base,
-        *of(DeformationStep, MaterialStep),
-        *touches,
-        *of(ContactStep, PhaseStep),
-        *forward,
-    ]
-    lines += [line for line in own if line not in before]
+    lines = [*of(GeometryStep), *base, *of(DeformationStep, MaterialStep), *touches]
+    lines += [*of(ContactStep, PhaseStep), *forward]
+    lines += [line for line in own if line not in lines]
     every = [line.cost for line in lines]
     return Plan(
         scene=scene.name,

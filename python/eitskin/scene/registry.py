@@ -11,8 +11,9 @@ import importlib
 import importlib.metadata
 import importlib.util
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
+from typing import Any, get_type_hints
 
 from eitskin.config import nearest
 from eitskin.errors import ConfigError
@@ -63,21 +64,12 @@ class Registry:
 
     def names(self) -> dict[str, str]:
         """Every name and its module; nothing is imported."""
-        found = {}
-        if self.entry_points:
-            found = {
-                one.name: one.value
-                for one in importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
-            }
+        points = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
+        found = {one.name: one.value for one in points} if self.entry_points else {}
         return {**found, **self.modules}
 
     def load(self, name: str, where: str) -> EffectModule:
-        """Import the module of the effect ``name``; ``where`` names the scene in errors.
-
-        Raises:
-            ConfigError: no such effect, or its module cannot be imported or breaks the contract of
-                ``effect.py``.
-        """
+        """Import the module of the effect ``name``; ``where`` names the scene in errors."""
         target = self.modules.get(name) or self.names().get(name)
         if target is None:
             raise ConfigError(
@@ -127,3 +119,22 @@ def summary_of(target: str) -> str:
             except ValueError:
                 return ""
     return ""
+
+
+def describe_parameters(module: EffectModule) -> list[dict[str, Any]]:
+    """Each parameter's name, type, default, range, unit and meaning, for ``eitskin scene effects
+    NAME``."""
+    hints = get_type_hints(module.Parameters)
+    rows = []
+    for one in fields(module.Parameters):
+        default = one.default if one.default_factory is MISSING else one.default_factory()
+        kind, told = hints[one.name], ("low", "high", "choices", "unit", "doc")
+        rows.append(
+            {
+                "name": one.name,
+                "type": kind.__name__ if isinstance(kind, type) else str(kind),
+                "default": "required" if default is MISSING else default,
+                **{key: one.metadata[key] for key in told if key in one.metadata},
+            }
+        )
+    return rows

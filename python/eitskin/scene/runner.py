@@ -1,9 +1,8 @@
 """Running a compiled scene: every distinct state is solved once, every frame goes through the named
 steps."""
 
-import dataclasses
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import Factorise, FactoriseComplex, Forward, Update, Work
 from eitskin.scene.motion import Mix
 from eitskin.scene.reading import PlainReader, TrueVoltages, WholeReader, solved_impedance
-from eitskin.scene.truth import Truth, truth_of
+from eitskin.scene.truth import truth_of
 from eitskin.skin.skin import skin_to_table
 
 
@@ -48,11 +47,7 @@ def forward_of(compiled: Compiled, work: Work) -> Forward:
 
 class FrameMaker:
     """The frames of a compiled scene, each made when it is asked for; a state is solved when a
-    frame first needs it. The same values in whatever order.
-
-    Raises:
-        ConfigError: an effect makes a conductivity that cannot be (also from the methods).
-    """
+    frame first needs it. The same values in whatever order."""
 
     def __init__(self, compiled: Compiled) -> None:
         self.compiled, self.work = compiled, Work()
@@ -137,19 +132,11 @@ def blend(readings: dict[int, TrueVoltages], mix: Mix) -> TrueVoltages:
     if loads[0] is None:
         return TrueVoltages(v)
 
-    def potential(name: str) -> npt.NDArray[Any]:
-        return between([getattr(one, name) for one in loads])
-
-    return TrueVoltages(
-        v,
-        replace(
-            loads[0],
-            source_v=potential("source_v"),
-            sink_v=potential("sink_v"),
-            plus_v=potential("plus_v"),
-            minus_v=potential("minus_v"),
-        ),
-    )
+    names = ("source_v", "sink_v", "plus_v", "minus_v")
+    potentials: dict[str, Any] = {
+        name: between([getattr(one, name) for one in loads]) for name in names
+    }
+    return TrueVoltages(v, replace(loads[0], **potentials))
 
 
 def simulate_frames(
@@ -203,22 +190,13 @@ def run(
         time_s=scene.times_s(),
         row_time_s=scene.row_delays_s if compiled.mixes else None,
         meta=meta_of(compiled, done),
-        **truth_fields(truth),
+        **truth,
     )
 
 
 def run_scene(scene: Scene) -> Frames:
-    """The frames of ``scene`` with their truth.
-
-    Raises:
-        ConfigError: as ``compile_scene`` and ``simulate_frames``.
-    """
+    """The frames of ``scene`` with their truth."""
     return run(compile_scene(scene))
-
-
-def truth_fields(truth: Truth) -> dict[str, Any]:
-    """The arguments of ``Frames`` that hold ``truth``."""
-    return {one.name: getattr(truth, one.name) for one in dataclasses.fields(truth)}
 
 
 def meta_of(compiled: Compiled, done: SceneRun) -> dict[str, Any]:
@@ -230,9 +208,7 @@ def meta_of(compiled: Compiled, done: SceneRun) -> dict[str, Any]:
         "skin": skin_to_table(scene.skin),
         "seed": scene.seed,
         "rate_hz": scene.rate_hz,
-        "effects": {
-            name: plain(dataclasses.asdict(one)) for name, one in compiled.parameters.items()
-        },
+        "effects": {name: plain(asdict(one)) for name, one in compiled.parameters.items()},
         "mesh_elements": compiled.model.mesh.n_elements,
         "plan": compiled.plan.as_dict(),
         "counters": {

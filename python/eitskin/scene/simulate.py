@@ -11,14 +11,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.frames.frames import Frames
-from eitskin.scene.cover import SUBDIVISION, Cover
+from eitskin.scene.cover import Cover
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import Protocol
@@ -132,25 +131,16 @@ class Simulated:
         )
 
 
-def element_cover(
-    mesh: Mesh, touch: TrueTouch, subdivision: int = SUBDIVISION
-) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Which elements a touch meets (e,), and what part of each it covers (e,), in (0, 1]; see
-    ``cover.Cover``."""
-    return Cover(mesh, subdivision).of(touch)
-
-
 def conductivity_with(mesh: Mesh, touches: Iterable[TrueTouch], sheet_s_per_m: float) -> FloatArray:
     """Conductivity (E,) in S/m of a sheet with touches: each element's mean over its area.
 
     Touches are taken to lie apart; where they overlap, their changes add (never below a thousandth
     of the sheet's).
     """
-    change = np.zeros(mesh.n_elements)
-    for touch in touches:
-        elements, part = element_cover(mesh, touch)
-        change[elements] += part * (touch.contrast - 1.0)
-    return np.asarray(sheet_s_per_m * np.maximum(1.0 + change, 1e-3))
+    conductivity = np.full(mesh.n_elements, float(sheet_s_per_m))
+    elements, factor = Cover(mesh).factor(touches)
+    conductivity[elements] *= factor
+    return conductivity
 
 
 def simulate(
@@ -182,11 +172,8 @@ def simulate(
     solved_on = mesh_for_elements(skin, ELEMENTS) if mesh is None else mesh
     own_seed = touches.seed if seed is None else seed
     role = touches.role
-    spread = (
-        stream(own_seed, f"contact {role}").uniform(-1.0, 1.0, skin.electrodes.count)
-        * how.contact_spread
-    )
-    contact = skin.electrodes.contact_impedance_ohm_m2 * (1.0 + spread)
+    drawn = stream(own_seed, f"contact {role}").uniform(-1.0, 1.0, skin.electrodes.count)
+    contact = skin.electrodes.contact_impedance_ohm_m2 * (1.0 + drawn * how.contact_spread)
     forward = ForwardModel(solved_on, skin, protocol, contact)
     sheet = skin.conductivity_s_per_m
     quiet = forward.voltages(np.full(solved_on.n_elements, sheet))

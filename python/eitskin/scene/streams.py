@@ -14,9 +14,6 @@ def stream(seed: int, name: str, index: int = 0) -> np.random.Generator:
 
     The name enters by its SHA-256, so that streams do not depend on the order or number of other
     names.
-
-    Raises:
-        UsageError: the seed or the index is below 0.
     """
     if seed < 0 or index < 0:
         raise UsageError(f"a seed must be 0 or above, not {min(seed, index)}")

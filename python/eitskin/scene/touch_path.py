@@ -105,13 +105,8 @@ def touches_of(tracks: Sequence[TouchTrack], time_s: float) -> tuple[TrueTouch, 
 def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[TrueTouch, ...]:
     """The touches that are there in ``frame``, in the tracks' order."""
     return tuple(
-        TrueTouch(
-            float(s.x_mm[frame]),
-            float(s.y_mm[frame]),
-            float(s.radius_mm[frame]),
-            float(s.contrast[frame]),
-            s.shape,
-        )
-        for s in samples
-        if s.there[frame]
-    )
+        TrueTouch(x_mm=float(s.x_mm[frame]), y_mm=float(s.y_mm[frame]),
+                  radius_mm=float(s.radius_mm[frame]), contrast=float(s.contrast[frame]),
+                  shape=s.shape)
+        for s in samples if s.there[frame]
+    )  # fmt: skip

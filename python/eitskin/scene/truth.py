@@ -1,7 +1,7 @@
 """What was truly there: each frame's touches, the mask of them, and the conductivity that was
 solved."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,42 +23,27 @@ MAX_CELLS = 500_000_000
 LAW_PIECES = 16  # straight lines between two keyframes, for a law that bends
 
 
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """The truth fields of ``Frames``, with its shapes; rasters are None where none were asked
-    for."""
-
-    touch_frame: npt.NDArray[np.int64]
-    touch_xy_mm: FloatArray
-    touch_radius_mm: FloatArray
-    touch_strength: FloatArray
-    touch_sign: npt.NDArray[np.int8]
-    truth_mask: npt.NDArray[np.int8] | None
-    truth_mask_extent_mm: tuple[float, float, float, float] | None
-    truth_conductivity_s_per_m: npt.NDArray[np.float32] | None
-    paths: Paths | None
-
-
-def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
-    """The truth of the recorded frames, rastered with ``pixels`` along the longer side, or 0 for no
-    rasters."""
+def truth_of(compiled: Compiled, pixels: int = 64) -> dict[str, Any]:
+    """The truth fields of ``Frames`` of the recorded frames, rastered with ``pixels`` along the
+    longer side, or 0 for no rasters."""
     numbers, states = _states_at_truth(compiled)
     flat = [(frame, t) for frame, k in enumerate(numbers) for t in states[k].touches]
     contrast = np.array([t.contrast for _, t in flat], dtype=np.float64)
     masks = conductivity = extent = None
     if pixels:
         masks, conductivity, extent = _rasters(compiled, numbers, states, pixels)
-    return Truth(
-        touch_frame=np.array([frame for frame, _ in flat], dtype=np.int64),
-        touch_xy_mm=np.array([(t.x_mm, t.y_mm) for _, t in flat], dtype=np.float64).reshape(-1, 2),
-        touch_radius_mm=np.array([t.radius_mm for _, t in flat], dtype=np.float64),
-        touch_strength=contrast - 1.0,
-        touch_sign=np.sign(contrast - 1.0).astype(np.int8),
-        truth_mask=masks,
-        truth_mask_extent_mm=extent,
-        truth_conductivity_s_per_m=conductivity,
-        paths=_paths(compiled.scene) if compiled.mixes else None,
-    )
+    places = np.array([(t.x_mm, t.y_mm) for _, t in flat], dtype=np.float64)
+    return {
+        "touch_frame": np.array([frame for frame, _ in flat], dtype=np.int64),
+        "touch_xy_mm": places.reshape(-1, 2),
+        "touch_radius_mm": np.array([t.radius_mm for _, t in flat], dtype=np.float64),
+        "touch_strength": contrast - 1.0,
+        "touch_sign": np.sign(contrast - 1.0).astype(np.int8),
+        "truth_mask": masks,
+        "truth_mask_extent_mm": extent,
+        "truth_conductivity_s_per_m": conductivity,
+        "paths": _paths(compiled.scene) if compiled.mixes else None,
+    }
 
 
 def _paths(scene: Scene) -> Paths | None:

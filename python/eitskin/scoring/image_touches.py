@@ -20,18 +20,8 @@ def touches_in_image(
     sign: int = 1,
 ) -> FloatArray:
     """Positions (k, 2) in mm of the touches that an image (n,) shows, the strongest (summed value)
-    first.
-
-    Args:
-        values: pixel values.
-        index: (n, 2) column and row of each pixel.
-        centres_mm: (n, 2) pixel centres.
-        threshold: fraction t of the image's largest value.
-        sign: -1 for resistive touches.
-
-    Raises:
-        MissingExtraError: scipy is absent.
-    """
+    first. ``index`` (n, 2): each pixel's column and row; ``threshold``: the fraction t; ``sign``:
+    -1 for resistive touches."""
     try:
         from scipy.ndimage import label
     except ImportError:

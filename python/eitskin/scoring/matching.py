@@ -7,18 +7,14 @@ import numpy as np
 import numpy.typing as npt
 
 GATE_MM = 10.0
+WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 
 
 @dataclass(frozen=True)
 class Matching:
-    """How found touches were paired with true ones.
-
-    Attributes:
-        pairs: (true index, found index) of each hit, in the order of the true touches.
-        distances_mm: the position error of each hit.
-        misses: true touches that nothing was paired with.
-        false_touches: found touches that no true one was paired with.
-    """
+    """How found touches were paired with true ones: ``pairs`` (true index, found index) in the
+    order of the true touches and their ``distances_mm``; ``misses`` and ``false_touches`` were
+    paired with nothing."""
 
     pairs: tuple[tuple[int, int], ...]
     distances_mm: tuple[float, ...]

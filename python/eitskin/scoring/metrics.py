@@ -12,7 +12,6 @@ discs or as a mask.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -20,50 +19,32 @@ import numpy.typing as npt
 from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
+from eitskin.skin.outline import Outline
 
 RASTER_MM = 1.5
 LOOKUPS = ("nearest", "bilinear")
 LOOKUP = "bilinear"
 
 
-class Region(Protocol):
-    """What the raster needs of an outline (``eitskin.skin.outline.Outline`` is one)."""
-
-    @property
-    def bounding_box_mm(self) -> tuple[float, float, float, float]:
-        """(xmin, ymin, xmax, ymax)."""
-
-    def contains(self, points: FloatArray) -> BoolArray:
-        """Which of ``points`` (k, 2) lie inside: (k,)."""
-
-
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """The cells on which masks are compared.
-
-    Attributes:
-        points_mm: (p, 2) centres of the cells that lie inside the skin.
-        spacing_mm: side of a cell.
-    """
+    """The cells on which masks are compared, squares of ``spacing_mm``: ``points_mm`` (p, 2) are
+    the centres of those that lie inside the skin."""
 
     points_mm: FloatArray
     spacing_mm: float
 
 
-def raster_inside(region: Region, spacing_mm: float = RASTER_MM) -> Raster:
-    """Square cells of ``spacing_mm`` over the bounding box; those whose centre is inside ``region``
-    are kept.
-
-    Raises:
-        UsageError: the spacing is not positive, or so coarse that no cell is inside.
-    """
+def raster_inside(outline: Outline, spacing_mm: float = RASTER_MM) -> Raster:
+    """Square cells of ``spacing_mm`` over the bounding box; those whose centre is inside
+    ``outline`` are kept."""
     if not spacing_mm > 0:
         raise UsageError(f"raster spacing {spacing_mm!r} mm must be above 0; 1.5 is usual")
-    x0, y0, x1, y1 = region.bounding_box_mm
+    x0, y0, x1, y1 = outline.bounding_box_mm
     x = np.arange(x0 + spacing_mm / 2, x1, spacing_mm)
     y = np.arange(y0 + spacing_mm / 2, y1, spacing_mm)
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    kept = points[region.contains(points)] if len(points) else points
+    kept = points[outline.contains(points)] if len(points) else points
     if not len(kept):
         raise UsageError(
             f"a raster of {spacing_mm:g} mm has no cell inside this skin; use a finer one"
@@ -89,10 +70,7 @@ def mask_on_points(
     points_mm: FloatArray, mask: npt.ArrayLike, box_mm: tuple[float, float, float, float]
 ) -> BoolArray:
     """Look a truth mask (ny, nx), row 0 lowest, spread over ``box_mm`` (xmin, ymin, xmax, ymax), up
-    at points (p, 2).
-
-    Points outside the box are background.
-    """
+    at points (p, 2); outside the box is background."""
     cells = np.asarray(mask, dtype=np.bool_)
     ny, nx = cells.shape
     x0, y0, x1, y1 = box_mm
@@ -107,11 +85,8 @@ def mask_on_points(
 @dataclass(frozen=True, eq=False)
 class Lookup:
     """How cells show an image: the value of cell i is sum_j weight[i, j] x[pixel[i, j]].
-
-    Attributes:
-        pixel: (p, c) places among the kept pixels; c is 1 for "nearest" and 4 for "bilinear".
-        weight: (p, c), each row summing to 1.
-    """
+    ``pixel`` (p, c) are places among the kept pixels, c 1 for "nearest" and 4 for "bilinear"; each
+    row of ``weight`` (p, c) sums to 1."""
 
     pixel: IntArray
     weight: FloatArray
@@ -129,9 +104,6 @@ def lookup_for(points_mm: FloatArray, grid: Grid, kind: str = LOOKUP) -> Lookup:
     "nearest" shows the nearest kept pixel. "bilinear" weights the up to four pixels whose centres
     surround the cell, leaving out those that are not kept (where none is, the nearest one is
     shown), as smooth pictures do.
-
-    Raises:
-        UsageError: ``kind`` is neither.
     """
     nearest = _nearest_pixels(points_mm, grid.centres_mm())
     if kind == "nearest":
@@ -200,13 +172,7 @@ def miou(estimate: BoolArray, truth: BoolArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ImageScorer:
-    """MIoU of pixel images on one raster.
-
-    Attributes:
-        raster: the cells.
-        lookup: what each cell shows of an image.
-        n_pixels: how many values an image has.
-    """
+    """What MIoU of images of ``n_pixels`` needs: the cells, and what each shows of an image."""
 
     raster: Raster
     lookup: Lookup
@@ -214,8 +180,8 @@ class ImageScorer:
 
 
 def judge_for(
-    region: Region, grid: Grid, spacing_mm: float = RASTER_MM, lookup: str = LOOKUP
+    outline: Outline, grid: Grid, spacing_mm: float = RASTER_MM, lookup: str = LOOKUP
 ) -> ImageScorer:
-    """The scorer for images on ``grid`` of the skin ``region``."""
-    raster = raster_inside(region, spacing_mm)
+    """The scorer for images on ``grid`` of a skin."""
+    raster = raster_inside(outline, spacing_mm)
     return ImageScorer(raster, lookup_for(raster.points_mm, grid, lookup), grid.n_pixels)

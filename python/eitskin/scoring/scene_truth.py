@@ -12,11 +12,10 @@ from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import touches_at, touches_of
-from eitskin.scoring.matching import GATE_MM, Matching, match
+from eitskin.scoring.matching import GATE_MM, WANTED_SIGNS, Matching, match
 from eitskin.skin.skin import size_to_paper
 
 WRAP_US = 2**32
-LOOKED_FOR = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 
 
 class SceneTruth:
@@ -33,27 +32,18 @@ class SceneTruth:
         self.scene, self._held, self._loop = scene, held, loop
         self._ahead = 1e-9 if held else 0.5
         self.gate_mm = GATE_MM * size_to_paper(scene.skin.outline)
-        self._samples, self._wanted = scene.samples(), LOOKED_FOR[sign]
-        self._began_us: int | None = None
-
-    def begin(self, time_us: int) -> None:
-        """The scene's time 0 is ``time_us`` of the board's clock; where nobody said so, the first
-        frame's that is asked for."""
-        self._began_us = time_us
+        self._samples, self._wanted = scene.samples(), WANTED_SIGNS[sign]
+        # the board's clock at the scene's time 0; where nobody says, the first frame's asked for
+        self.began_us: int | None = None
 
     def look_for(self, sign: str) -> None:
         """The board looks for other changes from now on."""
-        self._wanted = LOOKED_FOR[sign]
-
-    @property
-    def began_us(self) -> int | None:
-        """The board's clock at the scene's time 0; None where it is not known yet."""
-        return self._began_us
+        self._wanted = WANTED_SIGNS[sign]
 
     def touches(self, time_us: int) -> tuple[TrueTouch, ...]:
         """What a frame shows whose scan began at ``time_us``."""
-        if self._began_us is None:
-            self._began_us = time_us
+        if self.began_us is None:
+            self.began_us = time_us
         if self._loop:
             self._begin_again(time_us)
         scene, last = self.scene, self.scene.frames - 1
@@ -66,25 +56,25 @@ class SceneTruth:
 
     def over(self, time_us: int) -> bool:
         """Whether the scene has ended when the scan of a frame begins at ``time_us``."""
-        began = self._began_us is not None
+        began = self.began_us is not None
         return began and not self._loop and self._frame(time_us) >= self.scene.frames
 
     def _begin_again(self, time_us: int) -> None:
         """Let time 0 be that of the loop in which a scan begins at ``time_us``."""
         scene, late = self.scene, self._frame(time_us) - self.scene.frames
-        if late < 0 or self._began_us is None:
+        if late < 0 or self.began_us is None:
             return
         if late == 0 and not self._held:
-            self._began_us = time_us
+            self.began_us = time_us
         else:
             loops = 1 + late // scene.frames
-            self._began_us += round(1e6 * loops * scene.frames / scene.rate_hz)
+            self.began_us += round(1e6 * loops * scene.frames / scene.rate_hz)
 
     def _frame(self, time_us: int) -> int:
         return int(self._elapsed_s(time_us) * self.scene.rate_hz + self._ahead)
 
     def _elapsed_s(self, time_us: int) -> float:
-        return float((time_us - (self._began_us or 0)) % WRAP_US) / 1e6
+        return float((time_us - (self.began_us or 0)) % WRAP_US) / 1e6
 
     def matching(self, true: Sequence[TrueTouch], found_mm: npt.ArrayLike) -> Matching:
         """Which of the found places (k, 2) in mm is which true touch; within 10 mm on the paper's
@@ -119,7 +109,6 @@ class TruthScore:
     errors_mm: Sample = field(default_factory=Sample)
 
     def add(self, matching: Matching) -> None:
-        """One frame's."""
         self.frames += 1
         self.found += matching.hits
         self.missed += matching.misses
@@ -140,7 +129,6 @@ class TruthScore:
         }
 
     def text(self) -> str:
-        """In a line."""
         facts = self.as_dict()
         line = (
             f"against the scene's truth: {facts['found']} of {facts['true']} touches found,"

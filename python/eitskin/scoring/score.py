@@ -10,21 +10,14 @@ from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 from eitskin.scoring import metrics
-from eitskin.scoring.matching import GATE_MM, Matching, match
+from eitskin.scoring.matching import GATE_MM, WANTED_SIGNS, Matching, match
 from eitskin.skin.skin import size_to_paper
-
-WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 
 
 @dataclass(frozen=True)
 class FrameScore:
-    """One frame against its truth.
-
-    Attributes:
-        miou_image: MIoU of the mask x > t max(x), t the model's own, interpolated bilinearly.
-        miou_touches: MIoU of the touches as discs.
-        matching: of touch centres with the true ones.
-    """
+    """One frame against its truth: MIoU of the image's mask x > t max(x), t the model's own,
+    interpolated bilinearly; MIoU of the touches as discs; and how touches match the true ones."""
 
     miou_image: float
     miou_touches: float
@@ -50,7 +43,8 @@ class Scorer:
     ) -> FrameScore | None:
         """Frame ``number`` of ``frames``; None where no truth of the wanted ``sign`` is known."""
         wanted = WANTED_SIGNS[sign]
-        truth = self._truth(frames, number, wanted)
+        places = [i for i in frames.touches_in(number) if _sign_of(frames, i) in wanted]
+        truth = self._truth(frames, number, wanted, places)
         if truth is None:
             return None
         image = np.asarray(result.image, dtype=np.float64)
@@ -59,10 +53,7 @@ class Scorer:
             self.image_scorer.lookup.show(values), self.model.defaults.mask_threshold
         )
         discs = self._discs(result.touches)
-        true_places = [i for i in frames.touches_in(number) if _sign_of(frames, i) in wanted]
-        true_mm = (
-            frames.touch_xy_mm[true_places] if frames.touch_xy_mm is not None else np.zeros((0, 2))
-        )
+        true_mm = np.zeros((0, 2)) if frames.touch_xy_mm is None else frames.touch_xy_mm[places]
         found_mm = [(touch.x_mm, touch.y_mm) for touch in result.touches]
         return FrameScore(
             metrics.miou(shown, truth),
@@ -75,23 +66,19 @@ class Scorer:
         radii = np.array([touch.radius_mm for touch in touches])
         return metrics.disc_mask(self.image_scorer.raster.points_mm, centres, radii)
 
-    def _truth(self, frames: Frames, number: int, wanted: tuple[int, ...]) -> BoolArray | None:
+    def _truth(
+        self, frames: Frames, number: int, wanted: tuple[int, ...], places: list[int]
+    ) -> BoolArray | None:
         points = self.image_scorer.raster.points_mm
         if frames.truth_mask is not None and frames.truth_mask_extent_mm is not None:
             mask = np.isin(frames.truth_mask[number], wanted)
-            return (
-                metrics.mask_on_points(points, mask, frames.truth_mask_extent_mm)
-                if mask.any()
-                else None
-            )
-        if frames.touch_xy_mm is None or frames.touch_radius_mm is None:
+            if not mask.any():
+                return None
+            return metrics.mask_on_points(points, mask, frames.truth_mask_extent_mm)
+        xy_mm, radius_mm = frames.touch_xy_mm, frames.touch_radius_mm
+        if xy_mm is None or radius_mm is None or not places:
             return None
-        places = [i for i in frames.touches_in(number) if _sign_of(frames, i) in wanted]
-        return (
-            metrics.disc_mask(points, frames.touch_xy_mm[places], frames.touch_radius_mm[places])
-            if places
-            else None
-        )
+        return metrics.disc_mask(points, xy_mm[places], radius_mm[places])
 
 
 def _sign_of(frames: Frames, touch: int) -> int:

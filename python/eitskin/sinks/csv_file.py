@@ -50,12 +50,7 @@ def _text(rows: list[Any]) -> bytes:
 
 
 def new_file(url: str, source: Source, first: bytes = b"") -> RecordingFile:
-    """The file that ``csv:FILE`` and the like name, begun with ``first``.
-
-    Raises:
-        UsageError: it names none.
-        FileError: it exists already, another process records to it, or it cannot be written.
-    """
+    """The file that ``csv:FILE`` and the like name, begun with ``first``."""
     scheme, _, name = url.partition(":")
     if not name:
         raise UsageError(f"--to {url}: name a file, as in  {scheme}:touches.{scheme}")
@@ -69,5 +64,4 @@ def new_file(url: str, source: Source, first: bytes = b"") -> RecordingFile:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``new_file``."""
     return CsvSink(new_file(url, source, _text([COLUMNS])))

@@ -61,17 +61,14 @@ class FoxgloveSink:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
         return int(self._server.port)
 
     def write(self, told: Told) -> None:
         channel = self._channels.get(told.message["type"])
         if channel is None:
             return
-        message = told.message
-        time_s = message["time_unix_s"] if message["time_unix_s"] is not None else message["time_s"]
-        now = round(1e9 * (time_s or 0.0))
-        channel.log(json.dumps(message).encode(), log_time=now)
+        now = told.time_ns
+        channel.log(json.dumps(told.message).encode(), log_time=now)
         if told.frame is not None and told.frame.image is not None and self._model is not None:
             picture = np.nan_to_num(self._model.grid.image(told.frame.image)[::-1])
             height, width = picture.shape
@@ -93,8 +90,7 @@ class FoxgloveSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address`` and ``FoxgloveSink``; SinkError where the port is
-    taken."""
+    """See the module."""
     named = "foxglove://" if url == "foxglove:" else url
     parts, host, port = address(named, PORT, usage=USAGE)
     nothing_more(url, parts, USAGE)

@@ -75,13 +75,6 @@ class LslSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module.
-
-    Raises:
-        UsageError: the address cannot be read.
-        MissingExtraError: pylsl or its library is not installed.
-        SinkError: the library opens no outlet.
-    """
     name, _, query = url.partition(":")[2].partition("?")
     touches = setting(url, query, "touches", 1, 64, 8)
     if "/" in name:

@@ -33,8 +33,7 @@ class McapSink:
         if self._writer is None:
             images = told.frame is not None and told.frame.image is not None
             self._begin(IMAGES_BYTES if images else REPORTS_BYTES if told.report else CHUNK_BYTES)
-        time_s = message["time_unix_s"] if message["time_unix_s"] is not None else message["time_s"]
-        now = round(1e9 * (time_s or 0.0))
+        now = told.time_ns
         if told.report is not None:
             table = ros2.report(message, now, FRAME_ID)
             self._put("/reports", "eitskin_msgs/msg/Report", table, now)
@@ -71,7 +70,6 @@ class McapSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``new_file``; MissingExtraError where mcap is not installed."""
     try:
         import mcap_ros2.writer  # noqa: F401
     except ImportError:

@@ -11,17 +11,12 @@ from typing import Any
 
 from eitskin.errors import missing_extra
 from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
-from eitskin.sinks.udp import connected
+from eitskin.sinks.udp import connected, send
 
 USAGE = "osc://HOST:PORT or osc://HOST:PORT/prefix"
 
 
 def need_osc(extra: str) -> None:
-    """Refuse where python-osc is not installed.
-
-    Raises:
-        MissingExtraError: it is not.
-    """
     if find_spec("pythonosc") is None:
         raise missing_extra(extra, "python-osc")
 
@@ -50,11 +45,7 @@ class OscSink:
     def write(self, told: Told) -> None:
         messages = [(self._prefix + path, values) for path, values in osc_messages(told.message)]
         if messages:
-            data = bundle(messages)
-            try:
-                self._socket.send(data)
-            except ConnectionRefusedError:
-                self._socket.send(data)
+            send(self._socket, bundle(messages))
 
     def close(self) -> None:
         self._socket.close()
@@ -86,7 +77,6 @@ def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address``, ``connected`` and ``need_osc``."""
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE, path=True)
     need_osc("osc")

@@ -54,11 +54,7 @@ def open_sink(url: str, source: Source) -> Sink:
 class Outputs:
     """The sinks of ``urls``, open. ``patient``: the board runs only while it is asked and is not
     paced, so that a sink that is behind may be waited for, 2 s at most; else never. ``say`` gets a
-    line where one fails.
-
-    Raises:
-        EitskinError: one cannot be opened; the others are closed again.
-    """
+    line where one fails."""
 
     def __init__(
         self,
@@ -85,7 +81,6 @@ class Outputs:
         self.close()
 
     def put(self, item: Frame | Report | Notice) -> None:
-        """Give it to every sink."""
         told = Told(item)
         for one in self._queues:
             one.put(told, self._patience_s)
@@ -174,7 +169,6 @@ class Queue:
 
     @property
     def counts(self) -> dict[str, Any]:
-        """So far."""
         return {
             "url": self._url,
             "sent": self._sent,

@@ -53,6 +53,12 @@ class Told:
         return self._item if isinstance(self._item, dict) else self._item.message()
 
     @cached_property
+    def time_ns(self) -> int:
+        """The message's time, UTC where that is known."""
+        unix_s = self.message["time_unix_s"]
+        return round(1e9 * ((self.message["time_s"] if unix_s is None else unix_s) or 0.0))
+
+    @cached_property
     def text(self) -> str:
         """The message as a line of JSON."""
         return encoded(self.message)
@@ -81,11 +87,7 @@ def address(
     url: str, port: int | None, *, usage: str, lowest: int = 1
 ) -> tuple[SplitResult, str, int]:
     """The parts of ``url``, its host (this machine where none is named) and port; a server may have
-    0 as its ``lowest``, which is any.
-
-    Raises:
-        UsageError: it cannot be read, or names no port and there is no usual one.
-    """
+    0 as its ``lowest``, which is any."""
     shown = without_password(url)
     try:
         parts = urlsplit(url)
@@ -99,11 +101,7 @@ def address(
 
 
 def setting(url: str, query: str, name: str, low: int, high: int, usual: int) -> int:
-    """The whole number ``name=N`` of a query; ``usual`` where it is empty.
-
-    Raises:
-        UsageError: it is out of range, or something else is named.
-    """
+    """The whole number ``name=N`` of a query; ``usual`` where it is empty."""
     try:
         values = parse_qs(query, strict_parsing=True, keep_blank_values=True) if query else {}
         number = int(values.pop(name, [str(usual)])[-1])
@@ -117,11 +115,7 @@ def setting(url: str, query: str, name: str, low: int, high: int, usual: int) ->
 
 
 def nothing_more(url: str, parts: SplitResult, usage: str, *, path: bool = False) -> None:
-    """Refuse what stands after the port.
-
-    Raises:
-        UsageError: something does.
-    """
+    """Refuse what stands after the port."""
     if parts.query or parts.fragment or (parts.path not in ("", "/") and not path):
         raise UsageError(
             f"--to {without_password(url)}: nothing may follow the port; write  {usage}"

@@ -13,7 +13,7 @@ from typing import Any
 from eitskin.errors import SinkError
 from eitskin.sinks.osc import bundle, need_osc
 from eitskin.sinks.sink import Box, Sink, Source, Told, address, nothing_more
-from eitskin.sinks.udp import connected
+from eitskin.sinks.udp import connected, send
 
 USAGE = "tuio://HOST or tuio://HOST:PORT"
 PORT = 3333
@@ -88,11 +88,7 @@ class TuioSink:
                 return
             touches = []
         self._time_s = message.get("time_s", self._time_s)
-        data = bundle(self._cursors.messages(touches, self._time_s))
-        try:
-            self._socket.send(data)
-        except ConnectionRefusedError:
-            self._socket.send(data)
+        send(self._socket, bundle(self._cursors.messages(touches, self._time_s)))
 
     def close(self) -> None:
         if self._cursors.some:  # the stream was cut short: nobody touches any more
@@ -101,8 +97,6 @@ class TuioSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address``, ``connected`` and ``need_osc``; SinkError where the
-    skin's bounding box is not known."""
     parts, host, port = address(url, PORT, usage=USAGE)
     nothing_more(url, parts, USAGE)
     need_osc("tuio")

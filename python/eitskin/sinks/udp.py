@@ -15,28 +15,28 @@ class UdpSink:
         self._socket = target
 
     def write(self, told: Told) -> None:
-        try:
-            self._socket.send(told.text.encode())
-        except ConnectionRefusedError:  # of a datagram before: nobody listens on this machine
-            self._socket.send(told.text.encode())
+        send(self._socket, told.text.encode())
 
     def close(self) -> None:
         self._socket.close()
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address`` and ``connected``."""
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE)
     return UdpSink(connected(url, host, port))
 
 
-def connected(url: str, host: str, port: int) -> socket.socket:
-    """A socket that sends datagrams there.
+def send(target: socket.socket, data: bytes) -> None:
+    """One datagram; nobody need listen."""
+    try:
+        target.send(data)
+    except ConnectionRefusedError:  # of a datagram before: nobody listens on this machine
+        target.send(data)
 
-    Raises:
-        SinkError: the host is not known.
-    """
+
+def connected(url: str, host: str, port: int) -> socket.socket:
+    """A socket that sends datagrams there."""
     try:
         kind, _, _, _, target = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         opened = socket.socket(kind, socket.SOCK_DGRAM)

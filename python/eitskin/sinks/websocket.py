@@ -62,7 +62,6 @@ class WebSocketSink:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
         number: int = next(iter(self._server.sockets)).getsockname()[1]
         return number
 
@@ -107,7 +106,6 @@ class WebSocketSink:
 
 
 def open_sink(url: str, source: Source) -> Sink:
-    """See the module. Raises as ``address`` and ``WebSocketSink``."""
     parts, host, port = address(url, None, usage=USAGE, lowest=0)
     nothing_more(url, parts, USAGE)
     return WebSocketSink(url, host, port)

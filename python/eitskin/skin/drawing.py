@@ -32,11 +32,7 @@ class Drawing:
 
     def marked(self, mark: str) -> tuple[DrawnShape, ...]:
         """The shapes that ``mark`` names by id, class, layer or group, or whose id is ``mark`` and
-        a number, in any order.
-
-        Raises:
-            ConfigError: there is none.
-        """
+        a number, in any order."""
         numbered = re.compile(re.escape(mark) + r"[ _.-]?\d+")
         found = tuple(
             one for one in self.shapes if mark in one.names or numbered.fullmatch(one.name)
@@ -46,12 +42,7 @@ class Drawing:
         return found
 
     def outline(self, element: str | None = None, mark: str | None = None) -> Outline:
-        """The one closed outline, of those that ``element`` names and that are not marked ``mark``.
-
-        Raises:
-            ConfigError: nothing has that name.
-            GeometryError: no closed outline, several, or one that cannot be.
-        """
+        """The one closed outline of those that ``element`` names and that ``mark`` does not."""
         marks = {id(one) for one in self.marked(mark)} if mark is not None else set()
         shapes = [one for one in self.shapes if id(one) not in marks]
         if element is not None:

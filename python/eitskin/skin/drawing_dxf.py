@@ -34,11 +34,7 @@ DRAWN = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"}
 
 
 def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
-    """Every line and point of the DXF file ``content``; blocks are taken apart.
-
-    Raises:
-        ConfigError: it is damaged, too large, or has no units.
-    """
+    """Every line and point of the DXF file ``content``; blocks are taken apart."""
     talk = logging.getLogger("ezdxf")
     before = talk.level
     talk.setLevel(logging.CRITICAL)  # what it repairs in a file is no news to the user

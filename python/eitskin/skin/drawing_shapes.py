@@ -51,11 +51,6 @@ class TooManyPoints(Exception):
 
 
 def limited(shapes: Iterable[DrawnShape], where: str) -> list[DrawnShape]:
-    """All of them.
-
-    Raises:
-        ConfigError: they have over ``MAX_POINTS`` points.
-    """
     found, points = [], 0
     try:
         for one in shapes:

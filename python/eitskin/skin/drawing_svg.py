@@ -51,11 +51,7 @@ class Page:
 
 
 def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
-    """Every shape of the SVG file ``content``.
-
-    Raises:
-        ConfigError: it is damaged, no SVG, too large, or of no known size.
-    """
+    """Every shape of the SVG file ``content``."""
     try:
         root = ET.fromstring(content)
     except (ET.ParseError, ValueError, LookupError) as error:
@@ -73,9 +69,7 @@ def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         return limited(_shapes(tree, frozenset(), page, reading.tolerance_mm), where)
     except EitskinError:
         raise
-    except (
-        Exception
-    ) as error:  # the parser has no error of its own: whatever a damaged file meets in it
+    except Exception as error:  # the parser has none of its own: whatever a damaged file meets
         raise ConfigError(
             f"{where}: cannot be read as SVG ({type(error).__name__}: {error}); export it again"
         ) from None
@@ -138,19 +132,13 @@ def _refuse_copies(root: ET.Element, where: str) -> None:
             target = next(
                 (value for key, value in one.attrib.items() if key.rpartition("}")[2] == "href"), ""
             )
-            copied = (
-                by_id.get(target[1:])
-                if one.tag.rpartition("}")[2] == "use" and target.startswith("#")
-                else None
-            )
-            own = [] if copied is None else [copied]
+            is_copy = one.tag.rpartition("}")[2] == "use" and target.startswith("#")
+            copied = by_id.get(target[1:]) if is_copy else None
             words = sum(1 for key in WORKED for _ in WORD.finditer(one.get(key, "")))
             words += LOOSE_WORDS * sum(1 for _ in LOOSE.finditer(one.get("d", "")))
-            below = [count(child, depth + 1) for child in [*one, *own]]
-            counts[id(one)] = (
-                1 + sum(elements for elements, _ in below),
-                words + sum(more for _, more in below),
-            )
+            children = [*one] if copied is None else [*one, copied]
+            below = [(1, words), *(count(child, depth + 1) for child in children)]
+            counts[id(one)] = sum(n for n, _ in below), sum(n for _, n in below)
         return counts[id(one)]
 
     elements, words = count(root, 0)

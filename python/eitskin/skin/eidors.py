@@ -43,11 +43,7 @@ class EidorsModel:
     jacobian: FloatArray | None
 
     def rim(self) -> IntArray:
-        """The rim's nodes in order, counterclockwise, (k,).
-
-        Raises:
-            GeometryError: the triangles have holes, or hang together in single nodes only.
-        """
+        """The rim's nodes in order, counterclockwise, (k,)."""
         edges = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         n = len(self.nodes_mm)
         codes = edges @ [n, 1]
@@ -75,11 +71,7 @@ class EidorsModel:
 
     def contacts(self) -> tuple[FloatArray, float]:
         """The middle of each electrode on the rim of ``nodes_mm``, (L, 2), and their mean width. A
-        single node stands for half of the edges beside it, as in EIDORS.
-
-        Raises:
-            GeometryError: an electrode is not on the rim.
-        """
+        single node stands for half of the edges beside it, as in EIDORS."""
         rim = self.rim()
         place = {int(node): k for k, node in enumerate(rim)}
         points = self.nodes_mm[rim]

@@ -17,9 +17,6 @@ class Electrodes:
     Electrode centres lie at ``positions_mm`` along the rim from there in the numbering direction;
     None spaces them evenly, electrode 0 on the start point. ``contact_impedance_ohm_m2`` is that of
     a unit of contact area; 0 is an ideal shunt.
-
-    Raises:
-        GeometryError: a value is out of range, or positions are not ``count`` ascending numbers.
     """
 
     count: int = 16

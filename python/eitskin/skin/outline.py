@@ -151,11 +151,7 @@ class Outline:
 
 
 def disk(diameter_mm: float) -> Outline:
-    """A disk centred at (0, 0).
-
-    Raises:
-        GeometryError: the diameter is not finite, or out of range.
-    """
+    """A disk centred at (0, 0)."""
     if not (isfinite(diameter_mm) and MIN_SIZE_MM <= diameter_mm <= MAX_SIZE_MM):
         raise GeometryError(
             f"outline: diameter_mm = {diameter_mm:g} is out of range; it must be {MIN_SIZE_MM:g} to"
@@ -170,12 +166,7 @@ def disk(diameter_mm: float) -> Outline:
 
 def polygon(vertices: Iterable[Sequence[float]]) -> Outline:
     """A polygon through ``vertices`` (x, y) in mm, given either way round; a repeated closing point
-    is dropped.
-
-    Raises:
-        GeometryError: fewer than 3 or more than 2000 points, a point that is not finite or repeats
-            its neighbour, an outline that crosses or touches itself, or one smaller than 1 mm.
-    """
+    is dropped."""
     points = [(float(x), float(y)) for x, y in vertices]
     if len(points) > 1 and points[0] == points[-1]:
         points.pop()

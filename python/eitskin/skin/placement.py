@@ -26,11 +26,7 @@ class Placed:
 
 
 def by_fractions(outline: Outline, fractions: Sequence[float], clockwise: bool) -> Placed:
-    """Parts of the whole rim, from 0 to below 1, from the start point on.
-
-    Raises:
-        GeometryError: one is out of range.
-    """
+    """Parts of the whole rim, from 0 to below 1, from the start point on."""
     for k, value in enumerate(fractions):
         if not 0 <= value < 1:
             raise GeometryError(
@@ -47,12 +43,7 @@ def by_points(
     snap_mm: float = SNAP_MM,
 ) -> Placed:
     """The rim's points nearest to ``points_mm`` (k, 2), electrode 0 first; with ``clockwise`` None,
-    whichever way they go round.
-
-    Raises:
-        GeometryError: a point is further than ``snap_mm`` from the rim, or they are not in order
-            along it.
-    """
+    whichever way they go round."""
     points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
     arc_mm, away_mm = nearest_on_rim(outline, points)
     worst = int(np.argmax(away_mm))
@@ -67,12 +58,8 @@ def by_points(
         along = np.mod(start - arc_mm if way else arc_mm - start, perimeter)
         steps = np.mod(np.diff(along), perimeter)
         if steps.sum() < perimeter:
-            return Placed(
-                tuple(
-                    float(value) for value in along[0] + np.concatenate([[0.0], np.cumsum(steps)])
-                ),
-                way,
-            )
+            places = along[0] + np.concatenate([[0.0], np.cumsum(steps)])
+            return Placed(tuple(places.tolist()), way)
     way_text = {None: "", True: " clockwise", False: " counterclockwise"}[clockwise]
     raise GeometryError(
         f"electrodes: {len(points)} places are not in order along the rim{way_text}; give them one"
@@ -88,11 +75,7 @@ def by_marks(
     snap_mm: float = SNAP_MM,
 ) -> Placed:
     """The middles of ``marks``, in the order of the numbers that their ids end with; where not all
-    have one, along the rim from the start point.
-
-    Raises:
-        GeometryError: as ``by_points``, or two have the same number.
-    """
+    have one, along the rim from the start point."""
     middles = np.array([mark.middle_mm for mark in marks])
     numbers = [re.search(r"(\d+)$", mark.name) for mark in marks]
     if all(numbers):
@@ -106,9 +89,8 @@ def by_marks(
     arc_mm, _ = nearest_on_rim(outline, middles)
     start, way = outline.arc_length_at_angle(start_angle_deg), bool(clockwise)
     along = np.mod(start - arc_mm if way else arc_mm - start, outline.perimeter_mm)
-    return by_points(
-        outline, middles[np.argsort(along, kind="stable")], start_angle_deg, way, snap_mm
-    )
+    order = np.argsort(along, kind="stable")
+    return by_points(outline, middles[order], start_angle_deg, way, snap_mm)
 
 
 def nearest_on_rim(outline: Outline, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:

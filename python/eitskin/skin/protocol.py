@@ -134,13 +134,10 @@ class Protocol:
                     " keep at most two"
                 )
         members = list(groups.values())
-        return Reciprocity(
-            first=np.array([rows[0] for rows in members], dtype=np.int64),
-            second=np.array(
-                [rows[1] if len(rows) == 2 else -1 for rows in members], dtype=np.int64
-            ),
-            sign=np.array([signs[rows[0]] * signs[rows[-1]] for rows in members], dtype=np.int64),
-        )
+        first = [rows[0] for rows in members]
+        second = [rows[1] if len(rows) == 2 else -1 for rows in members]
+        sign = [signs[rows[0]] * signs[rows[-1]] for rows in members]
+        return Reciprocity(*(np.array(one, dtype=np.int64) for one in (first, second, sign)))
 
 
 def adjacent(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
@@ -188,11 +185,7 @@ def skip(n: int, skip: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
 
 
 def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """A protocol of one's own: ``rows`` (m, 4) [I+, I-, V+, V-].
-
-    Raises:
-        ProtocolError: the rows are invalid, or more than two hold the same voltage.
-    """
+    """A protocol of one's own: ``rows`` (m, 4) [I+, I-, V+, V-]."""
     try:
         given = np.asarray(rows)
     except ValueError:
@@ -206,11 +199,7 @@ def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> 
 
 def in_order(protocol: Protocol, order: str | Iterable[int]) -> Protocol:
     """``protocol`` with its drives measured in ``order``: their numbers; or "by k", drive k j
-    modulo their count at place j.
-
-    Raises:
-        ProtocolError: it does not have each drive once.
-    """
+    modulo their count at place j."""
     if isinstance(order, str):
         drives = len(protocol.drive_starts)
         word, _, number = order.partition(" ")
@@ -226,12 +215,7 @@ def in_order(protocol: Protocol, order: str | Iterable[int]) -> Protocol:
 
 def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where: str) -> Protocol:
     """The protocol in a parsed TOML table; ``where`` names its source in errors. An empty table is
-    adjacent.
-
-    Raises:
-        ConfigError: an unknown key, a wrong type, or a key that does not go with the kind.
-        ProtocolError: the protocol cannot be.
-    """
+    adjacent."""
     check_keys(toml_table, ("kind", "skip", "table", "current_a", "order"), where)
     kind = choice(toml_table, "kind", "adjacent", KINDS, where)
     for key in ("skip", "table"):
@@ -298,11 +282,7 @@ def _rows_of_table(toml_table: Mapping[str, Any], where: str) -> list[list[int]]
     if not isinstance(rows, list):
         raise ConfigError(f'{where}: kind = "table" needs table = [[I+, I-, V+, V-], ...]')
     for k, row in enumerate(rows):
-        if (
-            not isinstance(row, list)
-            or len(row) != 4
-            or any(type(value) is not int for value in row)
-        ):
+        if not (isinstance(row, list) and len(row) == 4 and {*map(type, row)} == {int}):
             raise ConfigError(
                 f"{where}: table row {k} (from 0) must be four whole numbers, not {row!r}"
             )

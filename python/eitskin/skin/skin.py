@@ -88,18 +88,13 @@ class Skin:
         else:
             along = np.array(electrodes.positions_mm, dtype=np.float64)
         start = self.outline.arc_length_at_angle(electrodes.start_angle_deg)
-        return np.asarray(
-            np.mod(start - along if electrodes.clockwise else start + along, perimeter)
-        )
+        place = start - along if electrodes.clockwise else start + along
+        return np.asarray(np.mod(place, perimeter))
 
 
 def _refuse_overlap(skin: Skin) -> None:
-    count, width, perimeter = (
-        skin.electrodes.count,
-        skin.electrodes.width_mm,
-        skin.outline.perimeter_mm,
-    )
-    least = MIN_GAP_PER_WIDTH * width
+    count, width = skin.electrodes.count, skin.electrodes.width_mm
+    perimeter, least = skin.outline.perimeter_mm, MIN_GAP_PER_WIDTH * width
     if count * (width + least) > perimeter:
         raise GeometryError(
             f"skin {skin.name!r}: {count} electrodes of {width:g} mm do not fit on a rim of"
@@ -276,9 +271,8 @@ def _outline_from_table(
     sheet: Mapping[str, Any], where: str, drawing: Drawing | None, marked: object
 ) -> Outline:
     if drawing is not None:
-        return drawing.outline(
-            _word(sheet, "element", where), marked if isinstance(marked, str) else None
-        )
+        mark = marked if isinstance(marked, str) else None
+        return drawing.outline(_word(sheet, "element", where), mark)
     if "diameter_mm" in sheet:
         return disk(number(sheet, "diameter_mm", None, where, low=MIN_SIZE_MM, high=MAX_SIZE_MM))
     return polygon(_points(sheet, "polygon_mm", where))
@@ -292,24 +286,16 @@ def _electrodes_from_table(
     start = number(table, "start_angle_deg", default.start_angle_deg, where, low=-360, high=360)
     way = choice(table, "direction", "counterclockwise", ("clockwise", "counterclockwise"), where)
     placed = _places(table, where, outline, drawing, start, way == "clockwise")
-    given = len(placed.positions_mm) if placed is not None else None
-    count = (
-        given
-        if given is not None and given <= MAX_COUNT and "positions_mm" not in table
-        else default.count
-    )
-    impedance = default.contact_impedance_ohm_m2
+    count, width, key = default.count, default.width_mm, "contact_impedance_ohm_m2"
+    if placed is not None and "positions_mm" not in table:
+        count = len(placed.positions_mm) if len(placed.positions_mm) <= MAX_COUNT else count
     return Electrodes(
         count=integer(table, "count", count, where, low=MIN_COUNT, high=MAX_COUNT),
-        width_mm=number(
-            table, "width_mm", default.width_mm, where, low=0, high=MAX_SIZE_MM, open_low=True
-        ),
+        width_mm=number(table, "width_mm", width, where, low=0, high=MAX_SIZE_MM, open_low=True),
         start_angle_deg=start,
         clockwise=way == "clockwise" if placed is None else placed.clockwise,
         positions_mm=None if placed is None else placed.positions_mm,
-        contact_impedance_ohm_m2=number(
-            table, "contact_impedance_ohm_m2", impedance, where, low=0, high=1e6
-        ),
+        contact_impedance_ohm_m2=number(table, key, getattr(default, key), where, low=0, high=1e6),
     )
 
 
@@ -366,11 +352,7 @@ def _points(table: Mapping[str, Any], key: str, where: str) -> list[list[float]]
     if not isinstance(points, list):
         raise ConfigError(f"{where}: {key} must be a list of [x, y] points")
     for k, point in enumerate(points):
-        if (
-            not isinstance(point, list)
-            or len(point) != 2
-            or not all(_is_number(value) for value in point)
-        ):
+        if not (isinstance(point, list) and len(point) == 2 and all(map(_is_number, point))):
             raise ConfigError(f"{where}: {key} entry {k} (from 0) must be [x, y], not {point!r}")
     return points
 

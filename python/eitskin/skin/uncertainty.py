@@ -28,9 +28,6 @@ class Uncertainty:
     ``touch_shapes`` is the weight of shaped ones, up to ``touch_aspect_max`` times as long as wide.
     ``row_gains``: each row is scaled to the model by the tare. ``samples`` random skins are drawn
     under ``seed``.
-
-    Raises:
-        UsageError: a value is out of range.
     """
 
     electrode_position_sd: float = 0.01
@@ -79,11 +76,7 @@ DEFAULT_UNCERTAINTY = Uncertainty()
 
 
 def uncertainty_from_table(value: object, where: str) -> Uncertainty | None:
-    """What a skin's file says at ``uncertainty``: a table, None for the defaults, or "none".
-
-    Raises:
-        ConfigError: an unknown key, a wrong type or a value out of range.
-    """
+    """What a skin's file says at ``uncertainty``: a table, None for the defaults, or "none"."""
     if value is None:
         return DEFAULT_UNCERTAINTY
     if value == "none":

@@ -11,9 +11,14 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import LearnedReference, Options, Reconstruction, check_options
+from eitskin.core.results import (
+    LearnedReference,
+    Options,
+    Reconstruction,
+    check_options,
+    check_shape,
+)
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
@@ -25,20 +30,11 @@ T = TypeVar("T")
 
 
 def check_threads(threads: int | None) -> int:
-    """``threads``, or where it is None as many as this process may use.
-
-    Raises:
-        UsageError: out of range.
-    """
+    """``threads``, or where it is None as many as this process may use."""
     if threads is None:
-        return min(
-            (
-                len(os.sched_getaffinity(0))
-                if hasattr(os, "sched_getaffinity")
-                else os.cpu_count() or 1
-            ),
-            MAX_THREADS,
-        )
+        known = hasattr(os, "sched_getaffinity")
+        count = len(os.sched_getaffinity(0)) if known else os.cpu_count() or 1
+        return min(count, MAX_THREADS)
     if not 1 <= threads <= MAX_THREADS:
         raise UsageError(f"{threads} threads cannot be; use 1 to {MAX_THREADS}")
     return threads
@@ -75,9 +71,8 @@ class Batch:
         width = "float32" if engine == "c" else "float64"
         self._engines = [CoreEngine(content, width) for _ in range(self.threads)]
         self._on_each(lambda one: one.set_options(chosen))
-        self._last = np.zeros(
-            (0, self._engines[0].n_rows)
-        )  # the last frame that could be used, if any
+        # the last frame that could be used, if any
+        self._last = np.zeros((0, self._engines[0].n_rows))
 
     def _on_each(self, call: Callable[[CoreEngine], T]) -> T:
         first, *_ = [call(engine) for engine in self._engines]
@@ -85,17 +80,9 @@ class Batch:
 
     def tare(self, quiet_v: npt.ArrayLike) -> LearnedReference:
         """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
-        noise.
-
-        Raises:
-            FrameError: a frame cannot be used.
-        """
+        noise."""
         frames = np.atleast_2d(np.asarray(quiet_v, dtype=np.float64))
-        if frames.ndim != 2 or frames.shape[1] != self._engines[0].n_rows or not len(frames):
-            raise FrameError(
-                f"reference: has shape {frames.shape}, but the model's protocol has"
-                f" {self._engines[0].n_rows} rows"
-            )
+        check_shape(frames, self._engines[0].n_rows, "reference", least=1)
         self._last = self._last[:0]
         return self._on_each(lambda one: one.set_reference(frames))
 
@@ -108,26 +95,17 @@ class Batch:
         self, frames_v: npt.ArrayLike, *, touches: bool = True
     ) -> Iterator[Reconstruction | FrameError]:
         """The results of frames (k, m) in V, in their order; for a frame that cannot be used, its
-        error. Ids count up from 1.
-
-        Raises:
-            FrameError: the frames are not (k, m) numbers.
-        """
+        error. Ids count up from 1."""
         frames = np.asarray(frames_v, dtype=np.float64)
-        if frames.ndim != 2 or frames.shape[1] != self._engines[0].n_rows:
-            raise FrameError(
-                f"frames: have shape {frames.shape}, but the model's protocol has"
-                f" {self._engines[0].n_rows} rows"
-            )
+        check_shape(frames, self._engines[0].n_rows, "frames")
         size = max(1, min(MAX_IN_BLOCK, len(frames) // (4 * self.threads)))
         free: SimpleQueue[CoreEngine] = SimpleQueue()
         for engine in self._engines[1:]:
             free.put(engine)
 
         def run(start: int) -> list[Reconstruction | FrameError]:
-            engine = (
-                free.get() if start > 0 else self._engines[0]
-            )  # a fresh one for the first frame of all
+            # a fresh one for the first frame of all
+            engine = free.get() if start > 0 else self._engines[0]
             try:
                 engine.follow(np.vstack([self._last, frames[max(0, start - MAX_IN_BLOCK) : start]]))
                 return engine.reconstruct_block(frames[start : start + size], touches=touches)
@@ -143,16 +121,10 @@ class Batch:
                         yield result
                         continue
                     last = frames[number - 1 : number].copy()
-                    numbered = tuple(
-                        _numbered(touch, next_id + k) for k, touch in enumerate(result.touches)
-                    )
-                    next_id += len(numbered)
-                    yield Reconstruction(result.image, result.coefficients, numbered, result.info)
+                    numbered = (replace(t, id=k) for k, t in enumerate(result.touches, next_id))
+                    yield replace(result, touches=tuple(numbered))
+                    next_id += len(result.touches)
         self._last = last
-
-
-def _numbered(t: Touch, number: int) -> Touch:
-    return replace(t, id=number)
 
 
 def reconstruct_many(

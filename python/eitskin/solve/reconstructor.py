@@ -12,7 +12,13 @@ import numpy.typing as npt
 from eitskin.arrays import FloatArray
 from eitskin.config import nearest
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import LearnedReference, Options, Reconstruction, check_options
+from eitskin.core.results import (
+    LearnedReference,
+    Options,
+    Reconstruction,
+    check_options,
+    check_shape,
+)
 from eitskin.errors import FrameError, ProtocolError, UsageError, missing_checkout
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
@@ -124,11 +130,8 @@ class Reconstructor:
         Raises:
             FrameError: a frame has the wrong length or cannot be used.
         """
-        frames, rows = np.atleast_2d(_numbers(quiet_v, "reference")), self.model.protocol.n_rows
-        if frames.ndim != 2 or frames.shape[1] != rows or not len(frames):
-            raise FrameError(
-                f"reference: has shape {frames.shape}, but the model's protocol has {rows} rows"
-            )
+        frames = np.atleast_2d(_numbers(quiet_v, "reference"))
+        check_shape(frames, self.model.protocol.n_rows, "reference", least=1)
         return self._engine.set_reference(frames)
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:

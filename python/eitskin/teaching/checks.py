@@ -14,11 +14,7 @@ LEAST_COVER, FAIR_COVER = 0.02, 0.4
 
 
 def check_presses(presses: Presses, skin: Skin | None) -> list[str]:
-    """Refuse what cannot teach; the rest as notes.
-
-    Raises:
-        FrameError: see the text.
-    """
+    """Refuse what cannot teach; the rest as notes."""
     if len(presses) < MIN_PRESSES:
         raise FrameError(
             f"teach: {len(presses)} presses are too few; record at least {MIN_PRESSES}, better 20"

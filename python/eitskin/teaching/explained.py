@@ -65,7 +65,6 @@ class Explained:
 
 
 def quiet_progress(items: Iterable[Any], what: str) -> Iterable[Any]:
-    """Shows nothing."""
     return items
 
 
@@ -110,11 +109,7 @@ def shifted_or_refused(
     found: Explained, skin: Skin | None, place_sd_mm: float, progress: Progress
 ) -> Explained:
     """``found`` explains nothing: the same with each press at a place some later or earlier, where
-    that does.
-
-    Raises:
-        FrameError: it does not either.
-    """
+    that does."""
     presses = found.presses
     few = presses.take(np.arange(min(len(presses), ENOUGH_FOR_SHIFT)))
     for by in shifts(presses):
@@ -141,7 +136,6 @@ def shifts(presses: Presses) -> list[int]:
 
 
 def shift_note(by: int) -> str:
-    """For a report."""
     count = abs(by)
     how = f"the first {count} were missed" if by > 0 else f"{count} more came first"
     if count == 1:

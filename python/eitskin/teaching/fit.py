@@ -39,11 +39,7 @@ class Noise:
 
 def differences(difference: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Each row over its rms, (n, m), and that rms (m,); rows that carry nothing get the greatest
-    rms, which keeps them at zero.
-
-    Raises:
-        FrameError: no row changes.
-    """
+    rms, which keeps them at zero."""
     rms = np.sqrt(np.mean(difference**2, axis=0))
     if not rms.max() > 0:
         raise FrameError(
@@ -62,11 +58,7 @@ def chosen_kernel(
     angles: int = START_ANGLES,
     progress: Progress = iter,
 ) -> tuple[Kernel, float]:
-    """``kernel`` with placement, own-row term and noise of the greatest likelihood, and its log.
-
-    Raises:
-        MissingExtraError: scipy is not installed.
-    """
+    """``kernel`` with placement, own-row term and noise of the greatest likelihood, and its log."""
     try:
         from scipy.optimize import minimize
     except ImportError:
@@ -225,7 +217,6 @@ class Learned:
 
     @property
     def kernel(self) -> Kernel:
-        """The kernel in use."""
         return self.process.kernel
 
     def whitened(self, difference: FloatArray) -> FloatArray:

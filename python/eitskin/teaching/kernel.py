@@ -138,7 +138,6 @@ def least_turn_deg(turn_deg: float, digits: int = 1) -> float:
 
 
 def placement_text(placement: Placement) -> str:
-    """For a report."""
     turn = least_turn_deg(placement.turn_deg)
     return (
         (f"turned by {turn:.1f} degrees" if turn else "not turned")

@@ -29,11 +29,7 @@ class Known:
 
 
 def known_of(model: Model, where: str) -> Known:
-    """What ``model`` was taught; ``where`` names it in errors.
-
-    Raises:
-        ModelError: it was not taught.
-    """
+    """What ``model`` was taught; ``where`` names it in errors."""
     if model.precision is None or "teach" not in model.meta:
         raise ModelError(
             f"{where}: a model from physics, which no press has taught; make one with  eitskin"

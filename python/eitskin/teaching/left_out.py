@@ -97,7 +97,6 @@ def _middle(score: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def stranger_note(strangers: npt.NDArray[np.int64]) -> str:
-    """For a report."""
     return (
         "presses that do not fit the others (two fingers at once, a slip, a wrong place); leave"
         " them out or record them again: " + ", ".join(map(str, strangers[:12]))

@@ -89,11 +89,7 @@ class PressFile:
         self.numbers.append(number)
 
     def _save(self, presses: Presses) -> None:
-        """Write them; the new file is locked before it has its name.
-
-        Raises:
-            FileError: it cannot be written, or another program wrote it since.
-        """
+        """Write them; the new file is locked before it has its name."""
         if self.path.is_file():
             ours = self._held is not None and os.path.samestat(
                 self.path.stat(), os.fstat(self._held.fileno())

@@ -132,11 +132,7 @@ def aged(presses: Presses, by: int) -> Presses:
 
 
 def joined(first: Presses, second: Presses) -> Presses:
-    """The presses of both, one after the other; what only one of them has becomes NaN, time goes.
-
-    Raises:
-        FrameError: their protocols differ.
-    """
+    """The presses of both, one after the other; what only one has becomes NaN, time goes."""
     if first.protocol.hash != second.protocol.hash:
         raise FrameError("presses: made with different protocols; teach them apart")
     optional: dict[str, Any] = {"time_s": None}

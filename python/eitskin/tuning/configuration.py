@@ -70,7 +70,6 @@ class Configuration:
     model_errors: bool = True
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         return asdict(self)
 
     @property
@@ -108,11 +107,7 @@ class Configuration:
 
 
 def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
-    """A configuration from a TOML table or a results file; what is not there has its default.
-
-    Raises:
-        ConfigError: a key is unknown, or a value out of range.
-    """
+    """A configuration from a TOML table or a results file; what is not there has its default."""
     name = table.get("name")
     if not isinstance(name, str) or not name.strip() or "," in name:
         raise ConfigError(

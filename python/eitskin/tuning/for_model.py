@@ -29,11 +29,8 @@ def chosen_point(
     points = []
     for point in load_front().points:
         one = point.configuration
-        other = {
-            name
-            for name, value in one.solver_settings.items()
-            if not _same(value, getattr(now, name, None))
-        }
+        wanted = one.solver_settings.items()
+        other = {name for name, value in wanted if not _same(value, getattr(now, name, None))}
         if (
             _is_of(one, point, model)
             and (any_scan or (one.samples, one.scan) == (usual.samples, usual.scan))
@@ -79,11 +76,8 @@ def _is_of(one: Configuration, point: Point, model: Model) -> bool:
 def settings_text(point: Point, board: str) -> str:
     """What was chosen, in a line."""
     one = point.configuration
-    score, typical, most = (
-        point.accuracy(Conditions()),
-        point.cost("us", board, Conditions()),
-        point.cost("us", board, Conditions(), True),
-    )
+    usual, score = Conditions(), point.accuracy(Conditions())
+    typical, most = (point.cost("us", board, usual, worst) for worst in (False, True))
     text = (
         f"settings of {point.name!r}: {one.solver}, {one.iterations} iterations at most, lambda_rel"
         f" {one.lambda_rel:g}"

@@ -57,11 +57,7 @@ UNITS = {
 
 
 def read_budget(text: str) -> Budget:
-    """A budget from "10ms", "800us", "600kMACs" or "2.5Minstructions".
-
-    Raises:
-        UsageError: it is none.
-    """
+    """A budget from "10ms", "800us", "600kMACs" or "2.5Minstructions"."""
     match = re.fullmatch(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?)\s*([A-Za-z]+)", text.strip())
     unit = None if match is None else match.group(2).lower()
     unit = unit if unit in UNITS or unit is None else f"{unit}s"
@@ -112,11 +108,9 @@ class Point:
     def macs(self, where: Conditions) -> tuple[float, float] | None:
         """Mean and most MACs of solve and touches there."""
         score = self.score(where)
-        return (
-            None
-            if score is None
-            else (score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"])
-        )
+        if score is None:
+            return None
+        return score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"]
 
     def cost(self, unit: str, board: str, where: Conditions, worst: bool = False) -> float | None:
         """Solve and touches of a frame in ``unit``: the mean (host: the median), or of the
@@ -142,11 +136,9 @@ class Point:
     def fits_f767(self) -> bool:
         """Whether flash and RAM of the NUCLEO-F767ZI hold model and workspace, and model and SOLVER
         command the settings."""
-        fits = (
-            self.costs["flash_bytes"] <= BANK_BYTES - RECORD_BYTES
-            and self.costs["ram_bytes"] <= F767_RAM
-        )
-        return bool(fits) and not unusual(self.configuration) - MODEL_HOLDS - board_takes()
+        fits = self.costs["flash_bytes"] <= BANK_BYTES - RECORD_BYTES
+        fits = bool(fits and self.costs["ram_bytes"] <= F767_RAM)
+        return fits and not unusual(self.configuration) - MODEL_HOLDS - board_takes()
 
 
 def unusual(one: Configuration) -> set[str]:
@@ -197,11 +189,7 @@ def _cell(cell: Any) -> dict[str, Any]:
 
 
 def front_from(values: Any, where: str) -> Front:
-    """Results from JSON values.
-
-    Raises:
-        ConfigError: they are none, or of another version.
-    """
+    """Results from JSON values."""
     try:
         if values["format"] != FORMAT or values["version"] != VERSION:
             raise KeyError("format")
@@ -222,12 +210,7 @@ def front_from(values: Any, where: str) -> Front:
 
 
 def load_front(path: Path | None = None) -> Front:
-    """The results in ``path``, or those that ship with the package.
-
-    Raises:
-        FileError: it cannot be read.
-        ConfigError: it holds no results.
-    """
+    """The results in ``path``, or those that ship with the package."""
     if path is not None:
         try:
             return front_from(parse_json(read_bytes(path, "results file")), str(path))
@@ -283,11 +266,7 @@ PRESETS = (*PRESET_ACCURACY, *PRESET_REPORT_MS)
 
 
 def preset(name: str, board: str, where: Conditions | None = None) -> Target:
-    """What the preset ``name`` asks for on ``board``.
-
-    Raises:
-        UsageError: there is none of that name.
-    """
+    """What the preset ``name`` asks for on ``board``."""
     if name not in PRESETS:
         raise UsageError(f"preset {name}: {nearest(name, PRESETS)}")
     ms = PRESET_REPORT_MS.get(name)
@@ -298,11 +277,7 @@ def preset(name: str, board: str, where: Conditions | None = None) -> Target:
 
 
 def check_wish(target: Target) -> Target:
-    """``target`` if it can be.
-
-    Raises:
-        UsageError: nothing is asked for, or a number is out of range.
-    """
+    """``target`` if it can be."""
     if target.budget is None and target.accuracy is None:
         raise UsageError(
             "name what to choose by:  --preset balanced,  --budget 10ms  or  --accuracy 0.86"
@@ -311,11 +286,7 @@ def check_wish(target: Target) -> Target:
         raise UsageError(f"--accuracy {target.accuracy:g} is an MIoU; use above 0 to below 1")
     if target.period_us is not None and not target.period_us > 0:
         raise UsageError("--period must be above 0")
-    if (
-        target.board == "host"
-        and target.budget is not None
-        and target.budget.unit == "instructions"
-    ):
+    if target.board == "host" and target.unit == "instructions":
         raise UsageError(
             "instructions are counted on the Cortex-M7; use a time or MACs for the host, or "
             " --board f767"
@@ -326,20 +297,13 @@ def check_wish(target: Target) -> Target:
 def choose(points: Iterable[Point], target: Target, what: str = "measured point") -> Point:
     """With a budget the most accurate point within it; with an accuracy the cheapest that reaches
     it; with both the cheapest that does both. Points that save on the fit of touches are left out.
-    ``what`` names the points in the refusal.
-
-    Raises:
-        UsageError: none does; the text says how near one comes.
-    """
+    ``what`` names the points in the refusal."""
     known = []
     for one in points:
-        cost, accuracy = (
-            one.cost(target.unit, target.board, target.where, target.worst),
-            one.accuracy(target.where),
-        )
-        usable = one.configuration.touch_sweeps >= MIN_SWEEPS and (
-            target.board == "host" or one.fits_f767
-        )
+        cost = one.cost(target.unit, target.board, target.where, target.worst)
+        accuracy = one.accuracy(target.where)
+        fits = target.board == "host" or one.fits_f767
+        usable = fits and one.configuration.touch_sweeps >= MIN_SWEEPS
         if cost is not None and accuracy is not None and usable:
             known.append((cost, accuracy, one))
     if not known:
@@ -351,8 +315,7 @@ def choose(points: Iterable[Point], target: Target, what: str = "measured point"
     if not known:
         raise UsageError(
             f"no {what} measures a frame within {target.acquisition_us / 1000:g} ms; allow more"
-            f" with "
-            " --period"
+            " with  --period"
         )
     within = [row for row in known if target.budget is None or row[0] <= target.budget.value]
     if not within:

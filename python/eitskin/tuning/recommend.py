@@ -47,7 +47,6 @@ class Recommendation:
         return options
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         point, target = self.point, self.target
         return {
             "name": point.name,
@@ -78,7 +77,6 @@ class Recommendation:
         }
 
     def text(self) -> str:
-        """In words."""
         point, target, one = self.point, self.target, self.point.configuration
         score = point.score(target.where)
         assert score is not None

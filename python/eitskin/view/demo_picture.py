@@ -9,7 +9,6 @@ from eitskin.view.pictures import Mark
 
 
 def draw_demo(path: str | Path, demo: Demo) -> None:
-    """Truth, image, touches."""
     skin = demo.model.skin
     truth = [
         Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1) * skin.conductivity_s_per_m)

@@ -33,36 +33,21 @@ def draw_report(path: str | Path, report: Report, case: Case) -> None:
     for panel in axes.ravel():
         panel.spines[["top", "right"]].set_visible(False)
     faults = [finding.name for finding in report.findings if finding.severity == FAULT]
-    verdict = (
-        "nothing must be repaired"
-        if not faults
-        else "to repair: " + ", ".join(dict.fromkeys(faults))
-    )
+    found = ", ".join(dict.fromkeys(faults))
+    verdict = f"to repair: {found}" if faults else "nothing must be repaired"
     title = wrapped(f"{Path(report.source).name}: {verdict}", 10.6, 11)
     figure.suptitle("\n".join(title).replace("$", r"\$"), x=0.01, ha="left", fontsize=11)
     save_picture(figure, path)
 
 
 def _reference(panel: Any, case: Case) -> None:
-    channels = np.arange(len(case.rows))
-    off = ~case.trusted
-    panel.plot(
-        channels,
-        1e3 * case.expected(),
-        color=EXPECTED,
-        linewidth=2.5,
-        label="expected of a homogeneous skin",
-    )
-    panel.plot(channels, 1e3 * case.reference, color=MEASURED, linewidth=0.9, label="measured")
-    if off.any():
-        panel.plot(
-            channels[off],
-            1e3 * case.reference[off],
-            ".",
-            color=BAD,
-            markersize=6,
-            label="not trusted",
-        )
+    expected_mv, measured_mv = 1e3 * case.expected(), 1e3 * case.reference
+    label = "expected of a homogeneous skin"
+    panel.plot(expected_mv, color=EXPECTED, linewidth=2.5, label=label)
+    panel.plot(measured_mv, color=MEASURED, linewidth=0.9, label="measured")
+    off = np.flatnonzero(~case.trusted)
+    if len(off):
+        panel.plot(off, measured_mv[off], ".", color=BAD, markersize=6, label="not trusted")
     panel.set(xlabel="channel (order and sign repaired)", ylabel="mV", title="Mean quiet frame")
     low, high = panel.get_ylim()
     panel.set_ylim(low, high + 0.2 * (high - low))
@@ -81,17 +66,12 @@ def _gains(figure: Any, panel: Any, case: Case) -> None:
         100 * grid, cmap="RdBu_r", vmin=-100 * GAIN_SPAN, vmax=100 * GAIN_SPAN, origin="lower"
     )
     panel.imshow(left_out, cmap="Greys", vmin=0, vmax=2, origin="lower")
-    step = max(1, len(drives) // 8)
-    panel.set_yticks(
-        range(0, len(drives), step), [f"{a},{b}" for a, b in drives[::step]], fontsize=8
-    )
-    step = max(1, len(pairs) // 8)
-    panel.set_xticks(range(0, len(pairs), step), [f"{a},{b}" for a, b in pairs[::step]], fontsize=8)
-    panel.set(
-        xlabel="measuring pair",
-        ylabel="drive pair",
-        title="Gain of each channel (grey: not trusted)",
-    )
+    for set_ticks, named in ((panel.set_yticks, drives), (panel.set_xticks, pairs)):
+        step = max(1, len(named) // 8)
+        texts = [f"{a},{b}" for a, b in named[::step]]
+        set_ticks(range(0, len(named), step), texts, fontsize=8)
+    panel.set(xlabel="measuring pair", ylabel="drive pair")
+    panel.set_title("Gain of each channel (grey: not trusted)")
     figure.colorbar(shown, ax=panel, label="% from expected")
 
 
@@ -99,11 +79,8 @@ def _reciprocity(panel: Any, case: Case) -> None:
     pairs = case.frames.protocol.reciprocal_pairs()
     both = pairs.second >= 0
     first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
-    panel.set(
-        xlabel="voltage of a channel, mV",
-        ylabel="mV",
-        title="Reciprocity: difference within each pair",
-    )
+    panel.set(xlabel="voltage of a channel, mV", ylabel="mV")
+    panel.set_title("Reciprocity: difference within each pair")
     if not len(first):
         panel.text(0.5, 0.5, "no reciprocal channels", transform=panel.transAxes, ha="center")
         return
@@ -120,14 +97,10 @@ def _noise_or_change(panel: Any, case: Case) -> None:
     if len(quiet) >= MIN_QUIET:
         noise = 1e6 * channel_noise(np.nan_to_num(quiet))
         panel.semilogy(np.maximum(noise, 1e-6), ".", color=MEASURED, markersize=4)
-        panel.axhline(
-            float(np.median(noise[case.trusted])) if case.trusted.any() else 0.0, color=EXPECTED
-        )
-        panel.set(
-            xlabel="channel",
-            ylabel="µV",
-            title=f"Noise over {len(quiet)} quiet frames (line: median)",
-        )
+        median = float(np.median(noise[case.trusted])) if case.trusted.any() else 0.0
+        panel.axhline(median, color=EXPECTED)
+        panel.set(xlabel="channel", ylabel="µV")
+        panel.set_title(f"Noise over {len(quiet)} quiet frames (line: median)")
         return
     panel.set(xlabel="channel", ylabel="mV", title="Change of each frame from the quiet one")
     for frame in case.frames.voltage_v[:20]:

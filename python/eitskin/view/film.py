@@ -32,11 +32,7 @@ def check_film(path: str | Path | None) -> None:
 
 
 def load_pillow() -> Any:
-    """pillow's images.
-
-    Raises:
-        MissingExtraError: it is not installed; matplotlib brings it.
-    """
+    """pillow's images."""
     try:
         import PIL.Image
     except ImportError:

@@ -19,21 +19,21 @@ def true_marks(frames: Frames, number: int) -> tuple[Mark, ...]:
     """The true touches of frame ``number``; their change is drawn by sign."""
     if frames.touch_xy_mm is None or frames.touch_radius_mm is None:
         return ()
-    signs = frames.touch_sign
+    own, signs = frames.touches_in(number), frames.touch_sign
+    sizes = [None] * len(own) if signs is None else signs[own].astype(float).tolist()
+    places, radii = frames.touch_xy_mm[own].tolist(), frames.touch_radius_mm[own].tolist()
     return tuple(
-        Mark(
-            float(frames.touch_xy_mm[i, 0]),
-            float(frames.touch_xy_mm[i, 1]),
-            float(frames.touch_radius_mm[i]),
-            None if signs is None else float(signs[i]),
-        )
-        for i in frames.touches_in(number)
+        Mark(x, y, radius, size) for (x, y), radius, size in zip(places, radii, sizes, strict=True)
     )
 
 
 def found_marks(result: Reconstruction) -> tuple[Mark, ...]:
     """What was found."""
     return tuple(map(found_mark, result.touches))
+
+
+def _panel(heading: str, frames: Frames, number: int, result: Reconstruction) -> Panel:
+    return Panel(heading, result.image, true_marks(frames, number), found_marks(result))
 
 
 def draw_results(
@@ -51,10 +51,9 @@ def draw_results(
     for number, result in list(results.items())[:MAX_PANELS]:
         heading = frames.frame_name[number]
         if number in scores:
-            heading += (
-                f"\nMIoU {scores[number].miou_image:.2f}, touches {scores[number].miou_touches:.2f}"
-            )
-        panels.append(Panel(heading, result.image, true_marks(frames, number), found_marks(result)))
+            score = scores[number]
+            heading += f"\nMIoU {score.miou_image:.2f}, touches {score.miou_touches:.2f}"
+        panels.append(_panel(heading, frames, number, result))
     more = len(results) > MAX_PANELS
     note = f"the first {MAX_PANELS} of {len(results)} frames" if more else ""
     draw_panels(path, model.skin, model.grid, panels, title=title, note=note, legend=True)
@@ -71,15 +70,7 @@ def film_results(
     """Image, true and found touches frame by frame, in the frames' time, or ten a second where they
     have none."""
     kept = [list(results)[k] for k in thinned(len(results))]
-    panels = [
-        Panel(
-            frames.frame_name[number],
-            results[number].image,
-            true_marks(frames, number),
-            found_marks(results[number]),
-        )
-        for number in kept
-    ]
+    panels = [_panel(frames.frame_name[k], frames, k, results[k]) for k in kept]
     times = frames.time_s
     shown = [0.1 * k if times is None else float(times[k]) for k in kept]
     draw_film(path, model, panels, shown, progress=progress)

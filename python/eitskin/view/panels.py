@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,11 +80,7 @@ class Page:
 def check_path(
     path: str | Path | None, formats: Sequence[str] = FORMATS, what: str = "picture"
 ) -> None:
-    """Refuse a picture's name that says no format, before anything is done for it.
-
-    Raises:
-        UsageError: naming the formats.
-    """
+    """Refuse a picture's name that says no format, before anything is done for it."""
     if path is not None and Path(path).suffix.lower() not in formats:
         suffix = Path(path).suffix
         said = f"{suffix!r} is no format of a {what}" if suffix else f"a {what} needs a suffix"
@@ -193,7 +189,7 @@ def panels_figure(
     figure = _figure(page)
     for k, (panel, place) in enumerate(zip(panels, places, strict=True)):
         axes = _axes(figure, page, place)
-        shown = _titled(panel, headings[k])
+        shown = replace(panel, title=plain(headings[k]))
         colours = draw_panel(axes, skin, grid, shown, limit=limit, small=small)
         _axis_labels(axes, small, k % columns == 0)
     if coloured:
@@ -229,13 +225,12 @@ def frame_figure(
     label = "\n".join(wrapped(f"change of conductivity ({unit})", cell.whole - GAP, 9))
     lines = label.count("\n") + 1
     left, places = (width - columns * cell.whole) / 2, []
-    for row in range(math.ceil(len(panels) / columns)):
+    for _ in range(math.ceil(len(panels) / columns)):
         page.height += GAP + LINE * 10 / 8.5
-        for k in range(columns if columns > 1 else 1):
+        for k in range(columns):
             x = left + k * cell.whole + cell.left
             places.append((x, page.height, cell.width, cell.height))
         page.height += cell.height + cell.below + GAP + BAR + TICKS + lines * LINE * 9 / 8.5
-        del row
     figure = _figure(page)
     for k, (panel, place) in enumerate(zip(panels, places, strict=True)):
         axes = _axes(figure, page, place)
@@ -287,10 +282,6 @@ def _heading(title: str, cell: Cell, size: float) -> str:
     return "\n".join(lines)
 
 
-def _titled(panel: Panel, heading: str) -> Panel:
-    return Panel(plain(heading), panel.values, panel.truth, panel.found, panel.fill_truth)
-
-
 def _figure(page: Page) -> Figure:
     matplotlib = load_matplotlib()
     page.height += EDGE
@@ -310,10 +301,10 @@ def _axes(figure: Figure, page: Page, place: tuple[float, float, float, float]) 
     left, top, width, height = place
     bottom = page.height - top - height
     matplotlib = load_matplotlib()
+    whole = (page.width, page.height)
+    share = [size / whole[k % 2] for k, size in enumerate((left, bottom, width, height))]
     with matplotlib.rc_context(STYLE):
-        return figure.add_axes(
-            (left / page.width, bottom / page.height, width / page.width, height / page.height)
-        )
+        return figure.add_axes((share[0], share[1], share[2], share[3]))
 
 
 def _axis_labels(axes: Axes, small: bool, first: bool) -> None:

@@ -87,11 +87,7 @@ class Panel:
 
 
 def load_matplotlib() -> Any:
-    """matplotlib, set to draw without a display.
-
-    Raises:
-        MissingExtraError: it is not installed.
-    """
+    """matplotlib, set to draw without a display."""
     try:
         import matplotlib
         import matplotlib.backends.backend_agg
@@ -135,13 +131,10 @@ def draw_panel(
         x0, y0 = grid.origin_mm
         extent = (x0, x0 + grid.nx * grid.pixel_mm, y0, y0 + grid.ny * grid.pixel_mm)
         shown = grid.image(values / largest(values) if limit is None else values)
-        colour: dict[str, Any] = {
-            "cmap": COLOURS,
-            "vmin": -scale,
-            "vmax": scale,
-            "interpolation": "nearest",
-        }
-        picture = axes.imshow(shown, origin="lower", extent=extent, zorder=1, **colour)
+        colour: dict[str, Any] = {"cmap": COLOURS, "vmin": -scale, "vmax": scale, "zorder": 1}
+        picture = axes.imshow(
+            shown, origin="lower", extent=extent, interpolation="nearest", **colour
+        )
         picture.set_clip_path(sheet)
     most = largest([m.change or 0.0 for m in panel.truth])
     for mark in panel.truth:
@@ -149,15 +142,8 @@ def draw_panel(
         if panel.fill_truth and mark.change is not None:
             part = mark.change / most if limit is None else mark.change / limit
             face = colour_map(0.5 + 0.5 * part)
-        _circle(
-            axes,
-            mark,
-            mark.radius_mm or 2.0,
-            facecolor=face,
-            edgecolor=TRUE,
-            linewidth=0.9,
-            zorder=3,
-        )
+        circle = {"facecolor": face, "edgecolor": TRUE, "linewidth": 0.9, "zorder": 3}
+        _circle(axes, mark, mark.radius_mm or 2.0, **circle)
     size, width = (3.5, 0.9) if small else (8.0, 1.6)
     halo = [withStroke(linewidth=width + 1.6, foreground="white")]
     for mark in panel.found:
@@ -168,13 +154,10 @@ def draw_panel(
             _place_ellipse(axes, mark, mark.place_mm2, edgecolor=FOUND, zorder=4, **ellipse)
         if mark.radius_mm is not None:
             dashes = {"linestyle": (0, (3, 2)), "linewidth": width, "path_effects": halo}
-            _shape(
-                axes, mark, mark.radius_mm, facecolor="none", edgecolor=FOUND, zorder=4, **dashes
-            )
-    width = 0.7 if small else 1.2
-    axes.add_patch(
-        Polygon(rim, closed=True, facecolor="none", edgecolor=RIM, linewidth=width, zorder=2)
-    )
+            dashes |= {"facecolor": "none", "edgecolor": FOUND, "zorder": 4}
+            _shape(axes, mark, mark.radius_mm, **dashes)
+    line = {"facecolor": "none", "edgecolor": RIM, "linewidth": 0.7 if small else 1.2}
+    axes.add_patch(Polygon(rim, closed=True, zorder=2, **line))
     _draw_electrodes(axes, skin, small)
     axes.set_title(panel.title, fontsize=8 if small else 10)
     return colours
@@ -221,9 +204,7 @@ def _draw_electrodes(axes: Axes, skin: Skin, small: bool) -> None:
     margin = SMALL_MARGIN if small else MARGIN
     for k, (start, end) in enumerate(skin.electrode_spans_mm()):
         along = outline.points_at(np.linspace(start, end, 9))
-        axes.plot(
-            along[:, 0], along[:, 1], color=ELECTRODE, linewidth=1.6 if small else 4.0, zorder=5
-        )
+        axes.plot(*along.T, color=ELECTRODE, linewidth=1.6 if small else 4.0, zorder=5)
         if not small:
             outward = np.array([along[5, 1] - along[3, 1], along[3, 0] - along[5, 0]])
             x, y = along[4] + 0.055 * size * outward / max(float(np.hypot(*outward)), 1e-9)

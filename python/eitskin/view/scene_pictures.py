@@ -26,20 +26,14 @@ def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(9.6, 4.9), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-        draw_panel(
-            left, scene.skin, grid_for(scene.skin.outline), Panel("touches, coloured by time")
-        )
+        panel = Panel("touches, coloured by time")
+        draw_panel(left, scene.skin, grid_for(scene.skin.outline), panel)
         _draw_touches(left, scene)
         left.set_ylabel("y (mm)")
         _draw_voltages(figure, right, scene, frames)
         named = ", ".join(scene.effects) or "none; ideal electrodes, no noise"
-        figure.suptitle(
-            f"{scene.name}: {scene.description}",
-            fontsize=10.5,
-            fontweight="bold",
-            color=INK,
-            wrap=True,
-        )
+        title = f"{scene.name}: {scene.description}"
+        figure.suptitle(title, fontsize=10.5, fontweight="bold", color=INK, wrap=True)
         figure.supxlabel(f"effects: {named}", fontsize=8, color=INK)
         save_picture(figure, path)
 
@@ -60,13 +54,9 @@ def _draw_touches(axes: "Axes", scene: Scene) -> None:
         for k in there[np.unique(np.linspace(0, len(there) - 1, MAX_OUTLINES).round().astype(int))]:
             colour = colours(k / max(scene.frames - 1, 1))
             press = 0.15 + 0.85 * abs(float(one.contrast[k]) - 1) / most
-            style: dict[str, Any] = {
-                "facecolor": "none",
-                "edgecolor": colour,
-                "linewidth": 1.6,
-                "alpha": press,
-            }
-            axes.add_patch(Circle((one.x_mm[k], one.y_mm[k]), one.radius_mm[k], zorder=4, **style))
+            circle = Circle((one.x_mm[k], one.y_mm[k]), one.radius_mm[k], fill=False, zorder=4)
+            circle.set(edgecolor=colour, linewidth=1.6, alpha=press)
+            axes.add_patch(circle)
 
 
 def _draw_voltages(figure: Any, axes: "Axes", scene: Scene, frames: Frames) -> None:
@@ -77,15 +67,9 @@ def _draw_voltages(figure: Any, axes: "Axes", scene: Scene, frames: Frames) -> N
     times = scene.times_s()
     extent = (float(times[0]) - half, float(times[-1]) + half, -0.5, change.shape[1] - 0.5)
     image = axes.imshow(
-        change.T,
-        aspect="auto",
-        origin="lower",
-        extent=extent,
-        cmap="RdBu_r",
-        vmin=-limit,
-        vmax=limit,
-        interpolation="nearest",
-    )
+        change.T, "RdBu_r", aspect="auto", origin="lower", extent=extent,
+        vmin=-limit, vmax=limit, interpolation="nearest",
+    )  # fmt: skip
     axes.set_xlabel("time (s)")
     axes.set_ylabel("row of the protocol (from 0)")
     axes.set_title("frames minus reference", fontsize=10)

@@ -22,58 +22,35 @@ class Album:
 
     def __init__(self) -> None:
         self._kept: list[ComparedFrame] = []
-        self._step, self._count = 1, 0
+        self._step, self.count = 1, 0  # how many were added
         self._last: ComparedFrame | None = None
 
     def add(self, seen: ComparedFrame) -> None:
-        """Another frame."""
-        if self._count % self._step == 0:
+        if self.count % self._step == 0:
             self._kept.append(seen)
             if len(self._kept) >= MAX_KEPT:
                 self._kept, self._step = self._kept[::2], 2 * self._step
-        self._count += 1
+        self.count += 1
         self._last = seen
 
-    @property
-    def frames(self) -> list[ComparedFrame]:
-        """At most 36, the first and the last among them."""
-        return self.spread(MAX_PANELS)
-
-    def spread(self, most: int) -> list[ComparedFrame]:
+    def spread(self, most: int = MAX_PANELS) -> list[ComparedFrame]:
         """At most ``most`` (up to 360), evenly spaced, the first and the last among them."""
-        kept = (
-            self._kept
-            if self._last is None or self._kept[-1] is self._last
-            else [*self._kept, self._last]
-        )
-        return spread(kept, most)
-
-    @property
-    def count(self) -> int:
-        """How many were added."""
-        return self._count
+        if self._last is None or self._kept[-1] is self._last:
+            return spread(self._kept, most)
+        return spread([*self._kept, self._last], most)
 
 
 def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> None:
     """The album as a PNG: circles are true touches, crosses what was found, dashed circles the
     found touches' sizes."""
-    frames = album.frames
-    if len(frames) == 1:
-        seen = frames[0]
-        values = (
-            np.zeros(model.grid.n_pixels) if seen.frame.image is None else seen.frame.image.image
-        )
-        draw_frame(
-            path,
-            model.skin,
-            model.grid,
-            values,
-            truth=_true_marks(model, seen),
-            found=_found_marks(seen),
-            title=title,
-        )
-        return
+    frames = album.spread()
     panels = [_panel(model, seen) for seen in frames]
+    if len(panels) == 1:
+        one = panels[0]
+        values = np.zeros(model.grid.n_pixels) if one.values is None else one.values
+        skin, grid = model.skin, model.grid
+        draw_frame(path, skin, grid, values, truth=one.truth, found=one.found, title=title)
+        return
     thinned = album.count > len(frames)
     note = f"{len(frames)} of {album.count} frames" if thinned else ""
     draw_panels(path, model.skin, model.grid, panels, title=title, note=note, legend=True)

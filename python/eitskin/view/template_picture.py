@@ -49,9 +49,8 @@ def draw_template(path: Path, skin: Skin, place_mm: FloatArray) -> int:
                 figure = Figure(figsize=tuple(page / MM_PER_INCH))
                 axes = figure.add_axes((*(MARGIN_MM / page), *(room / page)))
                 corner = low + room * (column, down - 1 - row) - (room * (across, down) - size) / 2
-                axes.set(
-                    xlim=(corner[0], corner[0] + room[0]), ylim=(corner[1], corner[1] + room[1])
-                )
+                (left, bottom), (right, top) = corner, corner + room
+                axes.set(xlim=(left, right), ylim=(bottom, top))
                 _draw(axes, skin, place_mm, corner, f"{row * across + column + 1}/{across * down}")
                 figures.append(figure)
         _save(temporary, path.suffix, figures)

@@ -257,7 +257,7 @@ def follow(
             if isinstance(item, Report):
                 told_us -= round(1e6 * half_s)
             if truth.began_us is None:  # a simulated board's scene begins with a scan
-                truth.begin(told_us)
+                truth.began_us = told_us
             began_s = 1e-6 * (told_us - (truth.began_us or 0))
             link_ms = 1e3 * sizes[0] * BITS_A_BYTE / BAUD
             if isinstance(item, Report):

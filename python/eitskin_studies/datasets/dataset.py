@@ -144,10 +144,10 @@ def make_chunk(job: Job, chunk: int, mesh_cache: MeshCache | None = None) -> byt
         values.append([one.draw(job.seed, number) for one in job.ranges.numbers])
         truth = truth_of(compiled, 0)
         rows = [
-            truth.touch_frame,
-            *truth.touch_xy_mm.T,
-            truth.touch_radius_mm,
-            truth.touch_strength,
+            truth["touch_frame"],
+            *truth["touch_xy_mm"].T,
+            truth["touch_radius_mm"],
+            truth["touch_strength"],
         ]
         touches.append(np.column_stack([np.full(len(rows[0]), len(seeds) - 1), *rows]))
     every = np.concatenate(touches)

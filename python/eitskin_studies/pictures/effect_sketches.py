@@ -398,7 +398,8 @@ def saturation(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The limiter's characteristic."""
     from eitskin.scene.effects import saturation as effect
 
-    _transfer(axes, session, effect, parameters, 1.6 * effect.limit_v(parameters, session))
+    limit_v = session.limit_v(parameters.limit_v, parameters.headroom)
+    _transfer(axes, session, effect, parameters, 1.6 * limit_v)
     axes.set_title("clipped")
 
 
@@ -406,7 +407,8 @@ def adc(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The converter's characteristic."""
     from eitskin.scene.effects import adc as effect
 
-    _transfer(axes, session, effect, parameters, 1.2 * effect.range_v(parameters, session))
+    limit_v = session.limit_v(parameters.range_v, parameters.headroom)
+    _transfer(axes, session, effect, parameters, 1.2 * limit_v)
     axes.set_title(f"{parameters.bits} bits")
 
 

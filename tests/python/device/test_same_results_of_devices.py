@@ -11,11 +11,12 @@ import pytest
 from device_helpers import board_info
 
 from eitskin.device import bandwidth, check, known_model
+from eitskin.device.client import check_tare_frames
 from eitskin.device.events import Events
 from eitskin.device.link import LinkEvent
 from eitskin.device.live_frames import LiveFrame, LiveSummary
 from eitskin.device.sample import Sample
-from eitskin.device.settings import ScanSettings, SolverSettings, check_tare_frames
+from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire import explain, link_table
 from eitskin.device.wire import packets as pk
 from eitskin.device.wire.payloads import MalformedPacket, parse

@@ -10,8 +10,7 @@ from scene_helpers import effect_module
 
 from eitskin.config import from_table, number, parameter
 from eitskin.errors import ConfigError
-from eitskin.scene.effect_table import describe_parameters
-from eitskin.scene.registry import BUILT_IN, ENTRY_POINT_GROUP, Registry
+from eitskin.scene.registry import BUILT_IN, ENTRY_POINT_GROUP, Registry, describe_parameters
 
 
 @dataclass(frozen=True)

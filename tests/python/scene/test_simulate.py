@@ -9,12 +9,12 @@ import pytest
 
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import Mesh, mesh_for_elements
+from eitskin.scene.cover import Cover
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch, random_touches
 from eitskin.scene.simulate import (
     Measurement,
     Simulated,
     conductivity_with,
-    element_cover,
     simulate,
 )
 from eitskin.skin.protocol import adjacent
@@ -44,14 +44,14 @@ def scenes_of(*touches: tuple[TrueTouch, ...]) -> TouchSet:
     "touch", [TrueTouch(0, 0, 9, 5), TrueTouch(40.3, -51.7, 6, 3), TrueTouch(2, 80, 12, 8)]
 )
 def test_a_touch_covers_its_area(mesh, touch):
-    elements, part = element_cover(mesh, touch)
+    elements, part = Cover(mesh).of(touch)
     assert part.min() > 0 and 0.5 < part.max() <= 1.0
     covered_mm2 = (part * mesh.areas_mm2[elements]).sum()
     assert covered_mm2 == pytest.approx(math.pi * touch.radius_mm**2, rel=0.01)
 
 
 def test_a_touch_smaller_than_an_element_is_not_lost(mesh):
-    elements, part = element_cover(mesh, TrueTouch(10.0, 3.0, 1.0, 5.0), subdivision=32)
+    elements, part = Cover(mesh, subdivision=32).of(TrueTouch(10.0, 3.0, 1.0, 5.0))
     assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(math.pi, rel=0.1)
     assert part.max() < 0.5
 
@@ -59,7 +59,7 @@ def test_a_touch_smaller_than_an_element_is_not_lost(mesh):
 def test_conductivity_is_the_mean_over_the_element(mesh):
     touch = TrueTouch(20, 10, 9, 5.0)
     sigma = conductivity_with(mesh, [touch], 0.01)
-    elements, part = element_cover(mesh, touch)
+    elements, part = Cover(mesh).of(touch)
     assert sigma[elements] == pytest.approx(0.01 * (1 + 4 * part))
     assert (np.delete(sigma, elements) == 0.01).all()
     both = conductivity_with(mesh, [TrueTouch(20, 10, 12, 5.0), TrueTouch(-40, 0, 12, 0.2)], 0.01)

@@ -75,7 +75,7 @@ def test_touches_that_are_not_looked_for_are_not_missed():
 
 def test_a_moving_touch_is_where_it_is_at_the_boards_time():
     truth = SceneTruth(find_scene("swipe"))
-    truth.begin(2**32 - 500_000)
+    truth.began_us = 2**32 - 500_000
     times = np.linspace(0, 1.95, 40)
     found = [truth.touches(int(2**32 - 500_000 + 1e6 * t) % 2**32) for t in times]
     x = np.array([one[0].x_mm for one in found if one])

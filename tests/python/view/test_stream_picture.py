@@ -39,7 +39,7 @@ def test_pictures(count, tmp_path):
 
 def test_a_long_stream_is_thinned_and_its_last_frame_kept():
     long = album(5 * MAX_KEPT + 3)
-    numbers = [one.frame.number for one in long.frames]
+    numbers = [one.frame.number for one in long.spread()]
     assert len(numbers) == MAX_PANELS and numbers[0] == 0 and numbers[-1] == 5 * MAX_KEPT + 2
     assert len(long._kept) < MAX_KEPT and long.count == 5 * MAX_KEPT + 3
     steps = np.diff(numbers)

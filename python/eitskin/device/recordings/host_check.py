@@ -48,16 +48,13 @@ class HostCheck:
 
     @property
     def compared(self) -> int:
-        """Frames."""
         return self.same + len(self.different)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         wrong = bool(self.different) or self.drives_different > 0
         return asdict(self) | {"same_bits": self.compared > 0 and not wrong}
 
     def text(self) -> str:
-        """In a line."""
         if not self.compared:
             line = "same bits: not told; no frame could be compared"
         elif self.different:
@@ -76,11 +73,7 @@ class HostCheck:
 
 
 class HostTwin:
-    """This host's core, kept in step with a board's; with ``board`` also touches after drives.
-
-    Raises:
-        UsageError: an option is out of range.
-    """
+    """This host's core, kept in step with a board's; with ``board`` also touches after drives."""
 
     def __init__(self, known: KnownModel, options: Options, board: BoardInfo | None = None) -> None:
         self._core = Reconstructor(known.model, blob=known.blob, options=options)
@@ -177,22 +170,15 @@ class HostTwin:
         if self._drives is not None and aligned is not None:
             result = self._drives.found(result)
         assert frame.solved is not None
-        same, difference = (
-            frame.refused is None
-            and same_diagnostics(result.info, raw, frame.solved, self._core.options),
-            1.0,
-        )
+        options, difference = self._core.options, 1.0
+        same = frame.refused is None and same_diagnostics(result.info, raw, frame.solved, options)
         if same and frame.image is not None:
-            same, difference = (
-                same_bits(result.image, frame.image.image),
-                _difference(result.image, frame.image.image),
-            )
+            same = same_bits(result.image, frame.image.image)
+            difference = _difference(result.image, frame.image.image)
         touched = frame.touches is None or same_touches(result.touches, frame.touches.touches)
         touched = self._same_events(frame) and touched
-        if same and not touched:
-            self._count(frame, False, difference, self._from_before or self._tracks)
-        else:
-            self._count(frame, same, difference, self._from_before)
+        from_before = self._from_before or (same and not touched and self._tracks)
+        self._count(frame, same and touched, difference, from_before)
         return result
 
     def _same_events(self, frame: LiveFrame) -> bool:
@@ -228,12 +214,9 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
     options = recorded_options(path)
     with Device(FileTransport(path)) as device:
         known = need_model(device.board, model, str(path), "the comparison")
-        twin = HostTwin(
-            known,
-            board_options(known.model, device.board) if options is None else options,
-            device.board,
-        )
-        return (twin.follow(follow(device, recorded_kinds(path))), options is not None)
+        used = board_options(known.model, device.board) if options is None else options
+        twin = HostTwin(known, used, device.board)
+        return twin.follow(follow(device, recorded_kinds(path))), options is not None
 
 
 def same_bits(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> bool:
@@ -249,19 +232,14 @@ def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
 def same_diagnostics(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
     """Whether this host's core found in a frame what the board says of it. Rows that the converter
     saturated are no numbers to the core: the quality of the raw frame tells them."""
-    lost = int(
-        np.count_nonzero(raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED)
-    )
-    saturated = 1 << DIAGNOSTICS.index("saturated") if lost else 0
-    here = (
-        info.diagnostics | (saturated & options.diagnostics),
-        info.saturated + lost,
-        info.outliers,
-    )
-    electrodes = info.open_electrodes, info.bridged_electrodes, info.noisy_electrodes
-    return (here, electrodes) == (
-        (solved.diagnostics, solved.saturated, solved.outliers),
-        (solved.open_electrodes, solved.bridged_electrodes, solved.noisy_electrodes),
+    only_saturated = raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED
+    lost = int(np.count_nonzero(only_saturated))
+    saturated = options.diagnostics & 1 << DIAGNOSTICS.index("saturated") if lost else 0
+    same = ("outliers", "open_electrodes", "bridged_electrodes", "noisy_electrodes")
+    return (
+        info.diagnostics | saturated == solved.diagnostics
+        and info.saturated + lost == solved.saturated
+        and all(getattr(info, name) == getattr(solved, name) for name in same)
     )
 
 

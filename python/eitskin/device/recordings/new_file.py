@@ -17,11 +17,7 @@ SYNC_S = 1.0
 
 class RecordingFile:
     """A new file at ``path`` that begins with ``first``; ``overwrite`` replaces a recording that is
-    there, but only once the new one has begun. What is no regular file is written into.
-
-    Raises:
-        FileError: the file exists, another process records to it, or it cannot be written.
-    """
+    there, but only once the new one has begun. What is no regular file is written into."""
 
     def __init__(self, path: Path, first: bytes, *, overwrite: bool) -> None:
         self._path = path
@@ -62,11 +58,6 @@ class RecordingFile:
             raise
 
     def write(self, data: bytes) -> None:
-        """Append ``data``.
-
-        Raises:
-            FileError: the disk is full, or the file is gone or closed.
-        """
         try:
             written = self._file.write(data)
         except (OSError, ValueError) as error:

@@ -32,7 +32,6 @@ class PacketLog:
         device.link.begin_tap(lambda sequence: None, self._tap)
 
     def stop(self) -> None:
-        """Keep no more."""
         self._device.link.end_tap(self._tap)
 
     def frames(self, what: Stream) -> Iterator[Item]:

@@ -32,11 +32,7 @@ class RawRun:
 
 
 def collect(device: Device, frames: int) -> RawRun:
-    """The next ``frames`` raw frames of a board.
-
-    Raises:
-        DeviceError: as ``Device.stream``; or none came.
-    """
+    """The next ``frames`` raw frames of a board."""
     run = gather(follow(device, Stream.RAW, frames=frames))
     if not run.frames:
         raise DeviceError(
@@ -66,11 +62,7 @@ def gather(items: Iterable[Item]) -> RawRun:
 
 def finite_only(frames: Frames, where: str) -> tuple[Frames, int]:
     """``frames`` without those that have a row which could not be measured, and how many these
-    were.
-
-    Raises:
-        FrameError: none are left, or no quiet ones.
-    """
+    were."""
     good = np.asarray(np.isfinite(frames.voltage_v).all(axis=1))
     quiet = np.asarray(np.isfinite(frames.reference_voltage_v).all(axis=1))
     if not good.any() or not quiet.any():
@@ -104,12 +96,7 @@ def as_frames(
     *,
     allow_nonfinite: bool = False,
 ) -> Frames:
-    """The frames, named by their numbers on the board and timed by its clock.
-
-    Raises:
-        FrameError: a voltage is not finite (unless ``allow_nonfinite``), or there are no quiet
-            frames.
-    """
+    """The frames, named by their numbers on the board and timed by its clock."""
     if not quiet:
         raise FrameError("there is no quiet frame, and images are made of what differs from them")
     rows = protocol.n_rows

@@ -147,12 +147,7 @@ class FileTransport:
 
 
 def read_head(path: str | Path) -> dict[str, Any]:
-    """What the recording in ``path`` says of itself.
-
-    Raises:
-        FileError: it cannot be read, or is no recording.
-        DeviceError: it is of a newer version, or its packets are of another version of the link.
-    """
+    """What the recording in ``path`` says of itself."""
     try:
         with Path(path).open("rb") as stream:
             data = stream.read(MAX_HEAD)
@@ -250,11 +245,7 @@ def recorded_options(path: str | Path) -> Options | None:
 
 
 def recorded_kinds(path: str | Path) -> Stream:
-    """The kinds of packets of frames that the recording holds.
-
-    Raises:
-        FileError: it cannot be read.
-    """
+    """The kinds of packets of frames that the recording holds."""
     kinds, decoder = Stream(0), Decoder()
     try:
         with Path(path).open("rb") as stream:

@@ -3,13 +3,13 @@ packet counted."""
 
 import zlib
 from collections import deque
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 from eitskin.core.engine import load_core
 from eitskin.device.wire.link_table import LINK_MAX_PAYLOAD, PacketType
-from eitskin.device.wire.sequence import LATE_IN_A_ROW, SequenceCheck
+from eitskin.device.wire.sequence import LATE_IN_A_ROW, LinkCounters, SequenceCheck
 from eitskin.errors import DeviceError
 
 
@@ -24,61 +24,18 @@ class Packet:
     lost: int = 0
 
 
-@dataclass
-class LinkCounters:
-    """What came over a link, counted since it was opened.
-
-    ``skipped_bytes`` came before the first delimiter, ``malformed`` had a right checksum but a
-    payload that is not of its type, ``missing`` packets lie in ``gaps`` gaps (as far as numbers
-    tell), ``duplicates`` and ``stale`` (late) packets were refused, ``dropped`` were left out by
-    the host's own queue because nobody fetched them, ``lines_skipped`` of another instrument were
-    no frames.
-    """
-
-    bytes: int = 0
-    skipped_bytes: int = 0
-    packets: int = 0
-    crc_errors: int = 0
-    framing_errors: int = 0
-    overruns: int = 0
-    version_errors: int = 0
-    malformed: int = 0
-    gaps: int = 0
-    missing: int = 0
-    duplicates: int = 0
-    stale: int = 0
-    restarts: int = 0
-    reconnects: int = 0
-    dropped: int = 0
-    lines_skipped: int = 0
-
-    def as_dict(self) -> dict[str, int]:
-        """For JSON."""
-        return asdict(self)
-
-
 @cache
 def _core() -> Any:
     return load_core("float32")
 
 
 def encode(packet_type: int, sequence: int, payload: bytes) -> bytes:
-    """The packet's bytes on the wire.
-
-    Raises:
-        DeviceError: the payload is longer than a packet may be.
-    """
+    """The packet's bytes on the wire."""
     module = _core()
     buffer = module.ffi.new("uint8_t[]", len(payload) + len(payload) // 254 + 32)
+    number, nothing = sequence % 2**32, module.ffi.NULL
     size = module.lib.eits_link_encode(
-        buffer,
-        len(buffer),
-        packet_type,
-        sequence % 2**32,
-        payload,
-        len(payload),
-        module.ffi.NULL,
-        0,
+        buffer, len(buffer), packet_type, number, payload, len(payload), nothing, 0
     )
     if not size:
         raise DeviceError(
@@ -101,16 +58,18 @@ class Decoder:
         room = int(self._lib.EITS_LINK_MAX_PACKET)
         self._buffer = self._ffi.new("uint64_t[]", (room + 7) // 8)
         self._state = self._ffi.new("eits_link_decoder *")
-        status = self._lib.eits_link_decoder_init(
-            self._state, self._ffi.cast("uint8_t *", self._buffer), room
-        )
-        assert status == 0
+        self._begin(room)
         self._packet = self._ffi.new("eits_link_packet *")
         self.counters = LinkCounters() if counters is None else counters
-        self._before = self._counted()
-        self._skipping = True
         self._sequence = SequenceCheck(self.counters)
         self._late: deque[Packet] = deque(maxlen=LATE_IN_A_ROW)
+
+    def _begin(self, room: int) -> None:
+        buffer = self._ffi.cast("uint8_t *", self._buffer)
+        status = self._lib.eits_link_decoder_init(self._state, buffer, room)
+        assert status == 0
+        self._before = self._counted()
+        self._skipping = True
 
     @property
     def other_version(self) -> int | None:
@@ -120,12 +79,7 @@ class Decoder:
     def link_lost(self) -> None:
         """The line was cut: what is half received is no error, and any packet may come next; it
         will count as one gap."""
-        status = self._lib.eits_link_decoder_init(
-            self._state, self._ffi.cast("uint8_t *", self._buffer), self._state.room
-        )
-        assert status == 0
-        self._before = self._counted()
-        self._skipping = True
+        self._begin(self._state.room)
         self._sequence.link_lost()
 
     def forget_sequence(self) -> None:

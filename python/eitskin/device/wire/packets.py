@@ -28,23 +28,15 @@ from eitskin.device.wire.link_table import (
     StatsPacket,
 )
 
-# faults that frames show, and that go after CLEAR_FRAMES; of those of an electrode each has its own
-FOUND_FAULTS = frozenset(
-    (FaultCode.ELECTRODE_OPEN, FaultCode.SATURATED, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY,
-    FaultCode.MODEL_MISMATCH,
-     FaultCode.STALE_REFERENCE, FaultCode.UNLIKE_MODEL)
-)  # fmt: skip
-DOUBTFUL_FAULTS = frozenset(
-    (
-        FaultCode.ELECTRODE_NOISY,
-        FaultCode.MODEL_MISMATCH,
-        FaultCode.STALE_REFERENCE,
-        FaultCode.UNLIKE_MODEL,
-    )
-)  # rise after RAISE_FRAMES
 ELECTRODE_FAULTS = frozenset(
     (FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY)
 )
+DOUBTFUL_FAULTS = frozenset(  # rise after RAISE_FRAMES
+    FaultCode[name]
+    for name in ("ELECTRODE_NOISY", "MODEL_MISMATCH", "STALE_REFERENCE", "UNLIKE_MODEL")
+)
+# faults that frames show, and that go after CLEAR_FRAMES; of those of an electrode each has its own
+FOUND_FAULTS = ELECTRODE_FAULTS | DOUBTFUL_FAULTS | {FaultCode.SATURATED}
 
 
 @dataclass(frozen=True)
@@ -101,7 +93,6 @@ class BoardInfo(InfoPacket):
         return Drive(self.drive).name.lower() if self.drive in list(Drive) else str(self.drive)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         values = asdict(self) | {
             "firmware": self.firmware_text,
             "protocol_hash": f"{self.protocol_hash:016x}",
@@ -214,7 +205,6 @@ class BoardStats(StatsPacket):
     """The board's counters; ``stages`` by ``STAGES``."""
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         return asdict(self)
 
 

@@ -56,7 +56,6 @@ def _read_text(values: Sequence[Any]) -> str:
 
 
 def _read_electrodes(values: Sequence[Any]) -> tuple[int, ...]:
-    """The places of the bits that are set."""
     word = values[0]
     return tuple(bit for bit in range(64) if word >> bit & 1) if word else ()
 
@@ -92,11 +91,7 @@ AnyPayload = TypeVar("AnyPayload", bound=Payload)
 
 
 def unpack(kind: type[AnyPayload], payload: bytes, what: str, *, more: bool = False) -> AnyPayload:
-    """The fields at the start of ``payload``; without ``more`` nothing may follow.
-
-    Raises:
-        MalformedPacket: it has another length, or a field a value that is not known.
-    """
+    """The fields at the start of ``payload``; without ``more`` nothing may follow."""
     layout = kind.LAYOUT
     if len(payload) < layout.size or (len(payload) > layout.size and not more):
         raise MalformedPacket(f"{what}: {len(payload)} bytes, not {layout.size}")

@@ -6,7 +6,7 @@ since that INFO may itself be a duplicate, the packet after it decides.
 """
 
 from collections import OrderedDict
-from typing import Protocol
+from dataclasses import asdict, dataclass
 
 WRAP = 2**32
 AHEAD = 2**31
@@ -14,14 +14,36 @@ REMEMBERED = 256
 LATE_IN_A_ROW = 8
 
 
-class SequenceCounters(Protocol):
-    """Where ``SequenceCheck`` counts; ``codec.LinkCounters`` is one."""
+@dataclass
+class LinkCounters:
+    """What came over a link, counted since it was opened.
 
-    gaps: int
-    missing: int
-    duplicates: int
-    stale: int
-    restarts: int
+    ``skipped_bytes`` came before the first delimiter, ``malformed`` had a right checksum but a
+    payload that is not of its type, ``missing`` packets lie in ``gaps`` gaps (as far as numbers
+    tell), ``duplicates`` and ``stale`` (late) packets were refused, ``dropped`` were left out by
+    the host's own queue because nobody fetched them, ``lines_skipped`` of another instrument were
+    no frames.
+    """
+
+    bytes: int = 0
+    skipped_bytes: int = 0
+    packets: int = 0
+    crc_errors: int = 0
+    framing_errors: int = 0
+    overruns: int = 0
+    version_errors: int = 0
+    malformed: int = 0
+    gaps: int = 0
+    missing: int = 0
+    duplicates: int = 0
+    stale: int = 0
+    restarts: int = 0
+    reconnects: int = 0
+    dropped: int = 0
+    lines_skipped: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        return asdict(self)
 
 
 class SequenceCheck:
@@ -31,12 +53,11 @@ class SequenceCheck:
     the last one judged were of a new life after all.
     """
 
-    def __init__(self, counters: SequenceCounters) -> None:
+    def __init__(self, counters: LinkCounters) -> None:
         self._counters = counters
         self._next: int | None = None
-        self._after_restart: int | None = (
-            None  # the next number, if the last INFO with request 0 was no duplicate
-        )
+        # the next number, if the last INFO with request 0 was no duplicate
+        self._after_restart: int | None = None
         self._cut = False
         self._seen: OrderedDict[int, int] = OrderedDict()
         self._late_run, self._late_next = 0, 0

@@ -36,7 +36,6 @@ class Case:
 
     @property
     def n_electrodes(self) -> int:
-        """The number of electrodes."""
         return self.frames.protocol.n_electrodes
 
     @property

@@ -26,36 +26,27 @@ def check_clipping(case: Case) -> tuple[Case, CheckOutcome]:
     if len(channels):
         names = [case.frames.frame_name[k] for k in np.flatnonzero(railed[quiet:].any(axis=1))]
         levels = sorted({float(value) for value in frames[railed]})
-        findings.append(
-            Finding(
-                "saturated",
-                FAULT,
-                f"{len(channels)} channel(s) stand at a rail: lower the gain or the current",
-                {
-                    "channels": numbers(channels),
-                    "rail_v": (
-                        [levels[0]] if levels[-1] - levels[0] < 1e-6 else [levels[0], levels[-1]]
-                    ),
-                    "readings": int(railed.sum()),
-                    "in_quiet_frames": int(railed[:quiet].sum()),
-                    "frames": names,
-                },
-                channel_remedy(case, channels),
-            )
-        )
+        text = f"{len(channels)} channel(s) stand at a rail: lower the gain or the current"
+        one_rail = levels[-1] - levels[0] < 1e-6
+        evidence = {
+            "channels": numbers(channels),
+            "rail_v": levels[:1] if one_rail else [levels[0], levels[-1]],
+            "readings": int(railed.sum()),
+            "in_quiet_frames": int(railed[:quiet].sum()),
+            "frames": names,
+        }
+        remedy = channel_remedy(case, channels)
+        findings.append(Finding("saturated", FAULT, text, evidence, remedy))
         trusted = trusted & ~railed[:quiet].any(axis=0)
     stuck = _stuck(case.frames.reference_voltage_v) & ~railed.any(axis=0)
     if stuck.any():
-        findings.append(
-            Finding(
-                "stuck",
-                FAULT,
-                f"{int(stuck.sum())} channel(s) read exactly the same in all {quiet} quiet frames"
-                " while others vary",
-                {"channels": numbers(np.flatnonzero(stuck))},
-                channel_remedy(case, np.flatnonzero(stuck)),
-            )
+        found = numbers(np.flatnonzero(stuck))
+        text = (
+            f"{len(found)} channel(s) read exactly the same in all {quiet} quiet frames while"
+            " others vary"
         )
+        remedy = channel_remedy(case, found)
+        findings.append(Finding("stuck", FAULT, text, {"channels": found}, remedy))
         trusted = trusted & ~stuck
     return replace(case, trusted=trusted), CheckOutcome(tuple(findings))
 
@@ -79,9 +70,8 @@ def at_rail(frames: FloatArray) -> BoolArray:
             continue
         hits = values >= limit - SAME * top
         rest = values[(values > top / 2) & ~hits]
-        usual = (
-            rest.size / max(len(np.unique(np.round(rest / (SAME * top)))), 1) if rest.size else 1.0
-        )
+        different = len(np.unique(np.round(rest / (SAME * top))))
+        usual = rest.size / different if rest.size else 1.0
         channels = int(hits.any(axis=0).sum())
         if hits.sum() >= max(MIN_TIES, TIES_PER_USUAL * usual) and (
             rest.size or channels < frames.shape[1]

@@ -24,8 +24,7 @@ from eitskin.frames.homogeneous import homogeneous
 
 RENUMBER_FIRST = (
     "how to repair what has an electrode's or a channel's number here: renumber by import first,"
-    " then"
-    " examine again"
+    " then examine again"
 )
 
 
@@ -55,10 +54,9 @@ def examine_case(subject: Subject) -> tuple[Report, Case]:
     case, clipping = check_clipping(case)
     case, wiring = check_wiring(case)
     if case.joined:
-        untold = CheckOutcome(
-            untold=("gains, single channels and numbering: part the joined electrodes first",)
-        )
-        outcomes += [sign, clipping, wiring, check_reciprocity(case), check_noise(case), untold]
+        text = "gains, single channels and numbering: part the joined electrodes first"
+        outcomes += [sign, clipping, wiring, check_reciprocity(case), check_noise(case)]
+        outcomes.append(CheckOutcome(untold=(text,)))
         return _report(subject, case, outcomes), case
     resemblance = check_resemblance(case)
     if resemblance.findings:
@@ -67,17 +65,8 @@ def examine_case(subject: Subject) -> tuple[Report, Case]:
     case, flips = check_flips(case)
     lost = check_lost(case)
     case, gain = check_gain(case)
-    outcomes += [
-        sign,
-        clipping,
-        wiring,
-        lost,
-        flips,
-        gain,
-        resemblance,
-        check_reciprocity(case),
-        check_noise(case),
-    ]
+    outcomes += [sign, clipping, wiring, lost, flips, gain, resemblance]
+    outcomes += [check_reciprocity(case), check_noise(case)]
     outcomes.append(check_orientation(case, numbering.untold))
     outcomes.append(check_level(case) if subject.stand_in else check_unit(case, subject.unit_known))
     return _report(subject, case, outcomes), case
@@ -86,14 +75,8 @@ def examine_case(subject: Subject) -> tuple[Report, Case]:
 def _case(frames: Frames, subject: Subject) -> Case:
     rows = np.asarray(frames.protocol.drive_measure, dtype=np.int64)
     prediction = subject.stand_in or homogeneous(subject.skin, frames.protocol.n_electrodes)
-    return Case(
-        frames,
-        subject.skin,
-        prediction,
-        prediction.transfer_ohm,
-        rows,
-        np.ones(len(rows), dtype=bool),
-    )
+    trusted = np.ones(len(rows), dtype=bool)
+    return Case(frames, subject.skin, prediction, prediction.transfer_ohm, rows, trusted)
 
 
 def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> Report:

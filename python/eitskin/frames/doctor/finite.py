@@ -18,20 +18,16 @@ def check_finite(case: Case) -> tuple[Case, CheckOutcome]:
     findings = []
     if len(channels):
         names = [case.frames.frame_name[k] for k in np.flatnonzero(bad.any(axis=1))]
-        findings.append(
-            Finding(
-                "not-finite",
-                FAULT,
-                f"{int(bad_quiet.sum() + bad.sum())} voltages are NaN or Inf, in {len(channels)}"
-                " channel(s)",
-                {
-                    "channels": numbers(channels),
-                    "frames": names,
-                    "quiet_frames": numbers(np.flatnonzero(bad_quiet.any(axis=1))),
-                },
-                channel_remedy(case, channels) if len(channels) <= len(case.rows) // 4 else "",
-            )
-        )
+        count = int(bad_quiet.sum() + bad.sum())
+        text = f"{count} voltages are NaN or Inf, in {len(channels)} channel(s)"
+        evidence = {
+            "channels": numbers(channels),
+            "frames": names,
+            "quiet_frames": numbers(np.flatnonzero(bad_quiet.any(axis=1))),
+        }
+        few = len(channels) <= len(case.rows) // 4
+        remedy = channel_remedy(case, channels) if few else ""
+        findings.append(Finding("not-finite", FAULT, text, evidence, remedy))
     trusted = case.trusted & ~bad_quiet.any(axis=0)
     if rms(case.reference[trusted]) == 0:
         text = "the reference frame is zero everywhere: no current, or a wrong array"

@@ -93,39 +93,27 @@ def check_gain(case: Case) -> tuple[Case, CheckOutcome]:
     if off_alone.any() and off_alone.sum() < MANY * strong.sum():
         channels = np.flatnonzero(off_alone)
         worst = int(channels[np.argmax(np.abs(gain[channels] - 1))])
-        findings.append(
-            Finding(
-                "channel-gain",
-                FAULT,
-                f"{len(channels)} channel(s) are far off: {short_list(channels)}; worst"
-                f" {case.channel(worst)}",
-                {
-                    "channels": numbers(channels),
-                    "worst_gain": round(float(gain[worst]), 4),
-                    "spread": round(spread, 4),
-                },
-                channel_remedy(case, channels),
-            )
-        )
+        text = f"{len(channels)} channel(s) are far off: {short_list(channels)}; worst"
+        evidence = {
+            "channels": numbers(channels),
+            "worst_gain": round(float(gain[worst]), 4),
+            "spread": round(spread, 4),
+        }
+        text, remedy = f"{text} {case.channel(worst)}", channel_remedy(case, channels)
+        findings.append(Finding("channel-gain", FAULT, text, evidence, remedy))
     if spread >= SPREAD_NOTE and strong.sum() >= GROUP:
         fault = spread >= SPREAD_FAULT
-        findings.append(
-            Finding(
-                "gain-spread",
-                FAULT if fault else NOTE,
-                f"channels have gains of their own, spread {100 * spread:.1f} %: "
-                + (
-                    "normalised differences are needed"
-                    if fault
-                    else "normalised differences may help"
-                ),
-                {"spread": round(spread, 4), "note_from": SPREAD_NOTE, "fault_from": SPREAD_FAULT},
-                "--equalise" if fault else "",
-            )
+        text = (
+            f"channels have gains of their own, spread {100 * spread:.1f} %: normalised differences"
+            f" {'are needed' if fault else 'may help'}"
         )
-    return replace(case, trusted=case.trusted & ~off), CheckOutcome(
-        tuple(findings), measured=measured
-    )
+        limits = {"note_from": SPREAD_NOTE, "fault_from": SPREAD_FAULT}
+        kind, remedy = (FAULT, "--equalise") if fault else (NOTE, "")
+        findings.append(
+            Finding("gain-spread", kind, text, {"spread": round(spread, 4)} | limits, remedy)
+        )
+    outcome = CheckOutcome(tuple(findings), measured=measured)
+    return replace(case, trusted=case.trusted & ~off), outcome
 
 
 def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
@@ -134,13 +122,12 @@ def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
         return CheckOutcome(untold=("the unit: it needs a skin with its conductivity (--skin)",))
     if not case.trusted.any():
         return CheckOutcome()
-    scale = float(np.median(np.abs(case.reference[case.trusted])))
-    predicted = (
-        float(np.median(np.abs(case.predicted[case.trusted]))) * case.frames.protocol.current_a
+    measured_v, per_a = (
+        float(np.median(np.abs(frame[case.trusted]))) for frame in (case.reference, case.predicted)
     )
-    if scale == 0:
+    if measured_v == 0:
         return CheckOutcome()
-    ratio = scale / predicted
+    ratio = measured_v / (per_a * case.frames.protocol.current_a)
     measured = {"reference_per_predicted": float(f"{ratio:.4g}")}
     if 1 / UNIT_OFF < ratio < UNIT_OFF:
         return CheckOutcome(measured=measured)
@@ -182,26 +169,17 @@ def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: floa
             if using.sum() < 4:
                 continue
             middle = float(np.median(gain[using]))
-            if abs(middle - 1) < PAIR_NOTE or robust_spread(gain[using]) > PAIR_AGREE * abs(
-                middle - 1
-            ):
+            off = abs(middle - 1)
+            if off < PAIR_NOTE or robust_spread(gain[using]) > PAIR_AGREE * off:
                 continue
-            if abs(middle - 1) < PAIR_SPREADS * spread / np.sqrt(np.count_nonzero(using)):
+            if off < PAIR_SPREADS * spread / np.sqrt(np.count_nonzero(using)):
                 continue
-            fault = abs(middle - 1) >= max(PAIR_FAULT, PAIR_SPREADS * spread)
-            findings.append(
-                Finding(
-                    f"{name}-pair-gain",
-                    FAULT if fault else NOTE,
-                    f"channels {said} pair {pair.tolist()} read {middle:.3g} of what the others do",
-                    {
-                        "pair": numbers(pair),
-                        "gain": round(middle, 4),
-                        "channels": numbers(np.flatnonzero(using)),
-                    },
-                    "--equalise" if fault else "",
-                )
-            )
+            fault = off >= max(PAIR_FAULT, PAIR_SPREADS * spread)
+            kind, remedy = (FAULT, "--equalise") if fault else (NOTE, "")
+            channels = numbers(np.flatnonzero(using))
+            evidence = {"pair": numbers(pair), "gain": round(middle, 4), "channels": channels}
+            text = f"channels {said} pair {pair.tolist()} read {middle:.3g} of what the others do"
+            findings.append(Finding(f"{name}-pair-gain", kind, text, evidence, remedy))
     return findings
 
 

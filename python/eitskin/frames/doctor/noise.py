@@ -34,82 +34,53 @@ def check_noise(case: Case) -> CheckOutcome:
     quiet = case.frames.reference_voltage_v
     quiet = quiet[np.isfinite(quiet[:, case.trusted]).all(axis=1)]
     if len(quiet) < MIN_QUIET:
-        return CheckOutcome(
-            untold=(
-                (
-                    f"noise, SNR and drift: {len(quiet)} quiet frame(s), they need at least"
-                    f" {MIN_QUIET}"
-                ),
-            )
-        )
+        few = f"noise, SNR and drift: {len(quiet)} quiet frame(s), they need at least {MIN_QUIET}"
+        return CheckOutcome(untold=(few,))
     trusted = np.flatnonzero(case.trusted)
     noise = channel_noise(quiet[:, trusted])
     level, sigma = rms(case.reference[trusted]), rms(noise)
     if sigma == 0 or level == 0:
         return CheckOutcome(untold=("noise and SNR: the quiet frames are all the same",))
     usual = np.maximum(_usual_noise(case, noise), np.median(noise) / NOISY_TIMES)
-    noisy = (
-        noise > NOISY_TIMES * usual if np.median(noise) > 0 else np.zeros(len(noise), dtype=bool)
-    )
+    noisy = (noise > NOISY_TIMES * usual) & (np.median(noise) > 0)
     healthy_sigma = rms(noise[~noisy]) or sigma
-    snr = 20 * np.log10(level / sigma)
-    measured = {
-        "snr_db": round(float(snr), 2),
-        "noise_v": float(f"{sigma:.4g}"),
-        "quiet_frames": len(quiet),
-    }
-    findings = []
+    snr, healthy_snr = (20 * np.log10(level / one) for one in (sigma, healthy_sigma))
+    measured = {"snr_db": round(float(snr), 2), "noise_v": float(f"{sigma:.4g}")}
+    measured["quiet_frames"] = len(quiet)
+    findings: list[Finding] = []
+    evidence: dict[str, object]
     if noisy.any():
         channels = trusted[noisy]
         shared = _common_electrode(case, channels)
-        findings.append(
-            Finding(
-                "noisy-channels",
-                FAULT,
-                f"{len(channels)} channel(s) are far noisier than the others:"
-                f" {short_list(channels)}"
-                + ("" if shared is None else f", all of electrode {shared} (from 0)"),
-                {
-                    "channels": numbers(channels),
-                    "times_usual": [round(float(v), 2) for v in noise[noisy] / usual[noisy]],
-                    "snr_db_without_them": round(float(20 * np.log10(level / healthy_sigma)), 2),
-                },
-                (
-                    f"--drop-electrodes {shared}"
-                    if shared is not None
-                    else channel_remedy(case, channels)
-                ),
-            )
-        )
-    healthy_snr = 20 * np.log10(level / healthy_sigma)
+        text = f"{len(channels)} channel(s) are far noisier than the others: {short_list(channels)}"
+        remedy = channel_remedy(case, channels)
+        if shared is not None:
+            text += f", all of electrode {shared} (from 0)"
+            remedy = f"--drop-electrodes {shared}"
+        evidence = {
+            "channels": numbers(channels),
+            "times_usual": [round(float(v), 2) for v in noise[noisy] / usual[noisy]],
+            "snr_db_without_them": round(float(healthy_snr), 2),
+        }
+        findings.append(Finding("noisy-channels", FAULT, text, evidence, remedy))
     if healthy_snr < SNR_NOTE_DB:
         fault = healthy_snr < SNR_FAULT_DB
-        text = f"the SNR is {healthy_snr:.1f} dB" + (
-            ": too low to image" if fault else ": weak touches will be lost"
-        )
-        evidence = {
-            "snr_db": round(float(healthy_snr), 2),
-            "note_below": SNR_NOTE_DB,
-            "fault_below": SNR_FAULT_DB,
-        }
+        what = "too low to image" if fault else "weak touches will be lost"
+        text = f"the SNR is {healthy_snr:.1f} dB: {what}"
+        limits = {"note_below": SNR_NOTE_DB, "fault_below": SNR_FAULT_DB}
+        evidence = {"snr_db": round(float(healthy_snr), 2), **limits}
         findings.append(Finding("snr", FAULT if fault else NOTE, text, evidence))
     drift, uncertainty = _drift(quiet[:, trusted], case.reference[trusted], healthy_sigma)
     measured["drift"] = float(f"{drift:.3g}")
     if abs(drift) > max(DRIFT_NOTE, DRIFT_SIGMAS * uncertainty):
         fault = abs(drift) > DRIFT_FAULT
-        findings.append(
-            Finding(
-                "drift",
-                FAULT if fault else NOTE,
-                f"the gain drifts by {100 * drift:.2f} % over the {len(quiet)} quiet frames: "
-                "take quiet frames nearer in time, or project the reference out",
-                {
-                    "drift": round(drift, 5),
-                    "uncertainty": float(f"{uncertainty:.3g}"),
-                    "fault_from": DRIFT_FAULT,
-                },
-            )
+        text = (
+            f"the gain drifts by {100 * drift:.2f} % over the {len(quiet)} quiet frames: take quiet"
+            " frames nearer in time, or project the reference out"
         )
+        evidence = {"drift": round(drift, 5), "uncertainty": float(f"{uncertainty:.3g}")}
+        evidence["fault_from"] = DRIFT_FAULT
+        findings.append(Finding("drift", FAULT if fault else NOTE, text, evidence))
     return CheckOutcome(tuple(findings), measured=measured)
 
 

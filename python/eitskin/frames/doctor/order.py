@@ -66,12 +66,9 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
 def check_frames(case: Case) -> CheckOutcome:
     """Frames that are no small change of the reference: another quantity (imaginary parts, times),
     or another unit."""
-    likeness = np.array(
-        [
-            cosine(frame[case.trusted], case.reference[case.trusted])
-            for frame in _finite_frames(case)
-        ]
-    )
+    reference = case.reference[case.trusted]
+    frames = _finite_frames(case)[:, case.trusted]
+    likeness = np.array([cosine(frame, reference) for frame in frames])
     odd = np.flatnonzero(likeness < UNLIKE)
     if not len(odd):
         return CheckOutcome()
@@ -102,11 +99,8 @@ def check_sign(case: Case) -> tuple[Case, CheckOutcome]:
     energy = float((predicted**2).sum())
     positive_share = float((predicted[predicted > 0] ** 2).sum()) / max(energy, 1e-300)
     mixed = MIXED_SHARE < positive_share < 1 - MIXED_SHARE
-    alike = [
-        frame
-        for frame in _finite_frames(case)[:, case.trusted]
-        if cosine(frame, measured) >= UNLIKE
-    ]
+    frames = _finite_frames(case)[:, case.trusted]
+    alike = [frame for frame in frames if cosine(frame, measured) >= UNLIKE]
     everything = np.concatenate([measured, *alike])
     some_negative = bool((everything < -limit).any())
     evidence: dict[str, Any] = {
@@ -132,13 +126,10 @@ def check_sign(case: Case) -> tuple[Case, CheckOutcome]:
                 " options repair it alike"
             )
             finding = Finding("reversed-or-magnitude", FAULT, text, evidence, "--sign reversed")
-        return _negated(case), CheckOutcome((finding,))
+        return _times(case, -1.0), CheckOutcome((finding,))
     if not mixed and positive_share > 0.5 and not some_negative:
-        return case, CheckOutcome(
-            untold=(
-                "whether these are magnitudes: the homogeneous frame is above 0 everywhere, too",
-            )
-        )
+        text = "whether these are magnitudes: the homogeneous frame is above 0 everywhere, too"
+        return case, CheckOutcome(untold=(text,))
     return case, CheckOutcome()
 
 
@@ -159,13 +150,7 @@ def check_flips(case: Case) -> tuple[Case, CheckOutcome]:
         {"channels": channels, "ratio_to_expected": round(float(np.median(ratio[channels])), 3)},
         f"--flip-channels {','.join(map(str, channels))}",
     )
-    sign = np.where(wrong, -1.0, 1.0)
-    frames = replace(
-        case.frames,
-        voltage_v=case.frames.voltage_v * sign,
-        reference_voltage_v=case.frames.reference_voltage_v * sign,
-    )
-    return replace(case, frames=frames), CheckOutcome((finding,))
+    return _times(case, np.where(wrong, -1.0, 1.0)), CheckOutcome((finding,))
 
 
 def _finite_frames(case: Case) -> FloatArray:
@@ -184,21 +169,15 @@ def _whole_pairs(case: Case, wrong: np.ndarray[Any, Any], columns: tuple[int, in
     return found
 
 
-def _negated(case: Case) -> Case:
-    frames = replace(
-        case.frames,
-        voltage_v=-case.frames.voltage_v,
-        reference_voltage_v=-case.frames.reference_voltage_v,
-    )
-    return replace(case, frames=frames)
+def _times(case: Case, sign: FloatArray | float, magnitude: bool = False) -> Case:
+    """``case`` with its voltages, or their magnitudes, times ``sign`` (m,)."""
+    quiet, voltage = case.frames.reference_voltage_v, case.frames.voltage_v
+    if magnitude:
+        quiet, voltage = np.abs(quiet), np.abs(voltage)
+    frames = replace(case.frames, voltage_v=voltage * sign, reference_voltage_v=quiet * sign)
+    return replace(case, frames=frames, magnitude=case.magnitude or magnitude)
 
 
 def signed_as_predicted(case: Case) -> Case:
     """The case with magnitudes of its voltages under the signs of the prediction."""
-    sign = np.where(case.predicted < 0, -1.0, 1.0)
-    frames = replace(
-        case.frames,
-        voltage_v=np.abs(case.frames.voltage_v) * sign,
-        reference_voltage_v=np.abs(case.frames.reference_voltage_v) * sign,
-    )
-    return replace(case, frames=frames, magnitude=True)
+    return _times(case, np.where(case.predicted < 0, -1.0, 1.0), magnitude=True)

@@ -24,20 +24,14 @@ SHOWN = 3
 def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
     """Hold the changes by known touches against every numbering; ``untold`` is what the quiet frame
     could not tell."""
-    frames, skin = case.frames, case.skin
-    if frames.touch_frame is None:
-        return CheckOutcome(
-            untold=tuple(f"{text}: say where a touch was (--touch X,Y)" for text in untold)
-        )
-    if skin is None:
-        return CheckOutcome(
-            untold=tuple(f"{text}: known touches need the skin (--skin)" for text in untold)
-        )
     measured, transfers = _changes(case)
     if not measured:
-        return CheckOutcome(
-            untold=tuple(f"{text}: the known touches have no sign or no change" for text in untold)
-        )
+        why = "the known touches have no sign or no change"
+        if case.frames.touch_frame is None:
+            why = "say where a touch was (--touch X,Y)"
+        elif case.skin is None:
+            why = "known touches need the skin (--skin)"
+        return CheckOutcome(untold=tuple(f"{text}: {why}" for text in untold))
     size = np.abs(case.predicted)
     weight = 1 / np.maximum(size, WEAK_PER_GREATEST * size.max())
     order = ranked(_fits(case, measured, transfers, weight))
@@ -47,19 +41,15 @@ def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
     summary = {"numbering_by_touch": evidence}
     if best.fit < LIKELY:
         if _drowned(case, measured, weight):
-            return CheckOutcome(
-                untold=("the known touches change the voltages by less than the noise",)
-            )
+            text = "the known touches change the voltages by less than the noise"
+            return CheckOutcome(untold=(text,))
         text = (
             "the known touches do not explain the change in any numbering: wrong places, signs or"
             " frames"
         )
         return CheckOutcome((Finding("touch-unexplained", NOTE, text, evidence),), measured=summary)
-    rivals = [
-        numbering
-        for numbering in order
-        if 1 - numbering.fit <= (1 - best.fit) * RIVAL_TIMES + CLOSE
-    ]
+    least = 1 - (1 - best.fit) * RIVAL_TIMES - CLOSE
+    rivals = [numbering for numbering in order if numbering.fit >= least]
     if given in rivals:
         return CheckOutcome(untold=_also(given, rivals), measured=summary)
     text = (
@@ -68,39 +58,28 @@ def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
     )
     if len(rivals) > 1:
         text += f"; {rivals[1]} fits nearly as well, a second touch would tell"
-    return CheckOutcome(
-        (Finding("numbering", FAULT, text, evidence, best.option),), measured=summary
-    )
+    finding = Finding("numbering", FAULT, text, evidence, best.option)
+    return CheckOutcome((finding,), measured=summary)
 
 
 def _changes(case: Case) -> tuple[list[FloatArray], list[FloatArray]]:
     """Of each frame with touches of known sign the measured change (m,) and the predicted transfer
     change (n, n)."""
     frames, skin = case.frames, case.skin
-    if (
-        frames.touch_frame is None
-        or frames.touch_xy_mm is None
-        or frames.touch_radius_mm is None
-        or skin is None
-    ):
+    at_mm, radius_mm, sign = frames.touch_xy_mm, frames.touch_radius_mm, frames.touch_sign
+    if frames.touch_frame is None or skin is None:
         return [], []
+    assert at_mm is not None  # Frames has all of them where it has touch_frame
+    assert radius_mm is not None
+    assert sign is not None
     measured, transfers = [], []
     for frame in np.unique(frames.touch_frame):
-        touches = frames.touches_in(int(frame))
-        signs = (
-            np.zeros(len(touches), dtype=np.int8)
-            if frames.touch_sign is None
-            else frames.touch_sign[touches]
-        )
+        own = frames.touches_in(int(frame))
         change = frames.voltage_v[frame] - case.reference
-        if (signs == 0).any() or not np.isfinite(change).all() or not change.any():
+        if (sign[own] == 0).any() or not np.isfinite(change).all() or not change.any():
             continue
         measured.append(change)
-        transfers.append(
-            touch_transfer(
-                skin, frames.touch_xy_mm[touches], frames.touch_radius_mm[touches], signs
-            )
-        )
+        transfers.append(touch_transfer(skin, at_mm[own], radius_mm[own], sign[own]))
     return measured, transfers
 
 
@@ -112,13 +91,11 @@ def _fits(
     use = case.trusted
     total = np.zeros((2, case.n_electrodes))
     for change, transfer in zip(measured, transfers, strict=True):
-        frames = renumbered_frames(case, transfer)
-        total += np.array(
-            [
-                [cosine((change * weight)[use], (frame * weight)[use]) for frame in side]
-                for side in frames
-            ]
+        seen, frames = (
+            (change * weight)[use],
+            (renumbered_frames(case, transfer) * weight)[..., use],
         )
+        total += np.array([[cosine(seen, frame) for frame in side] for side in frames])
     return total / len(measured)
 
 

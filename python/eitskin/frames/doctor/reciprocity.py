@@ -1,6 +1,8 @@
 """Reciprocity: exchanging the drive and the measuring pair must not change the voltage, whatever is
 inside the skin."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from eitskin.frames.doctor.case import Case, rms, short_list
@@ -30,9 +32,8 @@ def check_reciprocity(case: Case) -> CheckOutcome:
     )
     first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
     if not len(first):
-        return CheckOutcome(
-            untold=("reciprocity: the protocol has no two channels of one voltage",)
-        )
+        text = "reciprocity: the protocol has no two channels of one voltage"
+        return CheckOutcome(untold=(text,))
     reference = case.reference
     level = rms(reference[case.trusted])
     if level == 0:
@@ -42,8 +43,11 @@ def check_reciprocity(case: Case) -> CheckOutcome:
     error = np.abs(difference) / np.maximum(size, PAIR_FLOOR_PER_RMS * level)
     overall, usual = rms(difference) / level, float(np.median(error))
     order = np.argsort(-error, kind="stable")
-    gain, _ = channel_gains(case)
-    worst = {f"{first[k]}/{second[k]}": round(float(error[k]), 4) for k in order[:WORST]}
+    gain = np.abs(channel_gains(case)[0] - 1)
+
+    def errors(pairs: Iterable[int]) -> dict[str, float]:
+        return {f"{first[k]}/{second[k]}": round(float(error[k]), 4) for k in pairs}
+
     measured = {
         "reciprocity_rms": round(overall, 4),
         "reciprocity_median": round(usual, 4),
@@ -51,40 +55,22 @@ def check_reciprocity(case: Case) -> CheckOutcome:
     }
     bad = [k for k in order if error[k] > max(PAIR_OFF, PAIR_TIMES_USUAL * usual)]
     findings = []
+    evidence: dict[str, object]
     if bad:
-        off = [
-            int(first[k] if abs(gain[first[k]] - 1) > abs(gain[second[k]] - 1) else second[k])
-            for k in bad
-        ]
-        findings.append(
-            Finding(
-                "reciprocity-pairs",
-                FAULT,
-                f"{len(bad)} pair(s) of channels that must agree do not; off in each is channel"
-                f" {short_list(off)}",
-                {
-                    "errors": {f"{first[k]}/{second[k]}": round(float(error[k]), 4) for k in bad},
-                    "off": off,
-                    "median_of_all": round(usual, 4),
-                },
-                channel_remedy(case, off),
-            )
+        off = [int(first[k] if gain[first[k]] > gain[second[k]] else second[k]) for k in bad]
+        text = (
+            f"{len(bad)} pair(s) of channels that must agree do not; off in each is channel"
+            f" {short_list(off)}"
         )
+        evidence = {"errors": errors(bad), "off": off, "median_of_all": round(usual, 4)}
+        remedy = channel_remedy(case, off)
+        findings.append(Finding("reciprocity-pairs", FAULT, text, evidence, remedy))
     fault = overall >= RMS_FAULT
     if fault or (overall >= RMS_NOTE and usual >= MEDIAN_NOTE and len(first) >= MIN_PAIRS):
-        findings.append(
-            Finding(
-                "reciprocity",
-                FAULT if fault else NOTE,
-                f"reciprocal channels differ by {100 * overall:.1f} % of the rms voltage"
-                + ("; measured at different times, gains or currents" if fault else ""),
-                {
-                    "rms": round(overall, 4),
-                    "median": round(usual, 4),
-                    "worst_pairs": worst,
-                    "note_from": RMS_NOTE,
-                    "fault_from": RMS_FAULT,
-                },
-            )
-        )
+        text = f"reciprocal channels differ by {100 * overall:.1f} % of the rms voltage"
+        text += "; measured at different times, gains or currents" if fault else ""
+        evidence = {"rms": round(overall, 4), "median": round(usual, 4)}
+        evidence["worst_pairs"] = errors(order[:WORST])
+        evidence |= {"note_from": RMS_NOTE, "fault_from": RMS_FAULT}
+        findings.append(Finding("reciprocity", FAULT if fault else NOTE, text, evidence))
     return CheckOutcome(tuple(findings), measured=measured)

@@ -48,10 +48,8 @@ def combined_remedy(case: Case, remedies: Iterable[str]) -> str:
     }
     lists["--drop-channels"] -= gone
     lists["--impute-channels"] -= gone | lists["--drop-channels"]
-    partner, bad = (
-        partners(case.rows, case.n_electrodes),
-        lists["--impute-channels"] | lists["--drop-channels"],
-    )
+    partner = partners(case.rows, case.n_electrodes)
+    bad = lists["--impute-channels"] | lists["--drop-channels"]
     hopeless = {k for k in lists["--impute-channels"] if partner.get(k, (k, 1))[0] in bad}
     lists["--drop-channels"] |= hopeless
     lists["--impute-channels"] -= hopeless

@@ -69,14 +69,7 @@ class Report:
             "subject": self.subject,
             "healthy": self.healthy,
             "findings": [
-                {
-                    "name": finding.name,
-                    "severity": finding.severity,
-                    "text": finding.text,
-                    "evidence": _finite(finding.evidence),
-                    "repair": finding.repair,
-                }
-                for finding in self.findings
+                vars(finding) | {"evidence": _finite(finding.evidence)} for finding in self.findings
             ],
             "untold": list(self.untold),
             "measured": _finite(self.measured),
@@ -84,7 +77,6 @@ class Report:
         }
 
     def lines(self) -> list[str]:
-        """The report as lines of text."""
         lines = [f"{self.source}: {self.subject}"]
         for finding in self.findings:
             lines.append(f"  {finding.severity.upper():5} {finding.name}: {finding.text}")

@@ -67,9 +67,6 @@ def subject_from_source(
     ``load_frames`` reads it.
 
     Unlike import, NaN and Inf pass, and where no quiet frames are named the first frame is taken.
-
-    Raises:
-        EitskinError: as ``import_frames``.
     """
     if is_frames_file(path) and options == ImportOptions():
         return subject_from_frames(load_frames(path, allow_nonfinite=True), skin, str(path))
@@ -89,14 +86,6 @@ def subject_from_source(
         readings.append((order, frames))
     if not readings:
         raise refused if refused is not None else FrameError(f"{path}: no order fits")
-    remarks = []
-    if "assumed" in readings[0][1].meta:
-        remarks.append(str(readings[0][1].meta["assumed"]))
-    return Subject(
-        str(path),
-        options.order,
-        tuple(readings),
-        skin,
-        tuple(remarks),
-        options.source.scale is not None,
-    )
+    meta, unit_known = readings[0][1].meta, options.source.scale is not None
+    remarks = (str(meta["assumed"]),) if "assumed" in meta else ()
+    return Subject(str(path), options.order, tuple(readings), skin, remarks, unit_known)

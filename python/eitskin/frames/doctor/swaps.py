@@ -64,9 +64,7 @@ def best_exchange(case: Case) -> ElectrodeSwap:
 def check_swaps(case: Case) -> tuple[Case, CheckOutcome]:
     """Name exchanged electrodes; the case comes back with its rows renamed."""
     exchange = best_exchange(case)
-    if not exchange.convincing:
-        return case, CheckOutcome()
-    if best_joined(case, magnitude=True).misfit < exchange.after:
+    if not exchange.convincing or best_joined(case, magnitude=True).misfit < exchange.after:
         return case, CheckOutcome()
     named = " and then ".join(f"{i} and {j}" for i, j in exchange.pairs)
     finding = Finding(

@@ -74,45 +74,37 @@ def check_lost(case: Case) -> CheckOutcome:
         using = (case.rows[:, :2] == electrode).any(axis=1) & usable
         if using.sum() < MIN_OUTLIERS or not len(case.frames.voltage_v):
             continue
-        driven = np.where(
-            np.isfinite(case.frames.voltage_v[:, using]), case.frames.voltage_v[:, using], np.inf
-        )
+        driven = case.frames.voltage_v[:, using]
+        driven = np.where(np.isfinite(driven), driven, np.inf)
         left = np.median(np.abs(driven / case.reference[using]), axis=1)
         frames = np.flatnonzero(left < LOST)
         if len(frames):
-            findings.append(
-                Finding(
-                    "electrode-lost",
-                    FAULT,
-                    f"electrode {electrode} (from 0) stops driving in {len(frames)} frame(s), "
-                    f"first {case.frames.frame_name[frames[0]]!r}",
-                    {
-                        "electrode": electrode,
-                        "frames": numbers(frames),
-                        "left": round(float(left[frames].max()), 4),
-                    },
-                    f"--drop-electrodes {electrode}",
-                )
+            text = (
+                f"electrode {electrode} (from 0) stops driving in {len(frames)} frame(s), first"
+                f" {case.frames.frame_name[frames[0]]!r}"
             )
+            evidence = {"electrode": electrode, "frames": numbers(frames)}
+            evidence |= {"left": round(float(left[frames].max()), 4)}
+            remedy = f"--drop-electrodes {electrode}"
+            findings.append(Finding("electrode-lost", FAULT, text, evidence, remedy))
     return CheckOutcome(tuple(findings))
 
 
 def _best_dead(case: Case) -> Dead | None:
     """The fewest suspects without which the other channels are well explained: one, or two."""
     suspects = _suspects(case)
-    sets = [(e,) for e in suspects] + (
-        list(combinations(suspects, 2)) if len(suspects) <= MAX_SUSPECTS else []
-    )
+    sets: list[tuple[int, ...]] = [(e,) for e in suspects]
+    if len(suspects) <= MAX_SUSPECTS:
+        sets += combinations(suspects, 2)
     best: Dead | None = None
     for electrodes in sets:
         others = case.trusted & ~touching(case.rows, electrodes)
         dead = Dead(electrodes, misfit(case, others, case.magnitude) if others.any() else 1.0)
-        if (
-            best is None
-            or dead.misfit * (1 if len(electrodes) == len(best.electrodes) else BETTER_TIMES)
-            < best.misfit
-        ):
-            best = dead
+        if best is not None:
+            better = 1 if len(electrodes) == len(best.electrodes) else BETTER_TIMES
+            if dead.misfit * better >= best.misfit:
+                continue
+        best = dead
     return best
 
 
@@ -160,9 +152,8 @@ def _without(case: Case, dead: Dead, before: float) -> tuple[Case, list[Finding]
             f"electrode {electrode} (from 0) is dead, {' and '.join(sides)}: repair its contact, or"
             " leave it out"
         )
-        findings.append(
-            Finding("dead-electrode", FAULT, text, evidence, f"--drop-electrodes {electrode}")
-        )
+        remedy = f"--drop-electrodes {electrode}"
+        findings.append(Finding("dead-electrode", FAULT, text, evidence, remedy))
     return replace(case, trusted=case.trusted & ~touching(case.rows, dead.electrodes)), findings
 
 

@@ -19,7 +19,6 @@ NAME = "adc"
 STAGE = Stage.DIGITISE
 ORDER = 40
 SUMMARY = "Voltages are rounded to the converter's steps."
-DEFAULT_HEADROOM = 1.25
 
 
 @dataclass(frozen=True)
@@ -39,14 +38,6 @@ class Parameters:
             raise ConfigError("range_v: give either range_v or headroom")
 
 
-def range_v(parameters: Parameters, session: EffectSession) -> float:
-    """The converter's range in V."""
-    if parameters.range_v is not None:
-        return parameters.range_v
-    headroom = DEFAULT_HEADROOM if parameters.headroom is None else parameters.headroom
-    return headroom * float(np.abs(session.v0_v()).max())
-
-
 def codes(v: Voltages, lsb_v: float, bits: int) -> Voltages:
     """Whole numbers (m,), as float64, from -2^(bits - 1) to 2^(bits - 1) - 1."""
     half = 2.0 ** (bits - 1)
@@ -55,7 +46,7 @@ def codes(v: Voltages, lsb_v: float, bits: int) -> Voltages:
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Rounds every row."""
-    span_v = range_v(parameters, session)
+    span_v = session.limit_v(parameters.range_v, parameters.headroom)
     lsb_v = 2 * span_v / 2**parameters.bits
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:

@@ -14,9 +14,8 @@ from math import sqrt
 
 from eitskin.config import parameter
 from eitskin.errors import ConfigError
-from eitskin.scene.change import part_at
 from eitskin.scene.deformation import Deformation, stretched
-from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage
+from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage, part_at
 
 NAME = "bend"
 STAGE = Stage.MATERIAL

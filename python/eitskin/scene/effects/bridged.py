@@ -37,26 +37,13 @@ class Parameters:
 
 
 def make(parameters: Parameters, session: EffectSession) -> ContactStep:
-    """Adds the bridges.
-
-    Raises:
-        ConfigError: an electrode does not exist.
-    """
-    count = session.skin.electrodes.count
-    for electrode in parameters.electrodes:
-        if not 0 <= electrode < count:
-            raise ConfigError(
-                f"electrodes: {electrode} does not exist; the skin's are 0 to {count - 1}"
-            )
+    """Adds the bridges."""
+    session.refuse_absent(parameters.electrodes)
     bridges = tuple((i, j, parameters.resistance_ohm) for i, j in pairwise(parameters.electrodes))
 
     def apply(contacts: Contacts, time_s: float, frame: int) -> Contacts:
         return replace(contacts, bridges=contacts.bridges + bridges)
 
-    joined = " - ".join(str(electrode) for electrode in parameters.electrodes)
-    return ContactStep(
-        NAME,
-        EffectCost(),
-        f"electrodes {joined} (from 0) joined by {parameters.resistance_ohm:g} ohm",
-        apply,
-    )
+    joined = " - ".join(map(str, parameters.electrodes))
+    note = f"electrodes {joined} (from 0) joined by {parameters.resistance_ohm:g} ohm"
+    return ContactStep(NAME, EffectCost(), note, apply)

@@ -18,8 +18,15 @@ import numpy as np
 
 from eitskin.config import parameter
 from eitskin.errors import ConfigError
-from eitskin.scene.change import part_at
-from eitskin.scene.effect import Contacts, ContactStep, EffectCost, EffectSession, FloatArray, Stage
+from eitskin.scene.effect import (
+    Contacts,
+    ContactStep,
+    EffectCost,
+    EffectSession,
+    FloatArray,
+    Stage,
+    part_at,
+)
 
 NAME = "contact_impedance"
 STAGE = Stage.BOUNDARY

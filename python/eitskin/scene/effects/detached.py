@@ -47,18 +47,9 @@ def is_off(time_s: float, parameters: Parameters) -> bool:
 
 
 def make(parameters: Parameters, session: EffectSession) -> ContactStep:
-    """Marks the electrodes while they are off.
-
-    Raises:
-        ConfigError: an electrode does not exist, or no row of the protocol is left.
-    """
-    count = session.skin.electrodes.count
-    for electrode in parameters.electrodes:
-        if not 0 <= electrode < count:
-            raise ConfigError(
-                f"electrodes: {electrode} does not exist; the skin's are 0 to {count - 1}"
-            )
-    gone = np.isin(np.arange(count), parameters.electrodes)
+    """Marks the electrodes while they are off."""
+    session.refuse_absent(parameters.electrodes)
+    gone = np.isin(np.arange(session.skin.electrodes.count), parameters.electrodes)
     lost = np.asarray(gone[session.protocol.drive_measure].any(axis=1))
     if lost.all():
         raise ConfigError(
@@ -71,8 +62,6 @@ def make(parameters: Parameters, session: EffectSession) -> ContactStep:
             return contacts
         return replace(contacts, detached=contacts.detached | gone)
 
-    named = ", ".join(str(electrode) for electrode in parameters.electrodes)
+    named = ", ".join(map(str, parameters.electrodes))
     note = f"electrode {named} (from 0) off: {np.count_nonzero(lost)} of {len(lost)} rows read 0 V"
-    return ContactStep(
-        NAME, EffectCost(factorisations=1 if varies else 0), note, apply, varies=varies
-    )
+    return ContactStep(NAME, EffectCost(factorisations=int(varies)), note, apply, varies=varies)

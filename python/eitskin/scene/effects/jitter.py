@@ -65,10 +65,5 @@ def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
         f"{parameters.jitter_ns:g} ns at {parameters.frequency_hz:g} Hz: {100 * deviation:.3g} % of"
         " each voltage"
     )
-    return VoltageStep(
-        NAME,
-        STAGE,
-        EffectCost(vector_passes_per_frame=2, random_numbers_per_frame=rows),
-        note,
-        apply,
-    )
+    cost = EffectCost(vector_passes_per_frame=2, random_numbers_per_frame=rows)
+    return VoltageStep(NAME, STAGE, cost, note, apply)

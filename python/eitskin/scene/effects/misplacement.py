@@ -46,16 +46,9 @@ def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
 
 
 def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
-    """The skin that is meshed.
-
-    Raises:
-        ConfigError: there is not one known shift for each electrode, or shifted electrodes overlap.
-    """
-    count, spread, known = (
-        session.skin.electrodes.count,
-        parameters.spread_mm,
-        len(parameters.shift_mm),
-    )
+    """The skin that is meshed."""
+    count, spread = session.skin.electrodes.count, parameters.spread_mm
+    known = len(parameters.shift_mm)
     if known not in (0, count):
         raise ConfigError(f"shift_mm: {known} shifts for {count} electrodes; give one each")
     shift_mm = (

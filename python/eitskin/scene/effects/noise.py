@@ -36,7 +36,6 @@ class Parameters:
 
 
 def deviation_v(parameters: Parameters, session: EffectSession) -> float:
-    """The noise's standard deviation in V."""
     if parameters.noise_v is not None:
         return parameters.noise_v
     snr_db = DEFAULT_SNR_DB if parameters.snr_db is None else parameters.snr_db

@@ -34,11 +34,7 @@ class Parameters:
 
 
 def waved(outline: Outline, sizes: FloatArray, phases: FloatArray) -> Outline:
-    """``outline`` as a polygon with its radius waved, of the same area.
-
-    Raises:
-        GeometryError: the rim would cross itself.
-    """
+    """``outline`` as a polygon with its radius waved, of the same area."""
     corners = np.array(outline.vertices_mm)
     middle = np.array(outline.centre_mm)
     offsets = corners - middle
@@ -67,11 +63,7 @@ def bent(skin: Skin, outline: Outline) -> Skin:
 
 
 def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
-    """The skin that is meshed.
-
-    Raises:
-        ConfigError: the outline would not be one any more.
-    """
+    """The skin that is meshed."""
     generator = session.stream(NAME)
     sizes = parameters.spread * generator.standard_normal(len(HARMONICS))
     phases = generator.uniform(0, 2 * pi, len(HARMONICS))

@@ -17,7 +17,6 @@ NAME = "saturation"
 STAGE = Stage.DIGITISE
 ORDER = 30
 SUMMARY = "Voltages beyond a limit are clipped."
-DEFAULT_HEADROOM = 1.25
 
 
 @dataclass(frozen=True)
@@ -36,17 +35,9 @@ class Parameters:
             raise ConfigError("limit_v: give either limit_v or headroom")
 
 
-def limit_v(parameters: Parameters, session: EffectSession) -> float:
-    """The limit in V."""
-    if parameters.limit_v is not None:
-        return parameters.limit_v
-    headroom = DEFAULT_HEADROOM if parameters.headroom is None else parameters.headroom
-    return headroom * float(np.abs(session.v0_v()).max())
-
-
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Clips every row."""
-    limit = limit_v(parameters, session)
+    limit = session.limit_v(parameters.limit_v, parameters.headroom)
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
         return np.asarray(np.clip(v, -limit, limit))

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.config import parameter
-from eitskin.scene.change import part_at
-from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, MaterialStep, Stage
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, MaterialStep, Stage, part_at
 from eitskin.scene.random_field import COSINES, random_field
 
 NAME = "sheet_change"

@@ -10,9 +10,8 @@ begin before the quiet frames (``at_s`` of -1000).
 from dataclasses import dataclass
 
 from eitskin.config import parameter
-from eitskin.scene.change import part_at
 from eitskin.scene.deformation import Deformation, stretched
-from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage
+from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage, part_at
 
 NAME = "stretch"
 STAGE = Stage.MATERIAL

@@ -42,11 +42,7 @@ def temperature_factor(age_s: float, parameters: Parameters) -> float:
 
 
 def make(parameters: Parameters, session: EffectSession) -> MaterialStep:
-    """The skin's conductivity by time, one factor for all elements.
-
-    Raises:
-        ConfigError: the linear law would make the conductivity 0 or negative within the session.
-    """
+    """The skin's conductivity by time, one factor for all elements."""
     times_s = session.times_s()
     ages_s = (0.0, float(times_s[-1] - times_s[0]))
     if min(temperature_factor(age_s, parameters) for age_s in ages_s) <= 0:

@@ -14,8 +14,7 @@ from eitskin.arrays import FloatArray
 from eitskin.scene.compiler import MeshCache, compile_scene
 from eitskin.scene.description import scene_from_table
 from eitskin.scene.effect import EffectSession, GeometryStep, LoadedStep, Loads, Stage, VoltageStep
-from eitskin.scene.effect_table import describe_parameters
-from eitskin.scene.registry import BUILT_IN, Registry, summary_of
+from eitskin.scene.registry import BUILT_IN, Registry, describe_parameters, summary_of
 from eitskin.scene.runner import simulate_frames
 from eitskin.skin.protocol import adjacent
 
