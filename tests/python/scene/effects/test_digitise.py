@@ -67,6 +67,7 @@ def test_headroom_counts_from_the_largest_untouched_voltage(make_session, v0):
     for both in (
         lambda: adc.Parameters(range_v=1.0, headroom=1.0),
         lambda: saturation.Parameters(1.0, 1.0),
+        lambda: noise.Parameters(snr_db=60.0, noise_v=1e-3),
     ):
         with pytest.raises(ConfigError, match="give either"):
             both()
