@@ -678,7 +678,6 @@ TEST(test_places_that_the_reference_corrects)
             confirm(b, (const double[][2]){{12 + x + (there ? 2 * x : -3 * x), -21}}, 1);
         CHECK_EQUAL(b->fast->count > 0 && b->fast->known[0].id == 1, there);
         CHECK(!there || b->fast->known[0].confirmed);
-        bench_close(b);
     }
 }
 
