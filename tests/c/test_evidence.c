@@ -318,7 +318,7 @@ TEST(fit_and_test_share_what_may_be_made)
         for (uint32_t most = 0; most < 300; most += 50) {
             eits_context *ctx = set_up(&b, 1);
             CHANGE_OPTIONS(ctx, o.test_columns = most);
-            eits_fit f = fit_of(ctx, NULL, 0);
+            eits_fit f = fit_of(ctx, &(eits_disc){0}, 0);
             f.moves = moves[i];
             eits_test_touches(ctx, &ctx->scratch, &f);
             CHECK_EQUAL(ctx->evidence.columns_most, most < left[i] ? most : left[i]);
