@@ -3,6 +3,8 @@
 #include "small_model.h"
 
 #include "base/vec.h"
+#include "context/constants.h"
+#include "context/places.h"
 #include "eitskin/frame.h"
 #include "frame/constants.h"
 #include "frame/reference.h"

@@ -9,6 +9,7 @@
 
 #include "api/stages.h"
 #include "context/context.h"
+#include "context/places.h"
 #include "diagnostics/diagnostics.h"
 #include "evidence/evidence.h"
 #include "frame/reference.h"

@@ -16,11 +16,11 @@
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
+#include "context/places.h"
 #include "context/projection.h"
 #include "diagnostics/diagnostics.h"
 #include "evidence/constants.h"
 #include "frame/constants.h"
-#include "frame/reference.h"
 
 static int is_known(const eits_real *place_mm2, const eits_real *apart_mm)
 {

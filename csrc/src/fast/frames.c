@@ -2,7 +2,7 @@
  * what the solver finds then confirms, ends and begins touches. */
 #include "fast/fast.h"
 
-#include "frame/reference.h"
+#include "context/places.h"
 
 /* Where touch k was, and how strong, when a drive was last measured; with no strength, as it is,
  * where it was not there. */

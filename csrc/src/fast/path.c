@@ -2,7 +2,7 @@
  * them. The order of the questions is that of their cost, and of how often they are answered. */
 #include "fast/fast.h"
 
-#include "frame/reference.h"
+#include "context/places.h"
 
 /* A row that no touch can have changed so: it is dead, turned over, or far above its reference. */
 static int is_wild(const eits_fast *fast, eits_real v, eits_real v0)

@@ -31,10 +31,6 @@
  * larger: an instrument's gains move touches; smaller: misplaced electrodes do */
 #define EITS_ROW_SPREAD R(0.03)
 
-/* a place is corrected by at most this along x and y [pixels]. larger: an instrument that differs
- * moves touches; smaller: misplaced electrodes do */
-#define EITS_MAX_SHIFT R(1.0)
-
 /* ---- Chosen: by the arithmetic: half a unit in the last place of two float32 voltages, and some.
  * Check: ctest --preset host -R frame_f */
 

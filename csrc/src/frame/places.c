@@ -7,9 +7,9 @@
  *
  *     sum_t T_t(x, y) sum_j U_tj z_j,    T_t = 1, x, y, x^2, x y, y^2, ...
  *
- * along either axis, x and y from the grid's middle over half its longer side. That is taken back;
- * |N'y|^2 is the variance of what it leaves. Directions of y that no such skin has tell how much of
- * it is of rows with gains of their own: the more, the less is taken back.
+ * along either axis, x and y from the grid's middle over half its longer side. That is taken back
+ * (context/places.c); |N'y|^2 is the variance of what it leaves. Directions of y that no such skin
+ * has tell how much of it is of rows with gains of their own: the more, the less is taken back.
  * python/eitskin/model/tare_places.py has the formulas. */
 #include "frame/reference.h"
 
@@ -61,60 +61,4 @@ void eits_learn_places(eits_context *ctx, const eits_place_sums *sums)
             b->shift_mm[axis][t] = b->place_trust * shift;
         }
     }
-}
-
-/* By how much a touch found at `at` lies elsewhere. */
-static void shift_at(const eits_context *ctx, const eits_real at[2], eits_real shift[2])
-{
-    const eits_model *model = ctx->model;
-    const eits_reference *b = &ctx->reference;
-    const eits_real pixel = (eits_real)model->pixel_mm, reach = EITS_MAX_SHIFT * pixel,
-                    side = (eits_real)(model->nx > model->ny ? model->nx : model->ny),
-                    half = R(0.5) * side * pixel,
-                    x = (at[0] - (eits_real)model->origin_x_mm -
-                         R(0.5) * (eits_real)model->nx * pixel) /
-                        half,
-                    y = (at[1] - (eits_real)model->origin_y_mm -
-                         R(0.5) * (eits_real)model->ny * pixel) /
-                        half;
-    eits_real power[EITS_MAX_MOVE_DEGREE + 1] = {1}; /* x^n y^0 to x^0 y^n */
-    shift[0] = shift[1] = 0;
-    for (uint32_t n = 0, t = 0; t < model->uncertainty.move_terms; ++n) {
-        for (uint32_t j = 0; j <= n; ++j, ++t) {
-            shift[0] = eits_fma(b->shift_mm[0][t], power[j], shift[0]);
-            shift[1] = eits_fma(b->shift_mm[1][t], power[j], shift[1]);
-        }
-        if (t == model->uncertainty.move_terms)
-            break;
-        power[n + 1] = power[n] * y;
-        for (uint32_t j = 0; j <= n; ++j)
-            power[j] *= x;
-    }
-    shift[0] = eits_clamp(shift[0], -reach, reach);
-    shift[1] = eits_clamp(shift[1], -reach, reach);
-}
-
-int eits_corrects_places(const eits_context *ctx)
-{
-    return ctx->reference.row_gains && ctx->model->uncertainty.move_terms > 0;
-}
-
-void eits_place_on_skin(const eits_context *ctx, eits_real at[2])
-{
-    eits_real shift[2];
-    if (!eits_corrects_places(ctx))
-        return;
-    shift_at(ctx, at, shift);
-    at[0] += shift[0];
-    at[1] += shift[1];
-}
-
-void eits_place_in_model(const eits_context *ctx, eits_real at[2])
-{
-    eits_real shift[2];
-    if (!eits_corrects_places(ctx))
-        return;
-    shift_at(ctx, at, shift); /* which hardly differs over its own length */
-    at[0] -= shift[0];
-    at[1] -= shift[1];
 }

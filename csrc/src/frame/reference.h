@@ -51,13 +51,6 @@ void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
 /* reference.place_mm2 and shift_mm from them. */
 void eits_learn_places(eits_context *ctx, const eits_place_sums *sums);
 
-/* Whether places are corrected by what the reference tells: with row gains, for which it holds. */
-int eits_corrects_places(const eits_context *ctx);
-
-/* From where the modelled skin has a touch to where it lies, mm; and back. */
-void eits_place_on_skin(const eits_context *ctx, eits_real at[2]);
-void eits_place_in_model(const eits_context *ctx, eits_real at[2]);
-
 /* ---- follow.c ---- */
 
 /* Whether frames follow one another here, and for long enough to be told from single ones: after a

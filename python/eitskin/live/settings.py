@@ -16,7 +16,6 @@ from eitskin.tuning.for_model import chosen_point, settings_text
 from eitskin.tuning.front import REPORT_US, Target, board_takes
 
 KINDS = ("raw", "image", "touches", "events")
-REPORTS = ("frame", "drive")
 Say: TypeAlias = Callable[[str], None]
 
 

@@ -40,6 +40,7 @@ def matrices(draw: st.DrawFn) -> np.ndarray:
 
 @st.composite
 def problems(draw: st.DrawFn) -> dict[str, Any]:
+    """What a solve is asked."""
     s = draw(matrices())
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     kind = draw(st.sampled_from(["random", "of a column", "sparse", "zero"]))
@@ -64,13 +65,18 @@ def problems(draw: st.DrawFn) -> dict[str, Any]:
 
 def steps_of(given_problem: dict[str, Any]) -> tuple[np.ndarray, list[Step]]:
     """S as stored, and the steps: the data twice, which a warm start takes up."""
-    s = given_problem["s"]
-    lipschitz = None if s.any() else 1.0
-    model = made_model(s, storage=given_problem["storage"], lipschitz=lipschitz)
+    model = made_model(
+        given_problem["s"],
+        storage=given_problem["storage"],
+        lipschitz=None if given_problem["s"].any() else 1.0,
+    )
     names = ("sign", "solver", "iterations", "lambda_rel", "gap_rel", "mac_limit", "warm_start")
-    options = plain_options(s, **{name: given_problem[name] for name in names})
-    data = np.array([given_problem["y"]] * 2)
-    return model.sensitivity, [Load(encode_model(model)), Choose(options), Solve(data)]
+    options = plain_options(given_problem["s"], **{name: given_problem[name] for name in names})
+    return model.sensitivity, [
+        Load(encode_model(model)),
+        Choose(options),
+        Solve(np.array([given_problem["y"]] * 2)),
+    ]
 
 
 def test_any_problem(same_everywhere, margins):
@@ -90,8 +96,9 @@ def test_any_problem(same_everywhere, margins):
         statuses, outcomes = on_host(own)
         assert statuses == [0, 0]
         for one in outcomes:
-            point = judged(s, given_problem["y"], given_problem["sign"], one)
-            check_sound(margins, CASE, point, one)
+            check_sound(
+                margins, CASE, judged(s, given_problem["y"], given_problem["sign"], one), one
+            )
         steps.extend(own)
 
     sound()

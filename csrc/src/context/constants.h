@@ -1,0 +1,18 @@
+/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
+ * tables/constants.toml. */
+#ifndef EITSKIN_CONTEXT_CONSTANTS_H
+#define EITSKIN_CONTEXT_CONSTANTS_H
+
+#include "base/vec.h"
+
+/* clang-format off */
+
+/* ---- Chosen: by hand; not measured. Check: ctest --preset host -R places */
+
+/* a place is corrected by at most this along x and y [pixels]. larger: an instrument that differs
+ * moves touches; smaller: misplaced electrodes do */
+#define EITS_MAX_SHIFT R(1.0)
+
+/* clang-format on */
+
+#endif

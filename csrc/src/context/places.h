@@ -1,0 +1,16 @@
+/* From where the modelled skin has a touch to where it lies, and back. */
+#ifndef EITSKIN_PLACES_H
+#define EITSKIN_PLACES_H
+
+#include "context/context.h"
+
+/* Whether places are corrected by what the reference tells: with row gains, for which it holds. */
+int eits_corrects_places(const eits_context *ctx);
+
+/* at, mm: from where the modelled skin has a touch to where it lies; by at most EITS_MAX_SHIFT. */
+void eits_place_on_skin(const eits_context *ctx, eits_real at[2]);
+
+/* And back. */
+void eits_place_in_model(const eits_context *ctx, eits_real at[2]);
+
+#endif
