@@ -49,26 +49,19 @@ changed_since() {
         -type d \( -name __pycache__ -o -name build -o -name '*.egg-info' \) -prune -o -newer "$1" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
 }
 
-# pip_install ARGUMENTS...: pip, with a plain line for each package and for what is compiled. Python compiles each module when
-# it is first imported: most of them never are.
-pip_install() {
+# packages ARGUMENTS...: what pip's install takes, into the environment. By uv, which fetches and unpacks several at once and
+# says what; by pip where there is no uv, or where uv fails: only pip reads pip's settings. What is built here is built again.
+packages() {
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary uv uv 2>/dev/null || true
     {
-        "$venv/bin/python" -m pip install --no-compile --progress-bar off --disable-pip-version-check "$@" &&
-            touch "$venv/pip-done"
-    } | while read -r word name rest; do
-        case "$word $name $rest" in
-        "Collecting "*) printf '   %s\n' "$name" ;;
-        "Processing "*) printf '   %s\n' "${name##*/}" ;;
-        "Installing build"*started) printf '   tools to build it\n' ;;
-        "Building wheel for"*started) printf '   compiling\n' ;;
-        "Building wheel for"*running...) printf '   still compiling\n' ;;
-        "Installing collected"*) printf '   unpacking all of these\n' ;;
-        esac
-    done
-    rm "$venv/pip-done" 2>/dev/null || {
-        say "pip could not install this; its message stands above"
-        exit 1
-    }
+        "$venv/bin/uv" pip install --no-progress --python "$venv/bin/python" \
+            --reinstall-package eitskin --reinstall-package eitskin-studies "$@" && touch "$venv/packages-done"
+    } 2>&1 | sed '/^ *[-+~] /d; /^ *Downloaded /d; s/^ */   /'
+    rm "$venv/packages-done" 2>/dev/null && return 0
+    say "uv could not install this; trying pip"
+    "$venv/bin/python" -m pip install --progress-bar off --disable-pip-version-check "$@" && return 0
+    say "pip could not install this; its message stands above"
+    exit 1
 }
 
 make_environment() {
@@ -84,11 +77,11 @@ install_package() {
     make_environment
     if changed_since "$stamp"; then
         find_python
-        say "installing eitskin[$1]: packages, then compiling the C core; about a minute"
+        say "installing eitskin[$1]: packages, and compiling the C core; about half a minute"
         touch "$stamp.next"
         case $1 in
-        build) pip_install "$root[$1]" ;;
-        *) pip_install "$root[$1]" "$root/python" ;; # emulated board and studies, which only a checkout has
+        build) packages "$root[$1]" ;;
+        *) packages "$root[$1]" "$root/python" ;; # emulated board and studies, which only a checkout has
         esac
         mv "$stamp.next" "$stamp"
     fi
