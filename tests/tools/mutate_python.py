@@ -33,6 +33,7 @@ from mutants import ROOT, Mutant
 PACKAGE = ROOT / "python"
 ROOMS = ("solve", "device", "frames", "model")
 FOLDERS = (*(f"eitskin/{room}" for room in ROOMS), "eitskin_reference")
+PACKAGES = ("eitskin.", "eitskin_reference.")
 TESTS = ROOT / "tests" / "python"
 TEST_FOLDERS = (*ROOMS, "reference", "bytes", "core", "calibration")
 LIBRARIES = (
@@ -158,7 +159,7 @@ class _Watch:
         calls = [
             (name, code.co_firstlineno)
             for code, name in seen.items()
-            if name.startswith("eitskin.")
+            if name.startswith(PACKAGES)
         ]
         self.tests[item.nodeid] = (calls, time.process_time() - began)
 
