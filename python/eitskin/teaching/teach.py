@@ -14,15 +14,14 @@ from eitskin.errors import EitskinError, ProtocolError, UsageError
 from eitskin.fem.grid import Grid
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.checks import MIN_PRESSES, check_presses
 from eitskin.teaching.explained import (
     Explained,
-    Progress,
     explained,
     known_size,
-    quiet_progress,
     shifted_or_refused,
 )
 from eitskin.teaching.fit import Learned, learn, with_drift
@@ -85,7 +84,7 @@ def teach(
     place_sd_mm: float = 0.0,
     reference_age: int = 0,
     refuse: bool = True,
-    progress: Progress = quiet_progress,
+    progress: Progress = silent,
 ) -> Taught:
     """Learn a model from ``presses`` of ``skin``; None where it is not known. ``place_sd_mm``: how
     far places given by hand may be off, an axis. ``reference_age``: how many presses old the

@@ -23,14 +23,13 @@ from eitskin.errors import ProtocolError
 from eitskin.fem.grid import between_pixels, grid_for
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.teaching.checks import check_presses
 from eitskin.teaching.explained import (
     MIRROR_GAIN,
     PIXELS_ACROSS,
-    Progress,
     known_size,
-    quiet_progress,
     shift_note,
     shifts,
     starting_kernel,
@@ -108,7 +107,7 @@ class Updated:
 
 
 def update(
-    model: Model, presses: Presses, *, where: str = "model", progress: Progress = quiet_progress
+    model: Model, presses: Presses, *, where: str = "model", progress: Progress = silent
 ) -> Updated:
     """``model`` adapted by new ``presses``; ``where`` names it in errors.
 
@@ -327,7 +326,7 @@ def held_out_errors(
     session: Session,
     presses: Presses,
     found: dict[str, Learned],
-    progress: Progress = quiet_progress,
+    progress: Progress = silent,
 ) -> tuple[dict[str, FloatArray], dict[str, Tried]]:
     """Errors (n,) mm of each candidate for presses that it did not know, as the core solves them;
     of the old model, which knew none, for all. And the models that were tried, each with those

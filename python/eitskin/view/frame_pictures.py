@@ -1,12 +1,11 @@
 """Pictures of reconstructed frames, with the truth that they carry."""
 
-from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.scoring.score import FrameScore
 from eitskin.view.film import draw_film, thinned
 from eitskin.view.panels import draw_panels
@@ -65,7 +64,7 @@ def film_results(
     frames: Frames,
     results: dict[int, Reconstruction],
     *,
-    progress: Callable[..., Iterable[Any]] = lambda items, _: items,
+    progress: Progress = silent,
 ) -> None:
     """Image, true and found touches frame by frame, in the frames' time, or ten a second where they
     have none."""

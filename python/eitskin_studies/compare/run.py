@@ -17,6 +17,7 @@ import numpy.typing as npt
 from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import mesh_for_elements
+from eitskin.progress import Progress, silent
 from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
 from eitskin.scene.simulate import ELEMENTS, Measurement, Simulated, simulate
 from eitskin.scoring import metrics
@@ -35,8 +36,6 @@ from eitskin_studies.harness.thresholds import (
     match_all,
     miou_curves,
 )
-
-Progress = Callable[[Sequence[Any], str], Iterable[Any]]
 
 TOUCH_THRESHOLDS = THRESHOLDS[4::5]
 
@@ -164,18 +163,13 @@ class _Session:
     centres_mm: tuple[FloatArray, ...]
 
 
-def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
-    """No progress shown."""
-    return items
-
-
 def compare(
     skin: Skin,
     protocol: Protocol,
     settings: CompareSettings | None = None,
     *,
     families: Callable[[Setup], Sequence[Family]] = methods,
-    progress: Progress = plain,
+    progress: Progress = silent,
 ) -> Comparison:
     """Run the comparison; the same arguments give the same numbers.
 

@@ -3,7 +3,7 @@ as it comes."""
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,9 +16,10 @@ from eitskin import __version__
 from eitskin.core.engine import load_core
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import write_beside
+from eitskin.progress import Progress
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
-from eitskin_studies.harness.sessions import Progress, SceneSolver
+from eitskin_studies.harness.sessions import SceneSolver
 from eitskin_studies.harness.store import Store, key_of
 
 SIMULATED_ELEMENTS = 11_000
@@ -161,8 +162,3 @@ def workspace_in(folder: Path, settings: ExperimentSettings, progress: Progress)
             f"{folder}: cannot make this folder ({error.strerror}); name another with -o"
         ) from None
     return Workspace(settings, folder, progress, Store(folder / "results.jsonl"))
-
-
-def plain(items: Iterable[Any], what: str) -> Iterable[Any]:
-    """No progress shown."""
-    return items

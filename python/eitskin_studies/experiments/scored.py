@@ -12,11 +12,12 @@ import numpy.typing as npt
 from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.model.model import Model
+from eitskin.progress import Progress
 from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.solve.batch import reconstruct_many
-from eitskin_studies.harness.sessions import FrameSession, Progress, SceneSolver
+from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 from eitskin_studies.harness.summary import Summary
 from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 

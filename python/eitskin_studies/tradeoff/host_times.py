@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
+from eitskin.progress import Progress
 from eitskin.tuning.configuration import Configuration
 from eitskin_studies.harness.bare_core import bare_calls
-from eitskin_studies.harness.sessions import MeasuredFrames, Progress
+from eitskin_studies.harness.sessions import MeasuredFrames
 from eitskin_studies.tradeoff.engines import Built
 
 SCENES = 8
