@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.calibration.weights import Weight
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FrameError
@@ -28,7 +27,7 @@ class Presses:
     def __len__(self) -> int:
         return len(self.force_n)
 
-    def take(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> "Presses":
+    def take(self, rows: IntArray | BoolArray) -> "Presses":
         return Presses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
 
 

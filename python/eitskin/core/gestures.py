@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import load_core
 from eitskin.core.gestures_table import EventKind, EventPhase
@@ -221,6 +221,6 @@ def _event(one: Any, zone_name: str | None = None) -> GestureEvent:
     )  # fmt: skip
 
 
-def event_numbers(events: Iterable[GestureEvent]) -> npt.NDArray[np.float64]:
+def event_numbers(events: Iterable[GestureEvent]) -> FloatArray:
     """The events' numbers (k, 10), to compare two lists bit by bit."""
     return np.array([[getattr(one, name) for name in _NAMES] for one in events]).reshape(-1, 10)

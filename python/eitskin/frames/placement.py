@@ -2,12 +2,10 @@
 a protocol's order, signs."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eitskin.arrays import IntArray
+from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.orders import (
@@ -77,11 +75,11 @@ class Placement:
 
     channels: int
     index: IntArray
-    sign: NDArray[np.float64]
-    blank: NDArray[np.bool_]
+    sign: FloatArray
+    blank: BoolArray
     magnitude: bool
 
-    def frame(self, values: NDArray[Any]) -> NDArray[Any]:
+    def frame(self, values: AnyArray) -> AnyArray:
         """A frame (m,) of ``values`` (channels,), real or complex; NaN is a row that cannot be
         used."""
         placed = values[self.index]
@@ -131,7 +129,7 @@ def place(options: ImportOptions, protocol: Protocol | None, model: Model, where
     return Placement(len(rows), index, sign, blank, magnitude)
 
 
-def _expected(model: Model) -> NDArray[np.float64]:
+def _expected(model: Model) -> FloatArray:
     """The model's own voltages of the untouched skin (m,); 0 of rows that it does not use."""
     expected = np.zeros(model.protocol.n_rows)
     fold = model.fold

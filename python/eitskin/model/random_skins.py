@@ -11,9 +11,8 @@ described. What amplitude, place and radius of the discs can explain is taken ou
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.core.constants_table import MAX_RATIO, MAX_ROW_GAIN, RATIO_DEFINED
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.deform import Deformation, Rim
@@ -58,7 +57,7 @@ def sensitivity_of(
     forward: ForwardModel,
     pairs: FloatArray,
     v0: FloatArray,
-    elements: npt.NDArray[np.int64],
+    elements: IntArray,
 ) -> FloatArray:
     """The change of the folded datum with the conductivity of ``elements`` (e,), (k, e): ``pairs``
     are the fields of ``forward``, ``v0`` (k,) its voltages."""
@@ -179,7 +178,7 @@ class RandomSkins:
             )
         return np.asarray(gain * (v - v0))
 
-    def _sensitivity(self, elements: npt.NDArray[np.int64]) -> FloatArray:
+    def _sensitivity(self, elements: IntArray) -> FloatArray:
         return sensitivity_of(self.request, self.forward, self._pairs, self.v_ref, elements)
 
     def _columns(self, disc: ShapedTouch) -> FloatArray:

@@ -6,10 +6,9 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin import __version__
-from eitskin.arrays import FloatArray
+from eitskin.arrays import AnyArray, FloatArray
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
 from eitskin.progress import Progress, silent
@@ -31,7 +30,7 @@ class SceneRun:
     """
 
     voltage_v: FloatArray
-    true_v: npt.NDArray[Any]
+    true_v: AnyArray
     work: Work
     recorded_factorisations: int
     generators: int
@@ -123,7 +122,7 @@ def blend(readings: dict[int, TrueVoltages], mix: Mix) -> TrueVoltages:
     low, high = (np.searchsorted(numbers, one) for one in (mix.lower, upper))
     rows = np.arange(len(low))
 
-    def between(values: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    def between(values: list[AnyArray]) -> AnyArray:
         stack = np.array(values)
         first = stack[low, rows]
         return np.asarray(first + mix.part * (stack[high, rows] - first))
@@ -159,7 +158,7 @@ def simulate_frames(compiled: Compiled, progress: Progress = silent) -> SceneRun
     return SceneRun(voltage_v, true_v, maker.work, recorded, compiled.work.generators)
 
 
-def _reader(compiled: Compiled) -> Callable[[npt.NDArray[Any], State], TrueVoltages]:
+def _reader(compiled: Compiled) -> Callable[[AnyArray, State], TrueVoltages]:
     patterns, protocol = compiled.model.patterns, compiled.scene.protocol
     if compiled.needs_whole_reader:
         whole = WholeReader(patterns, protocol, compiled.bridge_pairs)

@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import (
     LearnedReference,
@@ -86,7 +87,7 @@ class Batch:
         self._last = self._last[:0]
         return self._on_each(lambda one: one.set_reference(frames))
 
-    def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
+    def mask_rows(self, rows: BoolArray) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before
         ``tare``."""
         self._on_each(lambda one: one.mask_rows(rows))

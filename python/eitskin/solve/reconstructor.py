@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.config import nearest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import (
@@ -134,7 +134,7 @@ class Reconstructor:
         check_shape(frames, self.model.protocol.n_rows, "reference", least=1)
         return self._engine.set_reference(frames)
 
-    def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
+    def mask_rows(self, rows: BoolArray) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before
         ``tare``.
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.calibration.fit import calibrate
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import EitskinError, ProtocolError, UsageError
@@ -36,7 +35,7 @@ from eitskin.teaching.make import LEAST_SHARES, taught_model
 from eitskin.teaching.presses import Presses, aged
 
 # models, each with the numbers of presses that it did not know
-Tried = list[tuple[Model, npt.NDArray[np.int64]]]
+Tried = list[tuple[Model, IntArray]]
 
 FEW_PRESSES = 50
 FEWEST_LEVELS = 3  # of depth or force, for a law
@@ -59,10 +58,10 @@ class HeldOut:
     covariance by the fit (inf where there is none), and which presses they are."""
 
     error_mm: FloatArray
-    count: npt.NDArray[np.int64]
+    count: IntArray
     strength: FloatArray
     mahalanobis2: FloatArray
-    which: npt.NDArray[np.int64]
+    which: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +167,7 @@ def squared(away_mm: FloatArray, touch: Touch) -> float:
 
 
 def model_without(
-    found: Explained, kept: npt.NDArray[np.int64], reference_age: int, least_share: float
+    found: Explained, kept: IntArray, reference_age: int, least_share: float
 ) -> Model:
     """A model of the presses ``kept`` with the kernel of all, and the drift of all."""
     presses, process, given = found.presses, found.learned.process, known_size(found.presses)
@@ -226,7 +225,7 @@ def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
     return LEAST_SHARES[k], held
 
 
-def best_share(alone: FloatArray, two: npt.NDArray[np.bool_]) -> int:
+def best_share(alone: FloatArray, two: BoolArray) -> int:
     """Which of k shares is best: ``alone`` (k,) of single presses count as one, ``two`` (k, n) of
     sums are told as two. With few sums the least that leaves single ones alone."""
     few = two.shape[1] < FEWEST_SUMS
@@ -236,16 +235,14 @@ def best_share(alone: FloatArray, two: npt.NDArray[np.bool_]) -> int:
     return int(enough[0 if few else np.argmax((alone + two.mean(axis=1))[enough])])
 
 
-def near_sums(place_mm: FloatArray, width_mm: float) -> npt.NDArray[np.int64]:
+def near_sums(place_mm: FloatArray, width_mm: float) -> IntArray:
     """Pairs (k, 2) of presses at ``place_mm`` (n, 2) that the core can just tell apart."""
     away = np.linalg.norm(place_mm[:, None] - place_mm, axis=2) / width_mm
     pairs = np.argwhere(np.triu((away > SUMS_FROM) & (away < SUMS_TO), 1))
     return np.random.default_rng(3).permutation(pairs)[:MAX_SUMS]
 
 
-def told_as_two(
-    model: Model, presses: Presses, pairs: npt.NDArray[np.int64]
-) -> npt.NDArray[np.bool_]:
+def told_as_two(model: Model, presses: Presses, pairs: IntArray) -> BoolArray:
     """Whether the core finds two touches and no more, each at its own, where two of ``presses``,
     numbered by ``pairs`` (k, 2), are added."""
     core, told = Reconstructor(model), np.zeros(len(pairs), dtype=bool)

@@ -16,9 +16,8 @@ from math import exp, log
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import ProtocolError
 from eitskin.fem.grid import between_pixels, grid_for
 from eitskin.model.force_law import LoadLaw
@@ -223,7 +222,7 @@ def _mirrored_or_not(session: Session, presses: Presses) -> tuple[Session, bool]
     return (other, True) if turned > plain + MIRROR_GAIN else (session, False)
 
 
-def _strangers(session: Session, learned: Learned) -> npt.NDArray[np.int64]:
+def _strangers(session: Session, learned: Learned) -> IntArray:
     """Presses that the others and the old noise do not explain; new noise would hide them."""
     white = whitening_of(session.old.noise / session.unit / session.unit[:, None])
     misfit = np.sum((learned.process.left_out() @ white.T) ** 2, axis=1)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import write_beside
@@ -204,7 +205,7 @@ def panels_figure(
 def frame_figure(
     skin: Skin,
     grid: Grid,
-    image: npt.NDArray[Any],
+    image: AnyArray,
     *,
     truth: Sequence[Mark] = (),
     found: Sequence[Mark] = (),

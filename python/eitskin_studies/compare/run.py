@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.progress import Progress, silent
@@ -159,7 +158,7 @@ class _Session:
 
     simulated: Simulated
     dv: FloatArray
-    truths: npt.NDArray[np.bool_]
+    truths: BoolArray
     centres_mm: tuple[FloatArray, ...]
 
 
@@ -228,7 +227,7 @@ def compare(
     )
 
 
-def truth_masks(touches: TouchSet, points_mm: FloatArray) -> npt.NDArray[np.bool_]:
+def truth_masks(touches: TouchSet, points_mm: FloatArray) -> BoolArray:
     """The touches of each scene on the raster's cells (p, 2): (k, p)."""
     return np.array([scene.mask(points_mm) for scene in touches.scenes])
 

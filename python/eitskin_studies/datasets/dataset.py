@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import AnyArray
 from eitskin.config import load_toml
 from eitskin.errors import ConfigError, EitskinError, FileError, UsageError, missing_extra
 from eitskin.fileio import parse_json, write_bytes
@@ -312,7 +312,7 @@ def _over_dask(job: Job, chunks: list[int], scheduler: str) -> Iterator[tuple[in
             yield futures[future], content
 
 
-def load_chunk(path: str | Path) -> dict[str, npt.NDArray[Any]]:
+def load_chunk(path: str | Path) -> dict[str, AnyArray]:
     """The arrays of one chunk.
 
     Raises:
@@ -326,7 +326,7 @@ def load_chunk(path: str | Path) -> dict[str, npt.NDArray[Any]]:
     return arrays
 
 
-def frames_of(chunk: dict[str, npt.NDArray[Any]], number: int) -> Frames:
+def frames_of(chunk: dict[str, AnyArray], number: int) -> Frames:
     """Scene ``number`` (from 0, in the chunk) as frames with truth, to be reconstructed like any
     others.
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin import __version__
+from eitskin.arrays import AnyArray
 from eitskin.core.engine import load_core
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import write_beside
@@ -114,8 +114,8 @@ class Workspace:
         return self.store.put(whole, make()) if found is None else found
 
     def kept_arrays(
-        self, facts: Mapping[str, Any], make: Callable[[], Mapping[str, npt.NDArray[Any]]]
-    ) -> dict[str, npt.NDArray[Any]]:
+        self, facts: Mapping[str, Any], make: Callable[[], Mapping[str, AnyArray]]
+    ) -> dict[str, AnyArray]:
         """The same for named arrays, in a file of their own below the folder."""
         path = (
             self.folder

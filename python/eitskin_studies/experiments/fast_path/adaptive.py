@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.model.model import Model
 from eitskin.progress import Progress
@@ -27,8 +27,6 @@ from eitskin_studies.experiments.fast_path.states import (
     States,
     draw_states,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 MEASURED = {
     "with_false": "scenes with a false touch",
