@@ -108,10 +108,8 @@ class Gestures:
     """Makes events of each frame's tracked touches; ``zones`` are evaluated beside. ``options``
     replace the usual ones of eits_gesture_options by name."""
 
-    def __init__(
-        self, zones: Sequence[Zone] = (), *, width: str = "float32", **options: float
-    ) -> None:
-        module = load_core(width)
+    def __init__(self, zones: Sequence[Zone] = (), **options: float) -> None:
+        module = load_core("float32")
         self._lib, self._ffi = module.lib, module.ffi
         self._options = self._ffi.new("eits_gesture_options *")
         self._lib.eits_gestures_usual(self._options)

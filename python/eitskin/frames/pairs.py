@@ -24,6 +24,7 @@ UNITS = {"deg": "degrees", "degs": "degrees", "degree": "degrees", "degrees": "d
 UNITS |= {"°": "degrees", "rad": "radians", "rads": "radians", "radian": "radians"}
 UNITS["radians"] = "radians"
 HALVES = {"real": "real-imag", "imag": "real-imag", "magnitude": "polar", "phase": "polar"}
+SHOWN = 4
 MOST_RADIANS = 12.6  # two turns
 A_PART = {"imag": "an imaginary part", "phase": "a phase"}
 
@@ -148,5 +149,5 @@ def _words(name: str) -> list[str]:
     return re.findall(r"[a-z]+|°", name.lower())
 
 
-def _some(names: Sequence[str], most: int = 4) -> str:
-    return ", ".join(names[:most]) + (", ..." if len(names) > most else "")
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")

@@ -214,12 +214,10 @@ def with_model_errors(
     uncertainty: Uncertainty,
     elements: int = 3000,
     *,
-    jobs: int | None = None,
     progress: Progress = silent,
 ) -> Model:
-    """``model`` of ``skin`` with the errors that ``uncertainty`` makes, drawn by ``jobs`` processes
-    (None: one a core) on a mesh of twice ``elements``, at
-    most 6000.
+    """``model`` of ``skin`` with the errors that ``uncertainty`` makes, drawn on a mesh of twice
+    ``elements``, at most 6000.
 
     ``progress`` wraps the samples as they are done, and is told how many there are."""
     from eitskin.fem.mesh import mesh_for_elements
@@ -236,7 +234,7 @@ def with_model_errors(
         grid=model.grid,
         uncertainty=uncertainty,
     )
-    return replace(model, model_errors=draw_model_errors(request, jobs=jobs, progress=progress))
+    return replace(model, model_errors=draw_model_errors(request, progress=progress))
 
 
 def stored_fields(skin: Skin, protocol: Protocol, linear: Linearisation) -> Fields | None:

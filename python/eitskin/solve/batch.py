@@ -134,7 +134,6 @@ def reconstruct_many(
     quiet_v: npt.ArrayLike,
     *,
     threads: int | None = None,
-    engine: str = "c",
     options: Options | None = None,
     touches: bool = True,
 ) -> list[Reconstruction]:
@@ -145,7 +144,7 @@ def reconstruct_many(
         FrameError: a frame cannot be used; the text has its number.
         UsageError, ModelError: as :class:`Batch`.
     """
-    batch = Batch(model, threads=threads, engine=engine, options=options)
+    batch = Batch(model, threads=threads, options=options)
     batch.tare(quiet_v)
     found: list[Reconstruction] = []
     for number, result in enumerate(batch.each(frames_v, touches=touches)):

@@ -69,12 +69,10 @@ class Reconstructor:
         self.set_options(options or self._options)
 
     @classmethod
-    def from_file(
-        cls, path: str | Path, *, engine: str = "c", options: Options | None = None
-    ) -> "Reconstructor":
+    def from_file(cls, path: str | Path, *, engine: str = "c") -> "Reconstructor":
         """With the model in the file ``path``; raises what ``load_model`` raises besides."""
         model, blob = load_model(path)
-        return cls(model, engine=engine, options=options, blob=blob)
+        return cls(model, engine=engine, blob=blob)
 
     @property
     def c_engine(self) -> CoreEngine | None:

@@ -41,8 +41,6 @@ def draw_results(
     frames: Frames,
     results: dict[int, Reconstruction],
     scores: dict[int, FrameScore],
-    *,
-    title: str = "",
 ) -> None:
     """A panel a frame, the first 36: image, true touches as circles, found ones as crosses and
     dashed circles."""
@@ -55,7 +53,7 @@ def draw_results(
         panels.append(_panel(heading, frames, number, result))
     more = len(results) > MAX_PANELS
     note = f"the first {MAX_PANELS} of {len(results)} frames" if more else ""
-    draw_panels(path, model.skin, model.grid, panels, title=title, note=note, legend=True)
+    draw_panels(path, model.skin, model.grid, panels, note=note, legend=True)
 
 
 def film_results(
