@@ -16,7 +16,7 @@ NEAR_MM = 25.0  # a touch that far from where the weight is said to be is not it
 
 
 @dataclass(frozen=True, eq=False)
-class Presses:
+class WeighedPresses:
     """k presses: ``force_n`` (k,) N as the list says; ``strength`` (k,) S/m mm^2, the median over
     the press's frames, and ``place_mm`` (k, 2) as found, medians too."""
 
@@ -27,13 +27,13 @@ class Presses:
     def __len__(self) -> int:
         return len(self.force_n)
 
-    def take(self, rows: IntArray | BoolArray) -> "Presses":
-        return Presses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
+    def take(self, rows: IntArray | BoolArray) -> "WeighedPresses":
+        return WeighedPresses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
 
 
-def joined(parts: Sequence[Presses]) -> Presses:
+def joined(parts: Sequence[WeighedPresses]) -> WeighedPresses:
     """All of several recordings."""
-    return Presses(
+    return WeighedPresses(
         np.concatenate([part.force_n for part in parts]),
         np.concatenate([part.strength for part in parts]),
         np.concatenate([part.place_mm for part in parts]),
@@ -46,7 +46,7 @@ def find_presses(
     numbers: Sequence[int],
     weights: Sequence[Weight],
     where: str,
-) -> tuple[Presses, list[str]]:
+) -> tuple[WeighedPresses, list[str]]:
     """The presses of ``weights`` in ``frames``, whose frames are counted by ``numbers``; and a line
     for each that shows no touch."""
     at = {number: k for k, number in enumerate(numbers)}
@@ -67,7 +67,7 @@ def find_presses(
         found = np.median([(abs(t.strength_s_per_m_mm2), t.x_mm, t.y_mm) for t in touches], axis=0)
         seen.append((weight.force_n, *found.tolist()))
     table = np.array(seen, dtype=np.float64).reshape(-1, 4)
-    return Presses(table[:, 0], table[:, 1], table[:, 2:]), unseen
+    return WeighedPresses(table[:, 0], table[:, 1], table[:, 2:]), unseen
 
 
 def _pressed(reconstructor: Reconstructor, frame_v: FloatArray, weight: Weight) -> Touch | None:

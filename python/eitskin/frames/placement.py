@@ -68,7 +68,7 @@ def table_rows(options: ImportOptions) -> IntArray | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class RowPlacement:
     """From frames as a source lists them to a model's rows: row r is ``sign[r]`` times the source's
     channel ``index[r]`` (``magnitude``: times its size), and unusable where ``blank[r]``.
     ``channels``: of a source's frame."""
@@ -88,7 +88,9 @@ class Placement:
         return np.asarray(np.where(self.blank, np.nan, placed * self.sign))
 
 
-def place(options: ImportOptions, protocol: Protocol | None, model: Model, where: str) -> Placement:
+def place(
+    options: ImportOptions, protocol: Protocol | None, model: Model, where: str
+) -> RowPlacement:
     """How frames that stand as ``options`` say come to the rows of ``model``; ``protocol``: the
     source's, None: the model's."""
     if options.equalise:
@@ -126,7 +128,7 @@ def place(options: ImportOptions, protocol: Protocol | None, model: Model, where
     check_range(options.drop_channels, len(measured), "--drop-channels")
     blank = touching(measured, options.drop_electrodes)
     blank[list(options.drop_channels)] = True
-    return Placement(len(rows), index, sign, blank, magnitude)
+    return RowPlacement(len(rows), index, sign, blank, magnitude)
 
 
 def _expected(model: Model) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.core.constants_table import MAX_RATIO, MAX_ROW_GAIN, RATIO_DEFINED
 from eitskin.fem.cem import ForwardModel
-from eitskin.fem.deform import Deformation, Rim
+from eitskin.fem.deform import MeshDeformation, Rim
 from eitskin.fem.grid import Grid
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.sensitivity import element_fields
@@ -81,7 +81,7 @@ class RandomSkins:
         self.request = request
         skin, mesh = request.skin, request.mesh
         self.forward = ForwardModel(mesh, skin, request.protocol)
-        self.deformation = Deformation(mesh)
+        self.deformation = MeshDeformation(mesh)
         self.cover = TouchCover(mesh)
         self.radius_mm = float(np.sqrt(skin.outline.area_mm2 / np.pi))
         self.conductivity = np.full(mesh.n_elements, skin.conductivity_s_per_m)

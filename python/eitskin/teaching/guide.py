@@ -23,7 +23,7 @@ from eitskin.arrays import FloatArray
 from eitskin.device.settings import ScanSettings
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import UsageError
-from eitskin.teaching.plan import Plan
+from eitskin.teaching.plan import PressPlan
 from eitskin.teaching.press_file import PressFile
 
 PACE_US = 25_000  # a frame: a hold of twelve is .3 s
@@ -71,7 +71,7 @@ class PressGuide:
         UsageError: the plan has no place ``start``.
     """
 
-    def __init__(self, plan: Plan, start: int = 0) -> None:
+    def __init__(self, plan: PressPlan, start: int = 0) -> None:
         if not 0 <= start <= len(plan):
             raise UsageError(f"teach: the plan has {len(plan)} places, so not number {start + 1}")
         self.plan = plan

@@ -291,7 +291,7 @@ def learning_curve(
 def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | None, list[str]]:
     """The law from strength to force, or where presses have a depth to that, from presses held
     out."""
-    from eitskin.calibration.presses import Presses as Weights
+    from eitskin.calibration.presses import WeighedPresses
 
     given = known_size(presses)
     if given is None:
@@ -308,7 +308,9 @@ def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | Non
     unit = "force in newtons" if presses.force_n is not None else "depth in mm, in place of newtons"
     try:
         places = presses.place_mm[held.which][good]
-        found = calibrate(Weights(size[good], held.strength[good], places), reach, resamples=0)
+        found = calibrate(
+            WeighedPresses(size[good], held.strength[good], places), reach, resamples=0
+        )
     except EitskinError as error:
         return None, [f"touches have no force: {error}"]
     rms = float(np.sqrt(np.mean((found.left_out * size[good]) ** 2)))

@@ -18,7 +18,7 @@ from eitskin.arrays import FloatArray
 from eitskin.config import nearest
 from eitskin.errors import GeometryError, UsageError
 from eitskin.fem.cem import ForwardModel
-from eitskin.fem.deform import Deformation
+from eitskin.fem.deform import MeshDeformation
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.fileio import write_beside
 from eitskin.progress import Progress, silent
@@ -76,8 +76,8 @@ class WorldFactory:
         return ForwardModel(self.mesh, self.skin, self.protocol)
 
     @cached_property
-    def _deformation(self) -> Deformation:
-        return Deformation(self.mesh)
+    def _deformation(self) -> MeshDeformation:
+        return MeshDeformation(self.mesh)
 
     @cached_property
     def _radius_mm(self) -> float:
