@@ -15,7 +15,7 @@ from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.sinks.outputs import Outputs
-from eitskin.sinks.sink import Source
+from eitskin.sinks.sink import TouchSource
 from eitskin.tuning.for_model import chosen_point
 from eitskin.tuning.front import Target
 from eitskin.tuning.front import preset as named_preset
@@ -95,7 +95,7 @@ def stream(
     )
     with Session(url, settings, speed=speed) as session:
         known = None if session.known is None else session.known.model
-        source = Source(session.device.transport.url, session.device.board.board, known)
+        source = TouchSource(session.device.transport.url, session.device.board.board, known)
         with Outputs(to, source, patient=session.patient) as outputs:
             yield from _frames(session, outputs)
             facts = session.finish().as_dict()

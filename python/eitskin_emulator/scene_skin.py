@@ -1,15 +1,13 @@
 """A scene as the emulated skin's frames."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.errors import ProtocolError
 from eitskin.scene.board_frames import BoardFrames, SceneRows
 from eitskin.scene.description import Scene
 from eitskin.skin.protocol import Protocol
 from eitskin_emulator.analog.skin import AnalogSkin
-
-FloatArray = npt.NDArray[np.float64]
 
 DONE_BY_THE_BOARD = ("adc",)
 MAX_QUIET = 1024  # as many as a tare takes

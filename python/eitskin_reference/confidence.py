@@ -2,8 +2,8 @@
 scenes with a truth."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_reference.constants_table import (
     CONFIDENCE_HALF,
     MAX_MOVE,
@@ -21,7 +21,6 @@ from eitskin_reference.evidence import Tested
 from eitskin_reference.places import Corrected
 from eitskin_reference.problem import orthonormal
 
-FloatArray = npt.NDArray[np.float64]
 PLACE_PARAMETERS = 4  # of a disc: strength, place, radius
 
 

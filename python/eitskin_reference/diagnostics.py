@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.results import Options
 from eitskin.model.model import Model
@@ -54,9 +55,6 @@ from eitskin_reference.constants_table import (
     STALE_NOISE,
     STALE_RATIO,
 )
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 CROWD_WEIGHTS = (
     CROWD_TOUCHES,

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Options
 from eitskin.model.model import Model
 from eitskin_reference.constants_table import (
@@ -21,8 +21,6 @@ from eitskin_reference.constants_table import (
     STEP_TRIALS,
     STRENGTH_PASSES,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

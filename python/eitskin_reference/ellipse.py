@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_reference.constants_table import (
     ELLIPSE_EVIDENCE,
     ELLIPSE_EXPECTED,
@@ -13,8 +13,6 @@ from eitskin_reference.constants_table import (
     MAX_MOVE,
 )
 from eitskin_reference.disc_fit import Disc, Fit
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def long_axis(

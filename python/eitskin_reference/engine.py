@@ -12,6 +12,7 @@ from time import perf_counter_ns
 
 import numpy as np
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import INTERACTION
 from eitskin.core.results import Info, LearnedReference, Options, Reconstruction
@@ -28,7 +29,6 @@ from eitskin_reference.frame_stage import FrameStage
 from eitskin_reference.interaction import interplay, turned_dipoles
 from eitskin_reference.problem import (
     Certificate,
-    FloatArray,
     Problem,
     SolveResult,
     greatest,

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_reference.constants_table import (
     CLEAR,
     CLEAR_AS_DISCS,
@@ -48,8 +48,6 @@ from eitskin_reference.ellipse import long_axis, placed
 from eitskin_reference.pair import pair_lines, pair_scores
 from eitskin_reference.places import Corrected
 from eitskin_reference.split_merge import merged
-
-FloatArray = npt.NDArray[np.float64]
 
 # what a disc's parameters are: strength (relative), x, y (pixels), radius (over the fitted one),
 # two of an ellipse's edge and two of its dipole

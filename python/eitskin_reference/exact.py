@@ -8,8 +8,8 @@ products are solved with again at each step; the core keeps a factor of them up 
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin_reference.constants_table import (
@@ -24,9 +24,7 @@ from eitskin_reference.constants_table import (
     TOLERANCE_EPSILONS,
     WORTHWHILE,
 )
-from eitskin_reference.problem import FloatArray, Problem, SolveResult, shrink
-
-IntArray = npt.NDArray[np.int64]
+from eitskin_reference.problem import Problem, SolveResult, shrink
 
 
 def coordinate(

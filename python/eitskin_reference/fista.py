@@ -3,6 +3,7 @@ column or on a working set."""
 
 import numpy as np
 
+from eitskin.arrays import FloatArray
 from eitskin.core.results import Options
 from eitskin_reference.constants_table import (
     LOOK_GROWTH,
@@ -13,7 +14,6 @@ from eitskin_reference.constants_table import (
 )
 from eitskin_reference.problem import (
     Certificate,
-    FloatArray,
     SolveResult,
     check_gap,
     project,

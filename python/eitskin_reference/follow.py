@@ -2,8 +2,8 @@
 eits_check_drift do, for tests and studies."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin_reference.constants_table import (
     DRIFT_CLEAR,
     DRIFT_UNEXPLAINED,
@@ -13,9 +13,6 @@ from eitskin_reference.constants_table import (
     FOLLOW_TOUCH,
 )
 from eitskin_reference.problem import orthonormal, project
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 class Follower:

@@ -4,8 +4,8 @@ it.
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.diagnostics_table import DIAGNOSTICS
 from eitskin.core.options_table import LOG_DATA
@@ -29,7 +29,6 @@ from eitskin_reference.constants_table import (
 from eitskin_reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
 from eitskin_reference.places import Corrected, corrected
 from eitskin_reference.problem import (
-    FloatArray,
     greatest,
     orthonormal,
     project,
@@ -37,8 +36,6 @@ from eitskin_reference.problem import (
 from eitskin_reference.reference_outliers import clean
 from eitskin_reference.row_gains import row_gains
 from eitskin_reference.whitening import Whitening, filled, form_of, whiten
-
-BoolArray = npt.NDArray[np.bool_]
 
 DEAD = "all voltages are zero; is the skin driven and connected?"
 

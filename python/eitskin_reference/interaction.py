@@ -4,13 +4,11 @@ data on the folded rows."""
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.model.model import Model
 from eitskin_reference.constants_table import NO_DIPOLE_MM2
 from eitskin_reference.disc_fit import Disc
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def interplay(model: Model, discs: Sequence[Disc]) -> FloatArray:

@@ -1,8 +1,8 @@
 """The numpy reference of csrc/src/evidence/pair.c: whether a disc may be two touches."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_reference.constants_table import (
     PAIR_BOTH,
     PAIR_BULGE,
@@ -13,8 +13,6 @@ from eitskin_reference.constants_table import (
     PAIR_MIN_VARIANCE,
     PAIR_OFFSET,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def pair_scores(offsets: FloatArray, step: FloatArray, variance: FloatArray) -> FloatArray:

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.grid import Grid
 from eitskin.model.model_errors import ModelErrors
 from eitskin_reference.constants_table import MAX_SHIFT, ROW_SPREAD
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

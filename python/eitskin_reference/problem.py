@@ -7,11 +7,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin_reference.constants_table import BASIS_TOLERANCE, MAX_RISE
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def shrink(v: FloatArray, threshold: float, sign: str) -> FloatArray:

@@ -2,8 +2,8 @@
 written for reading."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.skin.protocol import Reciprocity
 from eitskin_reference.constants_table import (
     CHANGED_AS_MUCH,
@@ -15,9 +15,6 @@ from eitskin_reference.constants_table import (
     UNPAIRED_MIN,
 )
 from eitskin_reference.diagnostics import robust
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 def odd_rows(

@@ -2,16 +2,14 @@
 model's own, row by row."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.model.model import Model
 from eitskin_reference.constants_table import MAX_DISTANCE, MAX_RECIPROCITY, MAX_ROW_GAIN
 
-FloatArray = npt.NDArray[np.float64]
-
 
 def row_gains(
-    model: Model, usable: npt.NDArray[np.bool_], v0: FloatArray
+    model: Model, usable: BoolArray, v0: FloatArray
 ) -> tuple[FloatArray, FloatArray, bool]:
     """What each row's data are multiplied by (m,), from a reference ``v0`` (m,) in the model's
     volts and where it is ``usable`` (m,); how far each fold is from the model, log(v_ref / v0)

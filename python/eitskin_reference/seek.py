@@ -2,8 +2,8 @@
 written for reading."""
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.options_table import SIGNS
 from eitskin_reference.constants_table import (
     CENTRE_SHARE,
@@ -14,8 +14,6 @@ from eitskin_reference.constants_table import (
     SEEK_SWEEPS,
 )
 from eitskin_reference.disc_fit import Disc, Fit
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def seek(fit: Fit) -> None:

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import SPLIT_MERGE
 from eitskin.core.results import Options
@@ -26,7 +26,6 @@ from eitskin_reference.evidence import DataErrors, keep_likely
 from eitskin_reference.seek import centre, seek
 from eitskin_reference.split_merge import join, part
 
-FloatArray = npt.NDArray[np.float64]
 Interplay = Callable[[Sequence[Disc]], FloatArray]
 
 

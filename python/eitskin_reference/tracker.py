@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import MAX_TOUCHES
 from eitskin.core.results import Options
@@ -23,7 +23,6 @@ from eitskin_reference.constants_table import (
     TENTATIVE_REACH,
 )
 
-FloatArray = npt.NDArray[np.float64]
 Pairing: TypeAlias = Callable[[FloatArray, float], list[tuple[int, int]]]
 
 

@@ -4,8 +4,8 @@ model would have had without the rows that a frame lacks, or with a higher regul
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.model.model import Model
 from eitskin_reference.constants_table import (
     LOST,
@@ -19,9 +19,6 @@ from eitskin_reference.constants_table import (
     REST_POWER,
     STEP_MARGIN,
 )
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.arrays import FloatArray, IntArray
-from eitskin.calibration.presses import Presses
+from eitskin.calibration.presses import WeighedPresses
 from eitskin.errors import FrameError, missing_extra
 from eitskin.model.force_law import MAX_ORDER, LoadLaw, monomials
 
@@ -152,7 +152,7 @@ def weights_of(force_n: FloatArray) -> FloatArray:
     return np.asarray(ascending[np.concatenate([[True], another])])
 
 
-def check_presses(presses: Presses) -> None:
+def check_presses(presses: WeighedPresses) -> None:
     """Refuse what cannot fix a law."""
     if len(presses) < MIN_PRESSES:
         raise FrameError(
@@ -173,7 +173,7 @@ def check_presses(presses: Presses) -> None:
 
 
 def calibrate(
-    presses: Presses, radius_mm: float, seed: int = 1, resamples: int = RESAMPLES
+    presses: WeighedPresses, radius_mm: float, seed: int = 1, resamples: int = RESAMPLES
 ) -> Calibration:
     """The law of a skin whose image reaches ``radius_mm`` from its middle; the intervals by
     ``resamples`` of its places.
@@ -232,7 +232,7 @@ def _steepness(fitted: FittedLaw, force_n: FloatArray) -> float:
     return float((high - low) / np.log(ends[1] / ends[0]))
 
 
-def fit(presses: Presses, radius_mm: float, form: str, order: int) -> FittedLaw:
+def fit(presses: WeighedPresses, radius_mm: float, form: str, order: int) -> FittedLaw:
     """One law and order to all ``presses``."""
     try:
         from scipy.optimize import least_squares
@@ -279,7 +279,9 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> FittedLaw:
     )
 
 
-def law_of(fitted: FittedLaw, presses: Presses, radius_mm: float, uncertainty: float) -> LoadLaw:
+def law_of(
+    fitted: FittedLaw, presses: WeighedPresses, radius_mm: float, uncertainty: float
+) -> LoadLaw:
     """``fitted`` as a model holds it: the law as a table up to the greatest load of ``presses``,
     evenly by strength."""
     shape, most = FORMS[fitted.form], float(presses.force_n.max())
@@ -296,7 +298,7 @@ def law_of(fitted: FittedLaw, presses: Presses, radius_mm: float, uncertainty: f
 
 
 def _left_out(
-    presses: Presses, radius_mm: float, fold: IntArray, form: str, order: int
+    presses: WeighedPresses, radius_mm: float, fold: IntArray, form: str, order: int
 ) -> FloatArray:
     """Relative error (k,) of each press's load by the fit to the presses of other folds."""
     errors = np.empty(len(presses))
@@ -324,7 +326,12 @@ def _rms_log(errors: FloatArray) -> float:
 
 
 def _interval(
-    presses: Presses, radius_mm: float, fitted: FittedLaw, fold: IntArray, seed: int, resamples: int
+    presses: WeighedPresses,
+    radius_mm: float,
+    fitted: FittedLaw,
+    fold: IntArray,
+    seed: int,
+    resamples: int,
 ) -> tuple[tuple[float, float], ...]:
     """95 % of the law's numbers over fits to folds drawn with replacement."""
     generator, count = np.random.default_rng(seed), int(fold.max()) + 1
@@ -339,7 +346,7 @@ def _interval(
     return tuple((float(low), float(high)) for low, high in ends.T)
 
 
-def _scatter(presses: Presses, errors: FloatArray) -> float:
+def _scatter(presses: WeighedPresses, errors: FloatArray) -> float:
     """Relative standard deviation over places of one load's reading: over all, around each weight's
     own mean."""
     residual = 1 + errors

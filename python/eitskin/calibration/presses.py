@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.calibration.weights import Weight
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FrameError
@@ -17,7 +16,7 @@ NEAR_MM = 25.0  # a touch that far from where the weight is said to be is not it
 
 
 @dataclass(frozen=True, eq=False)
-class Presses:
+class WeighedPresses:
     """k presses: ``force_n`` (k,) N as the list says; ``strength`` (k,) S/m mm^2, the median over
     the press's frames, and ``place_mm`` (k, 2) as found, medians too."""
 
@@ -28,13 +27,13 @@ class Presses:
     def __len__(self) -> int:
         return len(self.force_n)
 
-    def take(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> "Presses":
-        return Presses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
+    def take(self, rows: IntArray | BoolArray) -> "WeighedPresses":
+        return WeighedPresses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
 
 
-def joined(parts: Sequence[Presses]) -> Presses:
+def joined(parts: Sequence[WeighedPresses]) -> WeighedPresses:
     """All of several recordings."""
-    return Presses(
+    return WeighedPresses(
         np.concatenate([part.force_n for part in parts]),
         np.concatenate([part.strength for part in parts]),
         np.concatenate([part.place_mm for part in parts]),
@@ -47,7 +46,7 @@ def find_presses(
     numbers: Sequence[int],
     weights: Sequence[Weight],
     where: str,
-) -> tuple[Presses, list[str]]:
+) -> tuple[WeighedPresses, list[str]]:
     """The presses of ``weights`` in ``frames``, whose frames are counted by ``numbers``; and a line
     for each that shows no touch."""
     at = {number: k for k, number in enumerate(numbers)}
@@ -68,7 +67,7 @@ def find_presses(
         found = np.median([(abs(t.strength_s_per_m_mm2), t.x_mm, t.y_mm) for t in touches], axis=0)
         seen.append((weight.force_n, *found.tolist()))
     table = np.array(seen, dtype=np.float64).reshape(-1, 4)
-    return Presses(table[:, 0], table[:, 1], table[:, 2:]), unseen
+    return WeighedPresses(table[:, 0], table[:, 1], table[:, 2:]), unseen
 
 
 def _pressed(reconstructor: Reconstructor, frame_v: FloatArray, weight: Weight) -> Touch | None:

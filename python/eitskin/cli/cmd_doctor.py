@@ -23,7 +23,7 @@ from eitskin.device.known_model import find_model
 from eitskin.errors import UsageError
 from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.examine import examine_case
-from eitskin.frames.doctor.report import Report
+from eitskin.frames.doctor.report import DoctorReport
 from eitskin.frames.doctor.subject import Subject, subject_from_source
 from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import resistor_ring
@@ -128,7 +128,7 @@ def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
     return _tell(options, board_findings(report, found), case)
 
 
-def _tell(options: argparse.Namespace, report: Report, case: Case) -> int:
+def _tell(options: argparse.Namespace, report: DoctorReport, case: Case) -> int:
     if options.picture is not None:
         draw_report(options.picture, report, case)
     if options.json:

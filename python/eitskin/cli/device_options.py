@@ -20,7 +20,7 @@ from eitskin.live.session import Session
 from eitskin.live.settings import SessionSettings, kinds_of
 from eitskin.live.zones import load_zones
 from eitskin.sinks.outputs import Outputs
-from eitskin.sinks.sink import Source
+from eitskin.sinks.sink import TouchSource
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in), serial:/dev/ttyACM0, text:PORT?layout=FILE (another"
@@ -176,7 +176,7 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
 def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
     transport, board = session.device.transport, session.device.board
     model = None if session.known is None else session.known.model
-    source = Source(transport.url, board.board, model, getattr(options, "overwrite", False))
+    source = TouchSource(transport.url, board.board, model, getattr(options, "overwrite", False))
     return Outputs(options.to or (), source, patient=session.patient, say=say)
 
 

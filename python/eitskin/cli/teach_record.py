@@ -26,7 +26,7 @@ from eitskin.live.settings import SessionSettings
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin, load_skin
 from eitskin.teaching.guide import GuideEvent, PressGuide, guide_presses, scan_of_presses
-from eitskin.teaching.plan import Plan, load_plan
+from eitskin.teaching.plan import PressPlan, load_plan
 from eitskin.teaching.practice import plan_of_scene
 from eitskin.teaching.press_file import PressFile
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
     return _before_a_board(options, plan, skin, text)
 
 
-def _with_given(plan: Plan, options: argparse.Namespace) -> Plan:
+def _with_given(plan: PressPlan, options: argparse.Namespace) -> PressPlan:
     given = {"depth_mm": options.depth_mm, "force_n": options.force_n}
     for name, value in given.items():
         if value is None:
@@ -95,7 +95,7 @@ def _with_given(plan: Plan, options: argparse.Namespace) -> Plan:
     return plan
 
 
-def _say_off(plan: Plan, skin: Skin) -> None:
+def _say_off(plan: PressPlan, skin: Skin) -> None:
     off = [k + 1 for k in range(len(plan)) if not skin.outline.contains(plan.place_mm[k : k + 1])]
     if off:
         names = ", ".join(map(str, off[:5])) + (", ..." if len(off) > 5 else "")
@@ -107,7 +107,9 @@ def _in_time(frames: Frames) -> TimedFrames:
         yield frame, float(number if frames.time_s is None else frames.time_s[number])
 
 
-def _before_a_board(options: argparse.Namespace, plan: Plan, skin: Skin | None, text: str) -> int:
+def _before_a_board(
+    options: argparse.Namespace, plan: PressPlan, skin: Skin | None, text: str
+) -> int:
     with raw_session(options, options.model) as session:
         protocol = scanned_protocol(session.device.board, session.known, session.name)
         if skin is not None and skin.electrodes.count != protocol.n_electrodes:
@@ -140,7 +142,7 @@ def _live(session: Session) -> TimedFrames:
 
 
 def _guide(
-    options: argparse.Namespace, plan: Plan, text: str, protocol: Protocol, frames: TimedFrames
+    options: argparse.Namespace, plan: PressPlan, text: str, protocol: Protocol, frames: TimedFrames
 ) -> int:
     file = PressFile(options.output, plan, protocol, text, anew=options.overwrite)
     if file.numbers:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray, BoolArray, FloatArray
 from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.diagnostics_table import STOPS, InfoFields, Touch
 from eitskin.core.options_table import CHOICES
@@ -98,7 +99,7 @@ class CoreEngine:
         works on this context."""
         return self._lib, self._ffi, self._model, self._context
 
-    def _view(self, pointer: Any, count: int) -> npt.NDArray[Any]:
+    def _view(self, pointer: Any, count: int) -> AnyArray:
         """An array over ``count`` reals of the context's memory, not a copy."""
         return np.frombuffer(
             self._ffi.buffer(pointer, count * self.dtype.itemsize), dtype=self.dtype
@@ -124,7 +125,7 @@ class CoreEngine:
         self._check(self._lib.eits_set_options(self._context, given), "options", UsageError)
         self._saturation_v = float(options.saturation_v)
 
-    def set_reference(self, frames: npt.NDArray[np.float64]) -> LearnedReference:
+    def set_reference(self, frames: FloatArray) -> LearnedReference:
         """Take the reference from quiet ``frames`` (k, m) volts: one as it is, four or more also
         for the noise.
 
@@ -161,7 +162,7 @@ class CoreEngine:
             int(b.outliers),
         )
 
-    def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
+    def mask_rows(self, rows: BoolArray) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
         self._masked = rows.copy()
         for row in range(self.n_rows):
@@ -187,11 +188,11 @@ class CoreEngine:
             )
         )
 
-    def coefficients(self) -> npt.NDArray[Any]:
+    def coefficients(self) -> AnyArray:
         """x of the last solve, (n,)."""
         return self._view(self._lib.eits_get_coefficients(self._context), self.n_pixels).copy()
 
-    def reduced_data(self) -> npt.NDArray[Any]:
+    def reduced_data(self) -> AnyArray:
         """y of the last frame as the solver saw it, projected, (stride,)."""
         stride = (int(self._model.rank) + 7) // 8 * 8
         return self._view(self._lib.eits_get_reduced_data(self._context), stride).copy()
@@ -274,7 +275,7 @@ class CoreEngine:
             done.append(Reconstruction(images[k], coefficients[k], each, _info(r.info)))
         return done
 
-    def _reals(self, array: npt.NDArray[Any]) -> Any:
+    def _reals(self, array: AnyArray) -> Any:
         return self._ffi.from_buffer("eits_real[]", array)
 
     def last_info(self) -> Info:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray, IntArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine, aligned
 from eitskin.core.results import Info
@@ -32,7 +33,7 @@ class AlignedFrame:
     """A frame (m,) in V as if all its rows had been measured with its last drive; whether every
     drive of it is accounted for; and whether what the whole-frame solver says of it may be told."""
 
-    volts: npt.NDArray[Any]
+    volts: AnyArray
     explained: bool
     trusted: bool
 
@@ -62,7 +63,7 @@ class FastCore:
             text = self._ffi.string(self._lib.eits_status_text(status)).decode()
             raise FrameError(f"fast path: {text} (C core, status {int(status)})")
 
-    def _rows_of(self, drive: int) -> npt.NDArray[np.int64]:
+    def _rows_of(self, drive: int) -> IntArray:
         first = self._lib.eits_fast_rows(self._state, drive, self._number)
         return np.array(self._ffi.unpack(first, self._number[0]), dtype=np.int64)
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import load_core
 from eitskin.core.gestures_table import EventKind, EventPhase
@@ -108,10 +108,8 @@ class Gestures:
     """Makes events of each frame's tracked touches; ``zones`` are evaluated beside. ``options``
     replace the usual ones of eits_gesture_options by name."""
 
-    def __init__(
-        self, zones: Sequence[Zone] = (), *, width: str = "float32", **options: float
-    ) -> None:
-        module = load_core(width)
+    def __init__(self, zones: Sequence[Zone] = (), **options: float) -> None:
+        module = load_core("float32")
         self._lib, self._ffi = module.lib, module.ffi
         self._options = self._ffi.new("eits_gesture_options *")
         self._lib.eits_gestures_usual(self._options)
@@ -221,6 +219,6 @@ def _event(one: Any, zone_name: str | None = None) -> GestureEvent:
     )  # fmt: skip
 
 
-def event_numbers(events: Iterable[GestureEvent]) -> npt.NDArray[np.float64]:
+def event_numbers(events: Iterable[GestureEvent]) -> FloatArray:
     """The events' numbers (k, 10), to compare two lists bit by bit."""
     return np.array([[getattr(one, name) for name in _NAMES] for one in events]).reshape(-1, 10)

@@ -9,6 +9,7 @@ from typing import Any, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray, BoolArray, FloatArray
 from eitskin.core.diagnostics import names, words
 from eitskin.core.diagnostics_table import InfoFields, Touch
 from eitskin.core.notebook import places_text, touches_html
@@ -55,7 +56,7 @@ def _check_number(name: str, value: Any, low: float, high: float, *, whole: bool
         raise UsageError(f"options: {name} = {value!r} is out of range; use {low:g} to {high:.10g}")
 
 
-def check_shape(frames: npt.NDArray[Any], n_rows: int, what: str, least: int = 0) -> None:
+def check_shape(frames: AnyArray, n_rows: int, what: str, least: int = 0) -> None:
     """Refuse ``frames``, ``what`` in the error, that are not (k, n_rows), k at ``least``."""
     if frames.ndim != 2 or frames.shape[1] != n_rows or len(frames) < least:
         raise FrameError(
@@ -63,9 +64,7 @@ def check_shape(frames: npt.NDArray[Any], n_rows: int, what: str, least: int = 0
         )
 
 
-def check_reference_frames(
-    frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], saturation_v: float
-) -> None:
+def check_reference_frames(frames: FloatArray, masked: BoolArray, saturation_v: float) -> None:
     """Refuse quiet ``frames`` (k, m) with an unusable voltage in a row that is not ``masked`` (m,);
     0: no saturation."""
     values = np.where(masked, 0.0, frames)

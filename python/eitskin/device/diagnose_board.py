@@ -11,7 +11,7 @@ from eitskin.device.set_up import begin_scene
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.link_table import FaultCode
 from eitskin.device.wire.packets import ELECTRODE_FAULTS, BoardInfo, BoardStats, Fault
-from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Report
+from eitskin.frames.doctor.report import FAULT, NOTE, DoctorReport, Finding
 from eitskin.frames.doctor.subject import AS_GIVEN, Subject
 from eitskin.skin.skin import Skin
 
@@ -73,7 +73,7 @@ def board_subject(
     return Subject(device.transport.url, AS_GIVEN, ((AS_GIVEN, frames),), skin, remarks)
 
 
-def board_findings(report: Report, measured: MeasuredBoard) -> Report:
+def board_findings(report: DoctorReport, measured: MeasuredBoard) -> DoctorReport:
     """``report`` with what the board itself says. Remedies of ``eitskin import`` are taken out: a
     board is repaired by hand."""
     raised = [fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised]

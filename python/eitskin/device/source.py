@@ -12,10 +12,8 @@ import zlib
 from collections import deque
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Any
 
-from numpy.typing import NDArray
-
+from eitskin.arrays import AnyArray
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.link import LinkEvent
 from eitskin.device.simulated import GivenBoard
@@ -38,7 +36,7 @@ class GivenFrame:
     used; ``time_s`` by the instrument's clock, where it tells; ``came_s``: when it came, by
     ``time.monotonic``, where that is not now."""
 
-    voltage_v: NDArray[Any]
+    voltage_v: AnyArray
     time_s: float | None = None
     came_s: float | None = None
 

@@ -10,7 +10,7 @@ from eitskin.device.text_port import LinePort, open_port
 from eitskin.errors import DeviceError, FrameError, UsageError
 from eitskin.frames.layout import BadLine, Layout, LineFrame, LineParser, load_layout
 from eitskin.frames.lines import LineReader, Row
-from eitskin.frames.placement import Placement, place
+from eitskin.frames.placement import RowPlacement, place
 from eitskin.model.model import Model
 
 BAUD = 115_200
@@ -34,7 +34,7 @@ class TextSource(Source):
             raise UsageError(f"{where}: [lines] needs  cells, the numbers of a frame, with a label")
         self._layout, self._form = layout, layout.form
         self._reader = LineReader(self._form, self._parser.cells)
-        self._placement: Placement | None = None
+        self._placement: RowPlacement | None = None
         self._rest, self._lines = b"", 0
         self._cut = port.cut
         self._parsed: deque[tuple[LineFrame, float]] = deque()  # and when it came

@@ -54,7 +54,7 @@ def rim_of(mesh: Mesh) -> Rim:
     return Rim(np.array(chain, dtype=np.int64), arc[:-1], float(arc[-1]))
 
 
-class Deformation:
+class MeshDeformation:
     """Moves the nodes of one mesh; what does not depend on the movement is computed once."""
 
     def __init__(self, mesh: Mesh) -> None:

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 import eitskin
-from eitskin.arrays import FloatArray, IntArray
+from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.errors import GeometryError, UsageError, missing_extra
 from eitskin.skin.skin import Skin
 
@@ -121,7 +120,7 @@ def mesh_for_elements(skin: Skin, elements: int = 3000) -> Mesh:
     return best
 
 
-def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[npt.NDArray[Any]]:
+def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[AnyArray]:
     """Run mesh_worker.py on ``request``, killing it after ``timeout_s``; returns its four arrays.
     ``name``: the skin."""
     if importlib.util.find_spec("netgen") is None:
@@ -199,7 +198,7 @@ def _without_long_arcs(cuts: FloatArray, perimeter: float) -> FloatArray:
     return np.unique(np.mod([*cuts, *more], perimeter))
 
 
-def _checked_mesh(skin: Skin, arrays: list[npt.NDArray[Any]], owner: IntArray) -> Mesh:
+def _checked_mesh(skin: Skin, arrays: list[AnyArray], owner: IntArray) -> Mesh:
     nodes, triangles, edges, piece = arrays
     electrode = owner[piece]
     electrode_edges = tuple(_chained(edges[electrode == k]) for k in range(skin.electrodes.count))

@@ -4,9 +4,8 @@ from dataclasses import dataclass, replace
 from math import cos, sin, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.fem.mesh import Mesh
 
 PROFILES = ("uniform", "hertz", "gaussian")
@@ -66,12 +65,12 @@ class TouchCover:
         self._reach = np.linalg.norm(self._corners - self._middles[:, None], axis=2).max(axis=1)
         self._weights = centres_of_parts(SUBDIVISION)
 
-    def near(self, x_mm: float, y_mm: float, reach_mm: float) -> npt.NDArray[np.int64]:
+    def near(self, x_mm: float, y_mm: float, reach_mm: float) -> IntArray:
         """The elements (e,) that may lie within ``reach_mm`` of a place."""
         away = np.hypot(self._middles[:, 0] - x_mm, self._middles[:, 1] - y_mm)
         return np.flatnonzero(away <= reach_mm + self._reach)
 
-    def mean_change(self, touch: ShapedTouch, elements: npt.NDArray[np.int64]) -> FloatArray:
+    def mean_change(self, touch: ShapedTouch, elements: IntArray) -> FloatArray:
         """The mean relative change over each of ``elements`` (e,), (e,)."""
         return np.asarray(touch.change_at(self._weights @ self._corners[elements]).mean(axis=1))
 

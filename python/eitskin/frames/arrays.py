@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eitskin.arrays import AnyArray
 from eitskin.errors import EitskinError, FileError, FrameError
 from eitskin.fileio import read_bytes, read_mat
 
@@ -25,7 +25,7 @@ def read_npz(
     what: str,
     wanted: Collection[str] | None = None,
     most_bytes: int = MAX_UNPACKED_BYTES,
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, AnyArray]:
     """All arrays of an .npz, without pickle; ``what`` names its kind in errors. Arrays of objects
     are left out; those that are not ``wanted`` (None: all are) are not unpacked and come out empty.
     At most ``most_bytes`` are unpacked."""
@@ -70,7 +70,7 @@ def _refuse_inflating(archive: Any, where: str, most_bytes: int) -> None:
         )
 
 
-def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
+def read_arrays(path: str | Path) -> dict[str, AnyArray]:
     """All arrays of a file by name: of an .npz, of an .npy its one array as "array", of a .mat a
     struct's fields as "struct.field"."""
     suffix = Path(path).suffix.lower()
@@ -79,20 +79,20 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
     return {"array": _read_npy(path)} if suffix == ".npy" else _read_mat(path)
 
 
-def pick(arrays: Mapping[str, NDArray[Any]], key: str, option: str, where: str) -> NDArray[Any]:
+def pick(arrays: Mapping[str, AnyArray], key: str, option: str, where: str) -> AnyArray:
     """The array ``key``; ``option`` is the option that named it."""
     if key not in arrays:
         raise FrameError(f"{where}: no array {key!r} for {option}; it holds {listing(arrays)}")
     return arrays[key]
 
 
-def listing(arrays: Mapping[str, NDArray[Any]]) -> str:
+def listing(arrays: Mapping[str, AnyArray]) -> str:
     """Names and shapes on one line."""
     shown = [f"{name} {array.shape}" for name, array in sorted(arrays.items())][:LISTED]
     return ", ".join(shown) + (" ..." if len(arrays) > LISTED else "") if shown else "no arrays"
 
 
-def _read_npy(path: str | Path) -> NDArray[Any]:
+def _read_npy(path: str | Path) -> AnyArray:
     content = read_bytes(path, "array", MAX_BYTES)
     try:
         return np.asarray(np.lib.format.read_array(io.BytesIO(content), allow_pickle=False))
@@ -103,13 +103,13 @@ def _read_npy(path: str | Path) -> NDArray[Any]:
         ) from None
 
 
-def _read_mat(path: str | Path) -> dict[str, NDArray[Any]]:
-    arrays: dict[str, NDArray[Any]] = {}
+def _read_mat(path: str | Path) -> dict[str, AnyArray]:
+    arrays: dict[str, AnyArray] = {}
     _flatten(read_mat(path), "", arrays)
     return arrays
 
 
-def _flatten(content: Mapping[str, Any], prefix: str, arrays: dict[str, NDArray[Any]]) -> None:
+def _flatten(content: Mapping[str, Any], prefix: str, arrays: dict[str, AnyArray]) -> None:
     for name, value in content.items():
         if isinstance(value, Mapping):
             _flatten(value, f"{prefix}{name}.", arrays)

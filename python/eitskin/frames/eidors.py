@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import AnyArray, FloatArray
 from eitskin.errors import FrameError
 from eitskin.fem.grid import Grid
 from eitskin.fem.mesh import Mesh
@@ -200,7 +199,7 @@ def _image(name: str, elem_data: FloatArray, model: dict[str, Any]) -> dict[str,
     return {"type": "image", "name": name, "elem_data": elem_data, "fwd_model": model}
 
 
-def _struct_array(values: Sequence[Mapping[str, Any]]) -> npt.NDArray[Any]:
+def _struct_array(values: Sequence[Mapping[str, Any]]) -> AnyArray:
     """A 1 x n struct array as scipy writes one."""
     array = np.empty((1, len(values)), dtype=[(name, object) for name in values[0]])
     for k, one in enumerate(values):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eitskin.arrays import FloatArray, IntArray
+from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.errors import EitskinError, FrameError
 from eitskin.fileio import parse_json, write_beside
 from eitskin.frames.arrays import read_npz
@@ -286,7 +286,7 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
         ) from None
 
 
-def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Frames:
+def _from_arrays(arrays: dict[str, AnyArray], allow_nonfinite: bool) -> Frames:
     for name in REQUIRED:
         if name not in arrays:
             raise FrameError(f"the field {name!r} is missing; make the file again")

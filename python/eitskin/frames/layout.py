@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eitskin.arrays import AnyArray
 from eitskin.config import check_keys, choice, flag, integer, load_toml, number, subtable
 from eitskin.errors import ConfigError, EitskinError, UsageError
 from eitskin.fileio import write_bytes
@@ -162,7 +162,7 @@ class LineFrame:
     """A line's channels (c,), real or complex, times the layout's scale, NaN where a cell is no
     number; its time in s where the layout names one."""
 
-    values: NDArray[Any]
+    values: AnyArray
     time_s: float | None
 
 
@@ -219,7 +219,7 @@ class LineParser:
         self.cells, self._columns = cells, list(columns)
         self._time = time[0] if time else None
 
-    def _complex(self, values: NDArray[Any]) -> NDArray[Any]:
+    def _complex(self, values: AnyArray) -> AnyArray:
         source = self.layout.options.source
         if source.pairs is not None:
             places = range(len(values))
@@ -232,9 +232,9 @@ class LineParser:
         return np.asarray(values * (1.0 if source.scale is None else source.scale))
 
 
-def _parsed(cells: Sequence[str]) -> NDArray[Any]:
+def _parsed(cells: Sequence[str]) -> AnyArray:
     try:
-        values: NDArray[Any] = np.array([float(cell) for cell in cells])
+        values: AnyArray = np.array([float(cell) for cell in cells])
     except ValueError:
         parsed = (parse_cell(cell) for cell in cells)
         values = np.array([complex("nan") if z is None else z for z in parsed])

@@ -5,9 +5,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eitskin.arrays import IntArray
+from eitskin.arrays import BoolArray, IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.skin.protocol import Protocol
 
@@ -102,7 +101,7 @@ def relabel(rows: IntArray, electrodes: IntArray) -> IntArray:
     return np.asarray(electrodes[np.asarray(rows)])
 
 
-def touching(rows: IntArray, electrodes: Iterable[int]) -> NDArray[np.bool_]:
+def touching(rows: IntArray, electrodes: Iterable[int]) -> BoolArray:
     """(m,) which rows use any of ``electrodes``."""
     return np.asarray(np.isin(rows, list(electrodes)).any(axis=1))
 

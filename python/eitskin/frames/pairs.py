@@ -6,11 +6,10 @@ A header that says which is believed; where nothing says it, nothing is assumed.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eitskin.arrays import AnyArray, ComplexArray
 from eitskin.errors import UsageError
 
 PAIRS = ("real-imag", "magnitude-degrees", "magnitude-radians")
@@ -25,6 +24,7 @@ UNITS = {"deg": "degrees", "degs": "degrees", "degree": "degrees", "degrees": "d
 UNITS |= {"°": "degrees", "rad": "radians", "rads": "radians", "radian": "radians"}
 UNITS["radians"] = "radians"
 HALVES = {"real": "real-imag", "imag": "real-imag", "magnitude": "polar", "phase": "polar"}
+SHOWN = 4
 MOST_RADIANS = 12.6  # two turns
 A_PART = {"imag": "an imaginary part", "phase": "a phase"}
 
@@ -62,7 +62,7 @@ def all_magnitudes(names: Sequence[str]) -> bool:
     return bool(names) and all(kind_of(name) == "magnitude" for name in names)
 
 
-def paired(names: Sequence[str], values: NDArray[Any], how: str | None, option: str) -> Paired:
+def paired(names: Sequence[str], values: AnyArray, how: str | None, option: str) -> Paired:
     """How the columns of ``values`` (rows, c) with these ``names`` (empty: no header) are pairs."""
     count = values.shape[1]
     if count % 2:
@@ -94,7 +94,7 @@ def paired(names: Sequence[str], values: NDArray[Any], how: str | None, option: 
     return _checked(values, Paired(first, second, told), option)
 
 
-def _checked(values: NDArray[Any], pairs: Paired, option: str) -> Paired:
+def _checked(values: AnyArray, pairs: Paired, option: str) -> Paired:
     """``pairs``, unless the numbers cannot be such."""
     if pairs.how == "real-imag":
         return pairs
@@ -112,7 +112,7 @@ def _checked(values: NDArray[Any], pairs: Paired, option: str) -> Paired:
     return pairs
 
 
-def to_complex(values: NDArray[Any], pairs: Paired) -> NDArray[np.complex128]:
+def to_complex(values: AnyArray, pairs: Paired) -> ComplexArray:
     """Columns (rows, c) as complex (rows, c / 2)."""
     first, second = values[:, list(pairs.first)], values[:, list(pairs.second)]
     if pairs.how == "real-imag":
@@ -121,7 +121,7 @@ def to_complex(values: NDArray[Any], pairs: Paired) -> NDArray[np.complex128]:
     return np.asarray(first * np.exp(1j * angle))
 
 
-def _by_place(values: NDArray[Any], how: str | None, option: str) -> Paired:
+def _by_place(values: AnyArray, how: str | None, option: str) -> Paired:
     if how is None and (values[:, 0::2] < 0).any():
         how = "real-imag"  # no magnitude is below 0
     if how is None:
@@ -149,5 +149,5 @@ def _words(name: str) -> list[str]:
     return re.findall(r"[a-z]+|°", name.lower())
 
 
-def _some(names: Sequence[str], most: int = 4) -> str:
-    return ", ".join(names[:most]) + (", ..." if len(names) > most else "")
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")

@@ -2,12 +2,10 @@
 a protocol's order, signs."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eitskin.arrays import IntArray
+from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.orders import (
@@ -70,18 +68,18 @@ def table_rows(options: ImportOptions) -> IntArray | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class RowPlacement:
     """From frames as a source lists them to a model's rows: row r is ``sign[r]`` times the source's
     channel ``index[r]`` (``magnitude``: times its size), and unusable where ``blank[r]``.
     ``channels``: of a source's frame."""
 
     channels: int
     index: IntArray
-    sign: NDArray[np.float64]
-    blank: NDArray[np.bool_]
+    sign: FloatArray
+    blank: BoolArray
     magnitude: bool
 
-    def frame(self, values: NDArray[Any]) -> NDArray[Any]:
+    def frame(self, values: AnyArray) -> AnyArray:
         """A frame (m,) of ``values`` (channels,), real or complex; NaN is a row that cannot be
         used."""
         placed = values[self.index]
@@ -90,7 +88,9 @@ class Placement:
         return np.asarray(np.where(self.blank, np.nan, placed * self.sign))
 
 
-def place(options: ImportOptions, protocol: Protocol | None, model: Model, where: str) -> Placement:
+def place(
+    options: ImportOptions, protocol: Protocol | None, model: Model, where: str
+) -> RowPlacement:
     """How frames that stand as ``options`` say come to the rows of ``model``; ``protocol``: the
     source's, None: the model's."""
     if options.equalise:
@@ -128,10 +128,10 @@ def place(options: ImportOptions, protocol: Protocol | None, model: Model, where
     check_range(options.drop_channels, len(measured), "--drop-channels")
     blank = touching(measured, options.drop_electrodes)
     blank[list(options.drop_channels)] = True
-    return Placement(len(rows), index, sign, blank, magnitude)
+    return RowPlacement(len(rows), index, sign, blank, magnitude)
 
 
-def _expected(model: Model) -> NDArray[np.float64]:
+def _expected(model: Model) -> FloatArray:
     """The model's own voltages of the untouched skin (m,); 0 of rows that it does not use."""
     expected = np.zeros(model.protocol.n_rows)
     fold = model.fold

@@ -4,9 +4,8 @@ gains equal."""
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eitskin.arrays import FloatArray, IntArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.orders import touching
 from eitskin.skin.protocol import table
@@ -48,7 +47,7 @@ def partners(rows: IntArray, n_electrodes: int) -> dict[int, tuple[int, int]]:
 
 def kept_channels(
     rows: IntArray, n_electrodes: int, drop_channels: Sequence[int], drop_electrodes: Sequence[int]
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Which channels (m,) stay when ``drop_channels`` and all channels that use ``drop_electrodes``
     go."""
     check_range(drop_electrodes, n_electrodes, "--drop-electrodes")

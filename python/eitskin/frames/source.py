@@ -4,12 +4,10 @@ its own order."""
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eitskin.arrays import FloatArray, IntArray
+from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.arrays import listing, pick, read_arrays, read_npz
 from eitskin.frames.frames import FORMAT
@@ -86,7 +84,7 @@ class RawFrames:
     names: tuple[str, ...] = ()
     time_s: FloatArray | None = None
     table: IntArray | None = None
-    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    arrays: Mapping[str, AnyArray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     text: ReadText | None = None
 
@@ -122,7 +120,7 @@ def read_source(
     )
 
 
-def electrode_table(rows: NDArray[Any], base: int, where: str) -> IntArray:
+def electrode_table(rows: AnyArray, base: int, where: str) -> IntArray:
     """A source's protocol table as (rows, 4) electrodes from 0; ``base`` is the source's number of
     its first electrode."""
     table = np.asarray(rows)
@@ -235,7 +233,7 @@ def _numbers(
     options: SourceOptions,
     option: str,
     notes: list[str],
-) -> tuple[NDArray[Any], Paired | None]:
+) -> tuple[AnyArray, Paired | None]:
     """The chosen columns as numbers, pairs as complex ones, and how they were pairs."""
     values = table.numbers(columns)
     names = tuple(table.header[k] for k in columns) if table.header else ()
@@ -299,19 +297,19 @@ def _from_arrays(
     return _finish(voltage, reference, names, times, table, arrays, options)
 
 
-def _times(values: NDArray[Any], where: str) -> FloatArray:
+def _times(values: AnyArray, where: str) -> FloatArray:
     if values.dtype.kind not in "fiu":
         raise FrameError(f"{where}: holds {values.dtype}, no times")
     return np.atleast_1d(values).ravel().astype(np.float64)
 
 
 def _finish(
-    voltage: NDArray[Any],
-    reference: NDArray[Any] | None,
+    voltage: AnyArray,
+    reference: AnyArray | None,
     names: tuple[str, ...],
     times: FloatArray | None,
     table: IntArray | None,
-    arrays: Mapping[str, NDArray[Any]],
+    arrays: Mapping[str, AnyArray],
     options: SourceOptions,
 ) -> RawFrames:
     """Quiet frames taken out of the frames, complex numbers made real, everything scaled."""
@@ -348,14 +346,14 @@ def _finish(
     )
 
 
-def _common_phase(values: NDArray[Any]) -> float:
+def _common_phase(values: AnyArray) -> float:
     """The phase (radians, within +-pi/2) that puts most of ``values`` on the real axis: half the
     angle of sum z^2."""
     finite = np.asarray(values)[np.isfinite(values)]
     return float(np.angle((finite.astype(np.complex128) ** 2).sum()) / 2)
 
 
-def _part(values: NDArray[Any], part: str, phase: float) -> FloatArray:
+def _part(values: AnyArray, part: str, phase: float) -> FloatArray:
     if part == "abs":
         return np.asarray(np.abs(values))
     if part == "imag":
@@ -366,14 +364,14 @@ def _part(values: NDArray[Any], part: str, phase: float) -> FloatArray:
 
 
 def _frames_of(
-    arrays: Mapping[str, NDArray[Any]],
+    arrays: Mapping[str, AnyArray],
     key: str,
     option: str,
     row_counts: tuple[int, ...],
     frames_in: str,
     where: str,
     asked: str,
-) -> tuple[NDArray[Any], bool | None]:
+) -> tuple[AnyArray, bool | None]:
     """The array ``key`` as (frames, channels), and whether its frames were rows (None: it is one
     frame)."""
     values = pick(arrays, key, option, where)

@@ -5,11 +5,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eitskin.arrays import AnyArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.fileio import read_bytes
 from eitskin.frames.lines import (
@@ -44,7 +43,7 @@ class TextTable:
     def n_columns(self) -> int:
         return len(self.cells[0])
 
-    def numbers(self, columns: Sequence[int]) -> NDArray[Any]:
+    def numbers(self, columns: Sequence[int]) -> AnyArray:
         """The chosen ``columns`` as numbers, (rows, len(columns)), complex where a cell is like
         1.5-2j, else float."""
         values: list[list[complex]] = []

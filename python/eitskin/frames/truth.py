@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eitskin.arrays import AnyArray, FloatArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.arrays import pick
 
@@ -34,7 +34,7 @@ class TruthOptions:
 
 
 def truth_fields(
-    arrays: Mapping[str, NDArray[Any]],
+    arrays: Mapping[str, AnyArray],
     options: TruthOptions,
     names: Sequence[str],
     box_mm: tuple[float, float, float, float] | None,
@@ -46,7 +46,7 @@ def truth_fields(
 
 
 def _touches(
-    arrays: Mapping[str, NDArray[Any]], options: TruthOptions, names: Sequence[str], where: str
+    arrays: Mapping[str, AnyArray], options: TruthOptions, names: Sequence[str], where: str
 ) -> dict[str, Any]:
     needed = {
         "truth-frame": options.touch_frame,
@@ -77,7 +77,7 @@ def _touches(
     elif frame.dtype.kind == "f" and (frame == np.round(frame)).all():
         frame = frame.astype(np.int64)
 
-    def scaled(name: str, unit: float = 1.0) -> NDArray[np.float64]:
+    def scaled(name: str, unit: float = 1.0) -> FloatArray:
         values = picked[name]
         if values.dtype.kind not in "fiub":
             raise FrameError(f"{where}: {keys[name]}: holds {values.dtype}, no numbers")
@@ -94,7 +94,7 @@ def _touches(
 
 
 def _mask(
-    arrays: Mapping[str, NDArray[Any]],
+    arrays: Mapping[str, AnyArray],
     options: TruthOptions,
     box_mm: tuple[float, float, float, float] | None,
     where: str,

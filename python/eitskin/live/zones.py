@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.config import check_keys, load_toml, number
 from eitskin.core.gestures import Zone
 from eitskin.errors import ConfigError, GeometryError
@@ -122,7 +121,7 @@ class _Area:
         radii = [zone.outer_mm, zone.inner_mm] if zone.inner_mm else [zone.outer_mm]
         return [Outline(tuple(map(tuple, (middle + r * rim).tolist()))) for r in radii]
 
-    def contains(self, points: FloatArray) -> npt.NDArray[np.bool_]:
+    def contains(self, points: FloatArray) -> BoolArray:
         """Whether each of (k, 2) lies in it."""
         outer, *inner = self.loops
         inside = outer.contains(points)

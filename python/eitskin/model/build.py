@@ -1,7 +1,6 @@
 """From a skin's description to a model: mesh, forward model, Jacobian, reduction, storage, golden
 frame."""
 
-from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -26,12 +25,11 @@ from eitskin.model.reduction import (
 )
 from eitskin.model.row_form import row_form
 from eitskin.model.storage import STORAGES, store
+from eitskin.progress import Progress, silent
 from eitskin.skin.mirror import rim_mirror
 from eitskin.skin.protocol import Protocol, protocol_to_table
 from eitskin.skin.skin import Skin, size_to_paper, skin_to_table
 from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY, Uncertainty
-
-Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 LIPSCHITZ_MARGIN = 1e-4
 FIELD_PEAK = 1024.0
@@ -188,7 +186,7 @@ def build_model(
     protocol: Protocol,
     settings: BuildSettings | None = None,
     *,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     jacobian: FloatArray | None = None,
 ) -> Model:
     """The whole way from ``skin`` to a model, with the model errors that its uncertainty asks for;
@@ -216,12 +214,10 @@ def with_model_errors(
     uncertainty: Uncertainty,
     elements: int = 3000,
     *,
-    jobs: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Model:
-    """``model`` of ``skin`` with the errors that ``uncertainty`` makes, drawn by ``jobs`` processes
-    (None: one a core) on a mesh of twice ``elements``, at
-    most 6000.
+    """``model`` of ``skin`` with the errors that ``uncertainty`` makes, drawn on a mesh of twice
+    ``elements``, at most 6000.
 
     ``progress`` wraps the samples as they are done, and is told how many there are."""
     from eitskin.fem.mesh import mesh_for_elements
@@ -238,7 +234,7 @@ def with_model_errors(
         grid=model.grid,
         uncertainty=uncertainty,
     )
-    return replace(model, model_errors=draw_model_errors(request, jobs=jobs, progress=progress))
+    return replace(model, model_errors=draw_model_errors(request, progress=progress))
 
 
 def stored_fields(skin: Skin, protocol: Protocol, linear: Linearisation) -> Fields | None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.grid import Grid
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model_errors import ModelErrors
@@ -108,7 +109,7 @@ class Model:
         return f"<Model {name}, {scanned}, {self.grid.n_pixels} pixels, rank {self.rank}>"
 
     @cached_property
-    def sensitivity(self) -> npt.NDArray[np.float64]:
+    def sensitivity(self) -> FloatArray:
         """S (r, n) as stored, decoded."""
         return self.stored.decode(self.rank)
 

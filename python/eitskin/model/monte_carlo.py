@@ -23,8 +23,7 @@ from eitskin.errors import ModelError
 from eitskin.model.model_errors import ModelErrors
 from eitskin.model.random_skins import RandomSkins, Request
 from eitskin.model.tare_places import tare_places
-
-Progress = Callable[[Iterable[Any], int], Iterable[Any]]
+from eitskin.progress import Progress, silent
 
 METHODS: dict[str, Callable[..., Any]] = {
     "sample": RandomSkins.sample,
@@ -36,7 +35,7 @@ THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 
 
 def draw_model_errors(
-    request: Request, *, jobs: int | None = None, progress: Progress | None = None
+    request: Request, *, jobs: int | None = None, progress: Progress = silent
 ) -> ModelErrors:
     """The model errors of ``request``, drawn by ``jobs`` processes (None: one a core).
 
@@ -62,7 +61,7 @@ def draw_model_errors(
             drawn: Iterable[FloatArray] = pool.map(
                 lambda number: ask("sample", number), range(samples)
             )
-            rows = np.array(list(drawn if progress is None else progress(drawn, samples)))
+            rows = np.array(list(progress(drawn, samples)))
             rms_error, rms_shape_error = np.sqrt(np.mean(rows[:, -2:] ** 2, axis=0))
             return ModelErrors(
                 error=ask("error", rows),

@@ -11,12 +11,11 @@ described. What amplitude, place and radius of the discs can explain is taken ou
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.core.constants_table import MAX_RATIO, MAX_ROW_GAIN, RATIO_DEFINED
 from eitskin.fem.cem import ForwardModel
-from eitskin.fem.deform import Deformation, Rim
+from eitskin.fem.deform import MeshDeformation, Rim
 from eitskin.fem.grid import Grid
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.sensitivity import element_fields
@@ -58,7 +57,7 @@ def sensitivity_of(
     forward: ForwardModel,
     pairs: FloatArray,
     v0: FloatArray,
-    elements: npt.NDArray[np.int64],
+    elements: IntArray,
 ) -> FloatArray:
     """The change of the folded datum with the conductivity of ``elements`` (e,), (k, e): ``pairs``
     are the fields of ``forward``, ``v0`` (k,) its voltages."""
@@ -82,7 +81,7 @@ class RandomSkins:
         self.request = request
         skin, mesh = request.skin, request.mesh
         self.forward = ForwardModel(mesh, skin, request.protocol)
-        self.deformation = Deformation(mesh)
+        self.deformation = MeshDeformation(mesh)
         self.cover = TouchCover(mesh)
         self.radius_mm = float(np.sqrt(skin.outline.area_mm2 / np.pi))
         self.conductivity = np.full(mesh.n_elements, skin.conductivity_s_per_m)
@@ -179,7 +178,7 @@ class RandomSkins:
             )
         return np.asarray(gain * (v - v0))
 
-    def _sensitivity(self, elements: npt.NDArray[np.int64]) -> FloatArray:
+    def _sensitivity(self, elements: IntArray) -> FloatArray:
         return sensitivity_of(self.request, self.forward, self._pairs, self.v_ref, elements)
 
     def _columns(self, disc: ShapedTouch) -> FloatArray:

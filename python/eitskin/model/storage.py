@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray, FloatArray
 from eitskin.errors import UsageError
 
 STORAGES = ("f32", "f16", "i16", "i8")
@@ -28,10 +29,10 @@ class StoredMatrix:
     integers, else None."""
 
     storage: str
-    columns: npt.NDArray[Any]
+    columns: AnyArray
     scale: npt.NDArray[np.float32] | None
 
-    def decode(self, rank: int) -> npt.NDArray[np.float64]:
+    def decode(self, rank: int) -> FloatArray:
         """The matrix (rank, n) that the stored numbers stand for."""
         wide = self.columns[:, :rank].astype(np.float64)
         if self.scale is not None:

@@ -14,7 +14,7 @@ from eitskin.live.session import Session
 from eitskin.model.eitm import save_model
 from eitskin.skin.skin import Skin
 from eitskin.teaching.guide import GuideEvent, PressGuide, Step, scan_of_presses
-from eitskin.teaching.plan import Plan
+from eitskin.teaching.plan import PressPlan
 from eitskin.teaching.press_file import PressFile
 from eitskin.teaching.teach import teach
 
@@ -24,7 +24,9 @@ class Teacher:
     ``text``, None and "" for that of the board's model. ``on_event`` gets the facts for pages
     whenever something is new."""
 
-    def __init__(self, plan: Plan, presses: Path, skin: Skin | None = None, text: str = "") -> None:
+    def __init__(
+        self, plan: PressPlan, presses: Path, skin: Skin | None = None, text: str = ""
+    ) -> None:
         self.plan, self.path, self._skin, self._text = plan, presses, skin, text
         self.on_event: Callable[[dict[str, Any]], None] = lambda facts: None
         self._guide: PressGuide | None = None

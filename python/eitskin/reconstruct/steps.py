@@ -6,7 +6,7 @@
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from eitskin.frames.results_file import save_results
 from eitskin.model.model import Model
 from eitskin.model.options import tracking
 from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.progress import Progress, silent
 from eitskin.scoring.score import FrameScore, scorer_for
 from eitskin.solve.batch import Batch, check_threads
 from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
@@ -33,7 +34,6 @@ from eitskin.view.frame_pictures import draw_results, film_results
 from eitskin.view.panels import check_picture
 
 Results = dict[int, Reconstruction]
-Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def reconstruct_frames(
     output: Path | None = None,
     picture: Path | None = None,
     film: Path | None = None,
-    progress: Progress = lambda frames, _: frames,
+    progress: Progress = silent,
 ) -> ReconstructOutcome:
     """Reconstruct the frames of the file ``path``; those that cannot be used are named in
     ``refused``, and the others are still done. Images, touches and info go into the file ``output``
@@ -292,7 +292,7 @@ def write(
     output: Path | None,
     picture: Path | None,
     film: Path | None = None,
-    progress: Progress = lambda frames, _: frames,
+    progress: Progress = silent,
 ) -> None:
     """The file of results, the film and the picture, where there is something to show."""
     if output is not None and outcome.results:

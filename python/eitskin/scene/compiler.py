@@ -32,7 +32,7 @@ from eitskin.scene.effect import (
 )
 from eitskin.scene.forward_steps import Change, UpdateCost, count_costs, touched_unknowns
 from eitskin.scene.motion import Mix, Motion
-from eitskin.scene.plan import Plan, make_plan
+from eitskin.scene.plan import ScenePlan, make_plan
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.reading import live_rows, solved_impedance, with_bridges
 from eitskin.scene.registry import Registry
@@ -149,7 +149,7 @@ class Compiled:
     method: str
     reach: IntArray
     counted: UpdateCost | None
-    plan: Plan
+    plan: ScenePlan
     work: SessionWork
 
     def times_s(self) -> FloatArray:

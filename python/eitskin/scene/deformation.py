@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
 
@@ -26,7 +26,7 @@ class Deformation:
     yy: float = 1.0
 
     @property
-    def matrix(self) -> npt.NDArray[np.float64]:
+    def matrix(self) -> FloatArray:
         """As (2, 2), to multiply a column (x, y) by."""
         return np.array([[self.xx, self.xy], [self.yx, self.yy]])
 

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.config import check_keys, choice, flag, integer, load_toml, number, subtable, word
 from eitskin.errors import ConfigError
 from eitskin.scene.laws import DRIVING_KEY, LAW_KEYS, LAWS, law_from_table
@@ -350,7 +349,7 @@ def _scanned_s(scene: Scene) -> FloatArray:
     return np.asarray(np.unique(np.concatenate([times, times + scene.scan_s, keys])))
 
 
-def _room_mm(outline: Outline, one: TrackSamples, at: npt.NDArray[np.int64]) -> FloatArray:
+def _room_mm(outline: Outline, one: TrackSamples, at: IntArray) -> FloatArray:
     """How far inside the rim the touch's edge is in the frames ``at`` (k,): (k,)."""
     places = np.column_stack([one.x_mm[at], one.y_mm[at]])
     shape = one.shape

@@ -32,8 +32,8 @@ from enum import IntEnum
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import AnyArray
 from eitskin.arrays import BoolArray as BoolArray  # for effects
 from eitskin.arrays import ComplexArray as ComplexArray
 from eitskin.arrays import FloatArray as FloatArray
@@ -43,7 +43,7 @@ from eitskin.scene.deformation import Deformation
 from eitskin.skin.protocol import Protocol as ScanProtocol
 from eitskin.skin.skin import Skin
 
-Voltages: TypeAlias = npt.NDArray[Any]
+Voltages: TypeAlias = AnyArray
 """(m,) volts: float64, or complex128 between a phase step and the converter."""
 
 

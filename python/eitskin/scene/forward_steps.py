@@ -16,9 +16,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import AnyArray, FloatArray, IntArray
+from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from eitskin.fem.cem import ForwardModel, System, factorise
 from eitskin.scene.effect import PhaseStep
 
@@ -227,9 +226,7 @@ def _dense_change(
     return unknowns[free], dense[np.ix_(free, free)]
 
 
-def touched_unknowns(
-    model: ForwardModel, shunted: npt.NDArray[np.bool_], elements: IntArray
-) -> IntArray:
+def touched_unknowns(model: ForwardModel, shunted: BoolArray, elements: IntArray) -> IntArray:
     """The unknowns (k,) at the corners of ``elements`` (e,), ascending, without the grounded
     one."""
     system = model.system_for(shunted)
@@ -252,9 +249,7 @@ class UpdateCost:
         return "update" if self.update < self.factorise else "factorise"
 
 
-def count_costs(
-    model: ForwardModel, shunted: npt.NDArray[np.bool_], ranks: IntArray, reach: int
-) -> UpdateCost:
+def count_costs(model: ForwardModel, shunted: BoolArray, ranks: IntArray, reach: int) -> UpdateCost:
     """Count both ways for states that touch ``ranks`` (s,) unknowns each, ``reach`` different ones
     together.
 

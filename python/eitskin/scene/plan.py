@@ -36,7 +36,7 @@ class PlanStep:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ScenePlan:
     """All steps of a scene in the order they run, and what the whole session will cost.
 
     ``factorisations`` and ``solves`` are of recorded and quiet frames, and of the reference V0
@@ -120,7 +120,7 @@ def make_plan(
     work: SessionWork,
     factorised: bool = False,
     moving: int = 0,
-) -> Plan:
+) -> ScenePlan:
     """The plan of a compiled scene: the steps that every scene has, with those of the named effects
     in their places. ``factorised``: the untouched skin is already, for V0; ``moving``: frames in
     which touches change while they are scanned."""
@@ -175,7 +175,7 @@ def make_plan(
     lines += [*of(ContactStep, PhaseStep), *forward]
     lines += [line for line in own if line not in lines]
     every = [line.cost for line in lines]
-    return Plan(
+    return ScenePlan(
         scene=scene.name,
         steps=tuple(lines),
         frames=scene.frames,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.config import nearest
 from eitskin.errors import GeometryError, UsageError
 from eitskin.scene.streams import stream
@@ -45,7 +45,7 @@ class TrueTouch:
     contrast: float
     shape: "TouchShape | None" = None
 
-    def covers(self, x_mm: FloatArray, y_mm: FloatArray) -> npt.NDArray[np.bool_]:
+    def covers(self, x_mm: FloatArray, y_mm: FloatArray) -> BoolArray:
         """Whether places so far from its centre, (...), lie in it."""
         if self.shape is None:
             return np.asarray(x_mm**2 + y_mm**2 <= self.radius_mm**2)
@@ -75,7 +75,7 @@ class TouchScene:
         """(k,)."""
         return np.array([t.radius_mm for t in self.touches], dtype=np.float64)
 
-    def mask(self, points_mm: FloatArray) -> npt.NDArray[np.bool_]:
+    def mask(self, points_mm: FloatArray) -> BoolArray:
         """Which of ``points_mm`` (p, 2) lie in any touch (a Gaussian's: within half height)."""
         inside = np.zeros(len(points_mm), dtype=np.bool_)
         along_x, along_y = np.ascontiguousarray(points_mm.T)

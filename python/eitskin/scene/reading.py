@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eitskin.arrays import AnyArray, FloatArray, IntArray
+from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from eitskin.fem.patterns import Patterns
-from eitskin.scene.effect import BoolArray, Contacts, Loads
+from eitskin.scene.effect import Contacts, Loads
 from eitskin.skin.protocol import Protocol
 
 # A detached electrode's impedance in the solve. It carries no current as a whole, and 1e4 ohm m2

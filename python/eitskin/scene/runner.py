@@ -1,17 +1,17 @@
 """Running a compiled scene: every distinct state is solved once, every frame goes through the named
 steps."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin import __version__
-from eitskin.arrays import FloatArray
+from eitskin.arrays import AnyArray, FloatArray
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
+from eitskin.progress import Progress, silent
 from eitskin.scene.compiler import Compiled, State, background_of, compile_scene, used_in
 from eitskin.scene.deformation import FLAT, Deformation, deformed
 from eitskin.scene.description import Scene
@@ -30,7 +30,7 @@ class SceneRun:
     """
 
     voltage_v: FloatArray
-    true_v: npt.NDArray[Any]
+    true_v: AnyArray
     work: Work
     recorded_factorisations: int
     generators: int
@@ -122,7 +122,7 @@ def blend(readings: dict[int, TrueVoltages], mix: Mix) -> TrueVoltages:
     low, high = (np.searchsorted(numbers, one) for one in (mix.lower, upper))
     rows = np.arange(len(low))
 
-    def between(values: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    def between(values: list[AnyArray]) -> AnyArray:
         stack = np.array(values)
         first = stack[low, rows]
         return np.asarray(first + mix.part * (stack[high, rows] - first))
@@ -139,16 +139,14 @@ def blend(readings: dict[int, TrueVoltages], mix: Mix) -> TrueVoltages:
     return TrueVoltages(v, replace(loads[0], **potentials))
 
 
-def simulate_frames(
-    compiled: Compiled, progress: Callable[[range], Iterable[int]] | None = None
-) -> SceneRun:
+def simulate_frames(compiled: Compiled, progress: Progress = silent) -> SceneRun:
     """Solve every state, then take every frame through the steps; ``progress`` wraps the states'
     numbers."""
     scene, maker = compiled.scene, FrameMaker(compiled)
     states = compiled.states
     unknown = [k for k in range(len(states)) if k not in compiled.known]
     recorded, numbers = 0, range(len(unknown))
-    for k in map(unknown.__getitem__, progress(numbers) if progress else numbers):
+    for k in map(unknown.__getitem__, progress(numbers)):
         before = maker.work.factorisations
         maker.reading(k)
         if states[k].frame >= scene.quiet_frames:
@@ -160,7 +158,7 @@ def simulate_frames(
     return SceneRun(voltage_v, true_v, maker.work, recorded, compiled.work.generators)
 
 
-def _reader(compiled: Compiled) -> Callable[[npt.NDArray[Any], State], TrueVoltages]:
+def _reader(compiled: Compiled) -> Callable[[AnyArray, State], TrueVoltages]:
     patterns, protocol = compiled.model.patterns, compiled.scene.protocol
     if compiled.needs_whole_reader:
         whole = WholeReader(patterns, protocol, compiled.bridge_pairs)
@@ -173,7 +171,7 @@ def run(
     compiled: Compiled,
     *,
     truth_pixels: int = 64,
-    progress: Callable[[range], Iterable[int]] | None = None,
+    progress: Progress = silent,
 ) -> Frames:
     """The scene's frames with their truth, rastered with ``truth_pixels`` along the skin's longer
     side (0: no rasters).

@@ -1,12 +1,9 @@
 """The scan as the front end lives it: when a row is read, on which channel, and what the
 multiplexers do before."""
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray, IntArray
+from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from eitskin.scene.effect import EffectSession
 from eitskin.skin.protocol import Protocol
 
@@ -27,7 +24,7 @@ def channels(protocol: Protocol) -> tuple[IntArray, IntArray]:
     return pairs, np.asarray(number).reshape(-1)
 
 
-def switched(protocol: Protocol) -> npt.NDArray[np.bool_]:
+def switched(protocol: Protocol) -> BoolArray:
     """Whether each of the four multiplexers [I+, I-, V+, V-] switches just before each row, (m, 4).
 
     The scan is periodic: the last row comes before the first.
@@ -36,7 +33,7 @@ def switched(protocol: Protocol) -> npt.NDArray[np.bool_]:
     return np.asarray(rows != np.roll(rows, 1, axis=0))[protocol.scan_places]
 
 
-def settled_from_the_row_before(target: npt.NDArray[Any], left: float) -> npt.NDArray[Any]:
+def settled_from_the_row_before(target: AnyArray, left: float) -> AnyArray:
     """What a first-order settling leaves in each row (m,) of a periodic scan, in the order that
     they are measured.
 

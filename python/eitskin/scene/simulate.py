@@ -7,7 +7,7 @@ random stream (``eitskin.scene.streams``): turning one off leaves the samples of
 were.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from eitskin.errors import UsageError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.frames.frames import Frames
+from eitskin.progress import Progress, silent
 from eitskin.scene.cover import Cover
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.streams import stream
@@ -151,7 +152,7 @@ def simulate(
     measurement: Measurement | None = None,
     seed: int | None = None,
     mesh: Mesh | None = None,
-    progress: Callable[[Sequence[TouchScene]], Iterable[TouchScene]] | None = None,
+    progress: Progress = silent,
 ) -> Simulated:
     """Simulate a session with ``touches``.
 
@@ -177,7 +178,7 @@ def simulate(
     forward = ForwardModel(solved_on, skin, protocol, contact)
     sheet = skin.conductivity_s_per_m
     quiet = forward.voltages(np.full(solved_on.n_elements, sheet))
-    scenes: Iterable[TouchScene] = touches.scenes if progress is None else progress(touches.scenes)
+    scenes: Iterable[TouchScene] = progress(touches.scenes)
     exact = np.array(
         [forward.voltages(conductivity_with(solved_on, scene.touches, sheet)) for scene in scenes]
     )

@@ -66,11 +66,9 @@ class TrackSamples:
     shape: "TouchShape | None" = None
 
 
-def always(
-    x_mm: float, y_mm: float, radius_mm: float, law: Law | None = None, drive: float = 1.0
-) -> TouchTrack:
+def always(x_mm: float, y_mm: float, radius_mm: float, law: Law | None = None) -> TouchTrack:
     """A touch that stays where it is through all recorded frames."""
-    frame = Keyframe(ALWAYS_S[0], x_mm, y_mm, radius_mm, drive)
+    frame = Keyframe(ALWAYS_S[0], x_mm, y_mm, radius_mm)
     return TouchTrack((frame,), ShortCircuit() if law is None else law, hold=True)
 
 

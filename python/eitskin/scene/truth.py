@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.fem.sensitivity import element_to_pixel
@@ -68,7 +68,7 @@ def _paths(scene: Scene) -> Paths | None:
     return Paths(flat[:, 0].astype(np.int64), flat[:, 1], flat[:, 2:4], flat[:, 4], flat[:, 5])
 
 
-def _states_at_truth(compiled: Compiled) -> tuple[npt.NDArray[np.int64], list[State]]:
+def _states_at_truth(compiled: Compiled) -> tuple[IntArray, list[State]]:
     """The recorded frames' states when their truth was so, and which one each has (n,); those of
     frames in which touches move are not solved."""
     scene, states = compiled.scene, list(compiled.states)
@@ -95,7 +95,7 @@ def mask_of(
 
 
 def _rasters(
-    compiled: Compiled, numbers: npt.NDArray[np.int64], states: list[State], pixels: int
+    compiled: Compiled, numbers: IntArray, states: list[State], pixels: int
 ) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.float32], tuple[float, float, float, float]]:
     grid, mesh = grid_for(compiled.skin.outline, pixels), compiled.model.mesh
     if len(numbers) * grid.nx * grid.ny > MAX_CELLS:

@@ -7,14 +7,14 @@ corner); each component is one touch, at the centroid of its pixels weighted by 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import missing_extra
 from eitskin.scoring.metrics import touch_mask
 
 
 def touches_in_image(
     values: npt.ArrayLike,
-    index: npt.NDArray[np.int64],
+    index: IntArray,
     centres_mm: FloatArray,
     threshold: float,
     sign: int = 1,

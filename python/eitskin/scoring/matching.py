@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
+
 GATE_MM = 10.0
 WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 
@@ -56,7 +58,7 @@ def match(true_mm: npt.ArrayLike, found_mm: npt.ArrayLike, gate_mm: float = GATE
     )
 
 
-def assign(cost: npt.NDArray[np.float64]) -> list[int]:
+def assign(cost: FloatArray) -> list[int]:
     """The column of each row of ``cost`` (k, l), k <= l, all different, with the least sum.
 
     Shortest augmenting paths with potentials (R. Jonker and A. Volgenant, Computing 38 (1987)

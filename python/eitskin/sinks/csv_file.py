@@ -10,7 +10,7 @@ from typing import Any
 from eitskin.device.recordings.new_file import RecordingFile
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
-from eitskin.sinks.sink import Sink, Source, Told
+from eitskin.sinks.sink import Sink, Told, TouchSource
 
 TOUCH = (
     "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence",
@@ -49,7 +49,7 @@ def _text(rows: list[Any]) -> bytes:
     return text.getvalue().encode()
 
 
-def new_file(url: str, source: Source, first: bytes = b"") -> RecordingFile:
+def new_file(url: str, source: TouchSource, first: bytes = b"") -> RecordingFile:
     """The file that ``csv:FILE`` and the like name, begun with ``first``."""
     scheme, _, name = url.partition(":")
     if not name:
@@ -63,5 +63,5 @@ def new_file(url: str, source: Source, first: bytes = b"") -> RecordingFile:
     return RecordingFile(path, first, overwrite=source.overwrite)
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     return CsvSink(new_file(url, source, _text([COLUMNS])))

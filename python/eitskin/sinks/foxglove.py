@@ -13,7 +13,7 @@ import numpy as np
 from eitskin.errors import SinkError, missing_extra
 from eitskin.live.message import schema
 from eitskin.sinks.mcap_file import FRAME_ID
-from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
+from eitskin.sinks.sink import Sink, Told, TouchSource, address, nothing_more
 
 USAGE = "foxglove: or foxglove://HOST:PORT"
 PORT = 8765
@@ -29,7 +29,7 @@ class FoxgloveSink:
         RuntimeError, OSError: it cannot listen.
     """
 
-    def __init__(self, host: str, port: int, source: Source) -> None:
+    def __init__(self, host: str, port: int, source: TouchSource) -> None:
         try:
             import foxglove
             from foxglove.channels import RawImageChannel
@@ -89,7 +89,7 @@ class FoxgloveSink:
         self._server.stop()
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     """See the module."""
     named = "foxglove://" if url == "foxglove:" else url
     parts, host, port = address(named, PORT, usage=USAGE)

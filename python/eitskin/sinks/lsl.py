@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from eitskin.errors import SinkError, UsageError, missing_extra
-from eitskin.sinks.sink import Sink, Source, Told, or_nan, setting
+from eitskin.sinks.sink import Sink, Told, TouchSource, or_nan, setting
 
 QUIET = "[log]\nlevel = -2\n"  # no lines of its own but of what goes wrong
 FIELDS = ("id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n")
@@ -31,7 +31,7 @@ class LslSink:
         RuntimeError: liblsl opens none.
     """
 
-    def __init__(self, name: str, source: Source, touches: int) -> None:
+    def __init__(self, name: str, source: TouchSource, touches: int) -> None:
         self._name, self._touches = name, touches
         self._unique = quote(source.url, safe="")
         self._frames = self._outlet(name, ["touches"], FIELDS, "float32")
@@ -74,7 +74,7 @@ class LslSink:
         outlet.push_sample(sample)
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     name, _, query = url.partition(":")[2].partition("?")
     touches = setting(url, query, "touches", 1, 64, 8)
     if "/" in name:

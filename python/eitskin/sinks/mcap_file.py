@@ -11,7 +11,7 @@ from typing import Any
 from eitskin.errors import missing_extra
 from eitskin.sinks import ros2
 from eitskin.sinks.csv_file import new_file
-from eitskin.sinks.sink import Sink, Source, Told
+from eitskin.sinks.sink import Sink, Told, TouchSource
 
 CHUNK_BYTES, REPORTS_BYTES, IMAGES_BYTES = 1 << 14, 1 << 16, 1 << 18  # touches alone, with these
 FRAME_ID = "skin"
@@ -20,7 +20,7 @@ FRAME_ID = "skin"
 class McapSink:
     """One open file."""
 
-    def __init__(self, stream: Any, source: Source) -> None:
+    def __init__(self, stream: Any, source: TouchSource) -> None:
         self._stream, self._source = stream, source
         self._writer: Any = None
         self._types: dict[str, Any] = {}
@@ -69,7 +69,7 @@ class McapSink:
         self._writer.write_message(topic, self._types[kind], table, time_ns, time_ns)
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     try:
         import mcap_ros2.writer  # noqa: F401
     except ImportError:

@@ -6,7 +6,15 @@ from typing import Any
 from urllib.parse import unquote
 
 from eitskin.errors import SinkError, missing_extra
-from eitskin.sinks.sink import Dropped, Sink, Source, Told, address, nothing_more, without_password
+from eitskin.sinks.sink import (
+    Dropped,
+    Sink,
+    Told,
+    TouchSource,
+    address,
+    nothing_more,
+    without_password,
+)
 
 USAGE = "mqtt://HOST or mqtt://HOST:PORT/topic"
 PORT = 1883
@@ -45,7 +53,7 @@ class MqttSink:
         self._client.loop_stop()
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     """See the module.
 
     Raises:

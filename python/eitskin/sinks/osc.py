@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from eitskin.errors import missing_extra
-from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
+from eitskin.sinks.sink import Sink, Told, TouchSource, address, nothing_more
 from eitskin.sinks.udp import connected, send
 
 USAGE = "osc://HOST:PORT or osc://HOST:PORT/prefix"
@@ -76,7 +76,7 @@ def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
     return listed
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE, path=True)
     need_osc("osc")

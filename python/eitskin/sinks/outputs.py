@@ -13,7 +13,7 @@ from eitskin.config import nearest
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.message import summary_message
-from eitskin.sinks.sink import Dropped, Sink, Source, Told, without_password
+from eitskin.sinks.sink import Dropped, Sink, Told, TouchSource, without_password
 
 ENTRY_POINT_GROUP = "eitskin.sinks"
 ROOM = 64  # frames: more than a second
@@ -27,7 +27,7 @@ def sinks() -> dict[str, EntryPoint]:
     return {one.name: one for one in entry_points(group=ENTRY_POINT_GROUP)}
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     """The sink behind ``url``.
 
     Raises:
@@ -59,7 +59,7 @@ class Outputs:
     def __init__(
         self,
         urls: Sequence[str],
-        source: Source,
+        source: TouchSource,
         *,
         patient: bool = False,
         say: Callable[[str], None] = lambda text: None,

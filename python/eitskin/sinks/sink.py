@@ -22,7 +22,7 @@ class Dropped(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class TouchSource:
     """Whose touches they are: the device's URL, its board, and its model where the host has it.
     ``overwrite``: files that exist may be written over."""
 

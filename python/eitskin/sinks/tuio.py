@@ -12,7 +12,7 @@ from typing import Any
 
 from eitskin.errors import SinkError
 from eitskin.sinks.osc import bundle, need_osc
-from eitskin.sinks.sink import Box, Sink, Source, Told, address, nothing_more
+from eitskin.sinks.sink import Box, Sink, Told, TouchSource, address, nothing_more
 from eitskin.sinks.udp import connected, send
 
 USAGE = "tuio://HOST or tuio://HOST:PORT"
@@ -96,7 +96,7 @@ class TuioSink:
         self._socket.close()
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     parts, host, port = address(url, PORT, usage=USAGE)
     nothing_more(url, parts, USAGE)
     need_osc("tuio")

@@ -3,7 +3,7 @@
 import socket
 
 from eitskin.errors import SinkError
-from eitskin.sinks.sink import Sink, Source, Told, address, nothing_more
+from eitskin.sinks.sink import Sink, Told, TouchSource, address, nothing_more
 
 USAGE = "udp://HOST:PORT"
 
@@ -21,7 +21,7 @@ class UdpSink:
         self._socket.close()
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE)
     return UdpSink(connected(url, host, port))

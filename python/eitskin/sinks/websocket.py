@@ -13,7 +13,7 @@ from concurrent import futures
 from typing import Any
 
 from eitskin.errors import SinkError, missing_extra
-from eitskin.sinks.sink import Dropped, Sink, Source, Told, address, nothing_more
+from eitskin.sinks.sink import Dropped, Sink, Told, TouchSource, address, nothing_more
 
 USAGE = "ws://127.0.0.1:PORT, where clients connect"
 FULL_BYTES = 1 << 20  # unsent of a client: it is left out until it has read
@@ -105,7 +105,7 @@ class WebSocketSink:
         return left_out == 0
 
 
-def open_sink(url: str, source: Source) -> Sink:
+def open_sink(url: str, source: TouchSource) -> Sink:
     parts, host, port = address(url, None, usage=USAGE, lowest=0)
     nothing_more(url, parts, USAGE)
     return WebSocketSink(url, host, port)

@@ -42,7 +42,7 @@ LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
 @dataclass(frozen=True)
-class Page:
+class SvgPage:
     """mm a user unit, and the user coordinates of the page's left and lower edge."""
 
     scale_mm: float
@@ -75,7 +75,7 @@ def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         ) from None
 
 
-def _page(root: ET.Element, where: str, reading: DrawingReading) -> Page:
+def _page(root: ET.Element, where: str, reading: DrawingReading) -> SvgPage:
     try:
         box = [float(word) for word in re.split(r"[\s,]+", root.get("viewBox", "").strip()) if word]
     except ValueError:
@@ -106,8 +106,8 @@ def _page(root: ET.Element, where: str, reading: DrawingReading) -> Page:
             )
         scale = given[0]
     if box:
-        return Page(scale, box[0], box[1] + box[3])
-    return Page(scale, 0.0, sizes[1] / MM_A_PIXEL if sizes[1] else 0.0)
+        return SvgPage(scale, box[0], box[1] + box[3])
+    return SvgPage(scale, 0.0, sizes[1] / MM_A_PIXEL if sizes[1] else 0.0)
 
 
 def _length_mm(text: str | None) -> float | None:
@@ -156,7 +156,7 @@ def _refuse_copies(root: ET.Element, where: str) -> None:
 
 
 def _shapes(
-    one: Any, around: frozenset[str], page: Page, tolerance_mm: float
+    one: Any, around: frozenset[str], page: SvgPage, tolerance_mm: float
 ) -> Iterator[DrawnShape]:
     attributes = one.values.get("attributes", {}) if isinstance(one.values, dict) else {}
     if attributes.get("display") == "none" or "display:none" in str(

@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import BoolArray
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import (
     LearnedReference,
@@ -86,7 +87,7 @@ class Batch:
         self._last = self._last[:0]
         return self._on_each(lambda one: one.set_reference(frames))
 
-    def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
+    def mask_rows(self, rows: BoolArray) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before
         ``tare``."""
         self._on_each(lambda one: one.mask_rows(rows))
@@ -133,7 +134,6 @@ def reconstruct_many(
     quiet_v: npt.ArrayLike,
     *,
     threads: int | None = None,
-    engine: str = "c",
     options: Options | None = None,
     touches: bool = True,
 ) -> list[Reconstruction]:
@@ -144,7 +144,7 @@ def reconstruct_many(
         FrameError: a frame cannot be used; the text has its number.
         UsageError, ModelError: as :class:`Batch`.
     """
-    batch = Batch(model, threads=threads, engine=engine, options=options)
+    batch = Batch(model, threads=threads, options=options)
     batch.tare(quiet_v)
     found: list[Reconstruction] = []
     for number, result in enumerate(batch.each(frames_v, touches=touches)):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.config import nearest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import (
@@ -69,12 +69,10 @@ class Reconstructor:
         self.set_options(options or self._options)
 
     @classmethod
-    def from_file(
-        cls, path: str | Path, *, engine: str = "c", options: Options | None = None
-    ) -> "Reconstructor":
+    def from_file(cls, path: str | Path, *, engine: str = "c") -> "Reconstructor":
         """With the model in the file ``path``; raises what ``load_model`` raises besides."""
         model, blob = load_model(path)
-        return cls(model, engine=engine, options=options, blob=blob)
+        return cls(model, engine=engine, blob=blob)
 
     @property
     def c_engine(self) -> CoreEngine | None:
@@ -134,7 +132,7 @@ class Reconstructor:
         check_shape(frames, self.model.protocol.n_rows, "reference", least=1)
         return self._engine.set_reference(frames)
 
-    def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
+    def mask_rows(self, rows: BoolArray) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before
         ``tare``.
 

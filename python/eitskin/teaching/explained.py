@@ -1,7 +1,7 @@
 """What presses teach by the likelihood, whether their places are mirrored or shifted by some
 presses, and whether they explain the voltages at all."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.fem.grid import Grid, grid_for
+from eitskin.progress import Progress
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.skin import Skin
@@ -25,8 +26,6 @@ from eitskin.teaching.fit import (
 from eitskin.teaching.kernel import Kernel, Placement, field_sensitivity
 from eitskin.teaching.left_out import LeftOut, chance_share, leave_one_out, refined_places
 from eitskin.teaching.presses import Presses, shifted
-
-Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
 PIXELS_ACROSS = 32
 MIRROR_GAIN = 10.0  # of log likelihood

@@ -1,7 +1,6 @@
 """From presses to what a skin answers to a press anywhere: geometry and hyperparameters by marginal
 likelihood, amplitudes and noise from presses left out."""
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from math import exp, log
 from typing import Any
@@ -10,10 +9,9 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError, missing_extra
+from eitskin.progress import Progress, silent
 from eitskin.teaching.kernel import Kernel, Placement
 from eitskin.teaching.process import Process, condition
-
-Progress = Callable[[Iterable[Any]], Iterable[Any]]
 
 START_ANGLES = 32
 MAX_FOR_LIKELIHOOD = 150
@@ -56,7 +54,7 @@ def chosen_kernel(
     data: FloatArray,
     *,
     angles: int = START_ANGLES,
-    progress: Progress = iter,
+    progress: Progress = silent,
 ) -> tuple[Kernel, float]:
     """``kernel`` with placement, own-row term and noise of the greatest likelihood, and its log."""
     try:
@@ -246,7 +244,7 @@ def learn(
     choose: bool = True,
     angles: int = START_ANGLES,
     amplitude: FloatArray | None = None,
-    progress: Progress = iter,
+    progress: Progress = silent,
 ) -> Learned:
     """Learn from presses; ``choose`` False keeps the kernel's numbers, as for presses held out."""
     data, unit = differences(difference)

@@ -23,11 +23,20 @@ from eitskin.arrays import FloatArray
 from eitskin.device.settings import ScanSettings
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import UsageError
-from eitskin.teaching.plan import Plan
+from eitskin.teaching.plan import PressPlan
 from eitskin.teaching.press_file import PressFile
 
 PACE_US = 25_000  # a frame: a hold of twelve is .3 s
 JUMPS = 2  # between frames at rest: so many of the greatest are not counted as noise
+REST_FRAMES = 12  # of which the untouched frame is the mean
+SETTLE_FRAMES = 8  # after contact, before the hold counts
+HOLD_FRAMES = 12  # of which the pressed frame is the mean
+PATIENCE_FRAMES = 200  # that a skin which never rests, or rests elsewhere, is waited for
+PRESS_ABOVE = 8.0  # a change of so many times the noise is a press
+LIFTED_BELOW = 0.2  # one of so small a part of the press is none any more
+HELD_ABOVE = 0.7  # one of so great a part, for all that patience, was not lifted
+STRENGTH_CHANGE = 0.1  # between the halves of a hold, at most
+TURN = 0.02  # 1 - cosine between the changes of the two halves, at most, beside what noise makes
 
 
 class Step(Enum):
@@ -38,33 +47,6 @@ class Step(Enum):
     HOLD = "hold still"
     LIFT = "lift"
     DONE = "done"
-
-
-@dataclass(frozen=True)
-class GuideSettings:
-    """How presses are seen.
-
-    Attributes:
-        rest_frames: of which the untouched frame is the mean.
-        settle_frames: after contact, before the hold counts.
-        hold_frames: of which the pressed frame is the mean.
-        patience_frames: that a skin which never rests, or rests elsewhere, is waited for.
-        press_above: a change of so many times the noise is a press.
-        lifted_below: one of so small a part of the press is none any more.
-        held_above: one of so great a part, for all that patience, was not lifted.
-        strength_change: between the halves of a hold, at most.
-        turn: 1 - cosine between the changes of the two halves, at most, beside what noise makes.
-    """
-
-    rest_frames: int = 12
-    settle_frames: int = 8
-    hold_frames: int = 12
-    patience_frames: int = 200
-    press_above: float = 8.0
-    lifted_below: float = 0.2
-    held_above: float = 0.7
-    strength_change: float = 0.1
-    turn: float = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +71,14 @@ class PressGuide:
         UsageError: the plan has no place ``start``.
     """
 
-    def __init__(self, plan: Plan, settings: GuideSettings | None = None, start: int = 0) -> None:
+    def __init__(self, plan: PressPlan, start: int = 0) -> None:
         if not 0 <= start <= len(plan):
             raise UsageError(f"teach: the plan has {len(plan)} places, so not number {start + 1}")
-        self.plan, self.settings = plan, settings or GuideSettings()
+        self.plan = plan
         self.number = start
         self.taken: tuple[FloatArray, FloatArray, float] | None = None
         self.step = Step.REST if start < len(plan) else Step.DONE
-        self._rest: deque[FloatArray] = deque(maxlen=self.settings.rest_frames)
+        self._rest: deque[FloatArray] = deque(maxlen=REST_FRAMES)
         self._noise: FloatArray | None = None
         self._untouched: FloatArray | None = None
         self._hold: list[FloatArray] = []
@@ -134,12 +116,12 @@ class PressGuide:
     def _at_rest(self, frame: FloatArray, _: float) -> GuideEvent | None:
         """Wait until the skin rests: two halves of the last frames agree to within the noise, and
         with the skin as it was untouched last. One that creeps for ever, or stays elsewhere, is
-        taken as it is after ``patience_frames``."""
+        taken as it is after ``PATIENCE_FRAMES``."""
         self._rest.append(frame)
         if self._untouched is None:
             self._untouched = frame
         self._waited += 1
-        if len(self._rest) < self.settings.rest_frames:
+        if len(self._rest) < REST_FRAMES:
             return None
         frames = np.array(self._rest)
         steps = np.diff(frames, axis=0)
@@ -149,8 +131,8 @@ class PressGuide:
         noise = noise if self._noise is None else 0.8 * self._noise + 0.2 * noise
         half, mean = len(frames) // 2, frames.mean(axis=0)
         moved = _rms((frames[half:].mean(axis=0) - frames[:half].mean(axis=0)) / noise)
-        if self._waited < self.settings.patience_frames:
-            if moved > self.settings.press_above / 4:
+        if self._waited < PATIENCE_FRAMES:
+            if moved > PRESS_ABOVE / 4:
                 return None
             if _rms((mean - self._untouched) / noise) > self._lifted():
                 return self._warns()
@@ -169,7 +151,7 @@ class PressGuide:
     def _waiting(self, frame: FloatArray, _: float) -> GuideEvent | None:
         assert self._noise is not None
         assert self._untouched is not None
-        if self._size(frame) <= self.settings.press_above:
+        if self._size(frame) <= PRESS_ABOVE:
             self._rest.append(frame)
             self._untouched = np.array(self._rest)[: -(len(self._rest) // 4)].mean(axis=0)
             return None
@@ -178,12 +160,11 @@ class PressGuide:
 
     def _holding(self, frame: FloatArray, time_s: float) -> GuideEvent | None:
         self._hold.append(frame)
-        wanted = self.settings
-        if len(self._hold) < wanted.settle_frames + wanted.hold_frames:
-            if self._size(frame) > wanted.press_above / 2:
+        if len(self._hold) < SETTLE_FRAMES + HOLD_FRAMES:
+            if self._size(frame) > PRESS_ABOVE / 2:
                 return None
             return self._refuses("it was let go too early; hold it until you are told to lift")
-        frames = np.array(self._hold[wanted.settle_frames :])
+        frames = np.array(self._hold[SETTLE_FRAMES:])
         wrong = self._judged(frames)
         pressed = frames.mean(axis=0)
         self._strength = self._size(pressed)
@@ -206,9 +187,9 @@ class PressGuide:
         sizes = np.linalg.norm(first), np.linalg.norm(second)
         change = sizes[1] / sizes[0] - 1
         noisy = len(first) * 2 / half / sizes[0] ** 2  # what the noise of both halves makes of it
-        if 1 - first @ second / (sizes[0] * sizes[1]) > self.settings.turn + noisy:
+        if 1 - first @ second / (sizes[0] * sizes[1]) > TURN + noisy:
             return "it moved or slipped"
-        if abs(change) > self.settings.strength_change + 2 * np.sqrt(noisy / len(first)):
+        if abs(change) > STRENGTH_CHANGE + 2 * np.sqrt(noisy / len(first)):
             return f"it was not held: its strength changed by {100 * change:+.0f} %"
         return ""
 
@@ -217,8 +198,8 @@ class PressGuide:
             self._came_back = True
             return self._next("") if self._good else self._rests("")
         self._waited += 1
-        held = self._size(frame) > self.settings.held_above * self._strength
-        if self._came_back or not held or self._waited < self.settings.patience_frames:
+        held = self._size(frame) > HELD_ABOVE * self._strength
+        if self._came_back or not held or self._waited < PATIENCE_FRAMES:
             return None
         why = "the skin is not as it was before this press; perhaps lifting was taken for it"
         withdrawn, event = self._good, self._rests(f"again, please: {why}")
@@ -226,7 +207,7 @@ class PressGuide:
 
     def _lifted(self) -> float:
         """A change of the skin, over the noise, below which nothing touches it."""
-        return max(self.settings.press_above, self.settings.lifted_below * self._strength)
+        return max(PRESS_ABOVE, LIFTED_BELOW * self._strength)
 
     def _refuses(self, why: str) -> GuideEvent:
         self._good = False

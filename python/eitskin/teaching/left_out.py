@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.fem.grid import Grid
 from eitskin.teaching.fit import PLACE_KEPT, PLACE_ROUNDS, Learned, learn
 
@@ -96,7 +96,7 @@ def _middle(score: FloatArray, at: FloatArray) -> FloatArray:
     return np.asarray(chance @ at / chance.sum())
 
 
-def stranger_note(strangers: npt.NDArray[np.int64]) -> str:
+def stranger_note(strangers: IntArray) -> str:
     return (
         "presses that do not fit the others (two fingers at once, a slip, a wrong place); leave"
         " them out or record them again: " + ", ".join(map(str, strangers[:12]))

@@ -55,7 +55,6 @@ def taught_model(
     untouched: FloatArray,
     least_share: float,
     meta: dict[str, Any] | None = None,
-    storage: str = "f32",
     rank: int = RANK,
 ) -> Model:
     """The model of ``learned`` on ``grid``: P = U'W / s_1, S = diag(s / s_1) V' of S_w D = U s V',
@@ -67,7 +66,7 @@ def taught_model(
     u, s, vt = np.linalg.svd(answer * weight, full_matrices=False)
     rank = min(rank, rows, grid.n_pixels)
     projection = (u[:, :rank].T @ learned.noise.whitening / learned.unit / s[0]).astype(np.float32)
-    stored = store((s[:rank] / s[0])[:, None] * vt[:rank], storage)
+    stored = store((s[:rank] / s[0])[:, None] * vt[:rank], "f32")
     decoded = stored.decode(rank)
     reference = untouched.mean(axis=0).astype(np.float32)
     k = int(np.argmin(np.linalg.norm(grid.centres_mm() - grid.centres_mm().mean(axis=0), axis=1)))

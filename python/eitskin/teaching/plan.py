@@ -36,7 +36,7 @@ COLUMNS = ("x_mm", "y_mm", "depth_mm", "force_n")
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class PressPlan:
     """``place_mm`` (n, 2) in the order to press; ``depth_mm`` and ``force_n`` (n,), NaN where a
     press may be any."""
 
@@ -48,7 +48,7 @@ class Plan:
         return len(self.place_mm)
 
 
-def plan_places(skin: Skin, protocol: Protocol, count: int) -> Plan:
+def plan_places(skin: Skin, protocol: Protocol, count: int) -> PressPlan:
     """``count`` places on ``skin``, each the one that leaves least unknown.
 
     Raises:
@@ -70,7 +70,7 @@ def plan_places(skin: Skin, protocol: Protocol, count: int) -> Plan:
         column = variance[:, chosen[k]]
         variance = variance - np.outer(column, column) / own[chosen[k]]
     unknown = np.full(count, np.nan)
-    return Plan(place[chosen], unknown, unknown)
+    return PressPlan(place[chosen], unknown, unknown)
 
 
 def candidates(skin: Skin) -> FloatArray:
@@ -85,7 +85,7 @@ def candidates(skin: Skin) -> FloatArray:
     return np.asarray(place[inside if inside.any() else np.ones(len(place), dtype=bool)])
 
 
-def save_plan(path: str | Path, plan: Plan) -> None:
+def save_plan(path: str | Path, plan: PressPlan) -> None:
     """Write it as CSV, one place a line."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -98,7 +98,7 @@ def save_plan(path: str | Path, plan: Plan) -> None:
         temporary.write_text(text.getvalue(), encoding="utf-8")
 
 
-def load_plan(path: str | Path) -> Plan:
+def load_plan(path: str | Path) -> PressPlan:
     """A plan as ``save_plan`` writes it, or by hand: a header with x_mm and y_mm, and where wanted
     depth_mm or force_n, which may be empty.
 
@@ -139,4 +139,4 @@ def load_plan(path: str | Path) -> Plan:
         )
     if not 1 <= len(values) <= MAX_PLACES:
         raise FrameError(f"{path}: {len(values)} places; a plan has 1 to {MAX_PLACES}")
-    return Plan(values[:, :2], values[:, 2], values[:, 3])
+    return PressPlan(values[:, :2], values[:, 2], values[:, 3])

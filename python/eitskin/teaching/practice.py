@@ -10,14 +10,14 @@ from eitskin.fileio import read_bytes
 from eitskin.scene.description import load_scene
 from eitskin.scene.library_scenes import scene_path
 from eitskin.skin.skin import Skin
-from eitskin.teaching.plan import Plan
+from eitskin.teaching.plan import PressPlan
 
 REST_S, PRESS_S = 0.45, 0.6
 RATE_HZ = 40.0
 RADIUS_PER_SIZE = 0.04
 
 
-def practice_scene(skin: Skin, path: Path, plan: Plan) -> str:
+def practice_scene(skin: Skin, path: Path, plan: PressPlan) -> str:
     """The scene's TOML for ``skin``, whose description is the file ``path``."""
     low_x, low_y, high_x, high_y = skin.outline.bounding_box_mm
     radius = RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
@@ -48,14 +48,16 @@ def practice_scene(skin: Skin, path: Path, plan: Plan) -> str:
     return "\n".join(lines) + "\n"
 
 
-def plan_of_scene(name: str) -> tuple[Plan, str]:
+def plan_of_scene(name: str) -> tuple[PressPlan, str]:
     """Where the touches of a scene, a file or one of the library, press, and the text of its skin's
     description; empty for the paper's."""
     path = scene_path(name)
     scene = load_scene(path)
     first = sorted((track.keyframes[0] for track in scene.touches), key=lambda one: one.t_s)
     unknown = np.full(len(first), np.nan)
-    plan = Plan(np.array([(one.x_mm, one.y_mm) for one in first]).reshape(-1, 2), unknown, unknown)
+    plan = PressPlan(
+        np.array([(one.x_mm, one.y_mm) for one in first]).reshape(-1, 2), unknown, unknown
+    )
     skin = str(load_toml(path, "scene")["scene"].get("skin", "paper"))
     if skin == "paper":
         return plan, ""

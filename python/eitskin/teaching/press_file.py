@@ -11,7 +11,7 @@ from eitskin.arrays import FloatArray
 from eitskin.errors import FileError, FrameError
 from eitskin.fileio import followed, locked, write_beside
 from eitskin.skin.protocol import Protocol
-from eitskin.teaching.plan import Plan
+from eitskin.teaching.plan import PressPlan
 from eitskin.teaching.presses import Presses, joined, load_presses, write_presses
 
 SAME_PLACE_MM = 0.02
@@ -28,7 +28,7 @@ class PressFile:
     """
 
     def __init__(
-        self, path: Path, plan: Plan, protocol: Protocol, skin: str, *, anew: bool = False
+        self, path: Path, plan: PressPlan, protocol: Protocol, skin: str, *, anew: bool = False
     ) -> None:
         self.path, self.plan, self.protocol, self.skin = path, plan, protocol, skin
         self._held: IO[bytes] | None = None

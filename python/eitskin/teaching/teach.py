@@ -5,24 +5,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.calibration.fit import calibrate
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import EitskinError, ProtocolError, UsageError
 from eitskin.fem.grid import Grid
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.checks import MIN_PRESSES, check_presses
 from eitskin.teaching.explained import (
     Explained,
-    Progress,
     explained,
     known_size,
-    quiet_progress,
     shifted_or_refused,
 )
 from eitskin.teaching.fit import Learned, learn, with_drift
@@ -37,7 +35,7 @@ from eitskin.teaching.make import LEAST_SHARES, taught_model
 from eitskin.teaching.presses import Presses, aged
 
 # models, each with the numbers of presses that it did not know
-Tried = list[tuple[Model, npt.NDArray[np.int64]]]
+Tried = list[tuple[Model, IntArray]]
 
 FEW_PRESSES = 50
 FEWEST_LEVELS = 3  # of depth or force, for a law
@@ -60,10 +58,10 @@ class HeldOut:
     covariance by the fit (inf where there is none), and which presses they are."""
 
     error_mm: FloatArray
-    count: npt.NDArray[np.int64]
+    count: IntArray
     strength: FloatArray
     mahalanobis2: FloatArray
-    which: npt.NDArray[np.int64]
+    which: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +83,7 @@ def teach(
     place_sd_mm: float = 0.0,
     reference_age: int = 0,
     refuse: bool = True,
-    progress: Progress = quiet_progress,
+    progress: Progress = silent,
 ) -> Taught:
     """Learn a model from ``presses`` of ``skin``; None where it is not known. ``place_sd_mm``: how
     far places given by hand may be off, an axis. ``reference_age``: how many presses old the
@@ -169,7 +167,7 @@ def squared(away_mm: FloatArray, touch: Touch) -> float:
 
 
 def model_without(
-    found: Explained, kept: npt.NDArray[np.int64], reference_age: int, least_share: float
+    found: Explained, kept: IntArray, reference_age: int, least_share: float
 ) -> Model:
     """A model of the presses ``kept`` with the kernel of all, and the drift of all."""
     presses, process, given = found.presses, found.learned.process, known_size(found.presses)
@@ -227,7 +225,7 @@ def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
     return LEAST_SHARES[k], held
 
 
-def best_share(alone: FloatArray, two: npt.NDArray[np.bool_]) -> int:
+def best_share(alone: FloatArray, two: BoolArray) -> int:
     """Which of k shares is best: ``alone`` (k,) of single presses count as one, ``two`` (k, n) of
     sums are told as two. With few sums the least that leaves single ones alone."""
     few = two.shape[1] < FEWEST_SUMS
@@ -237,16 +235,14 @@ def best_share(alone: FloatArray, two: npt.NDArray[np.bool_]) -> int:
     return int(enough[0 if few else np.argmax((alone + two.mean(axis=1))[enough])])
 
 
-def near_sums(place_mm: FloatArray, width_mm: float) -> npt.NDArray[np.int64]:
+def near_sums(place_mm: FloatArray, width_mm: float) -> IntArray:
     """Pairs (k, 2) of presses at ``place_mm`` (n, 2) that the core can just tell apart."""
     away = np.linalg.norm(place_mm[:, None] - place_mm, axis=2) / width_mm
     pairs = np.argwhere(np.triu((away > SUMS_FROM) & (away < SUMS_TO), 1))
     return np.random.default_rng(3).permutation(pairs)[:MAX_SUMS]
 
 
-def told_as_two(
-    model: Model, presses: Presses, pairs: npt.NDArray[np.int64]
-) -> npt.NDArray[np.bool_]:
+def told_as_two(model: Model, presses: Presses, pairs: IntArray) -> BoolArray:
     """Whether the core finds two touches and no more, each at its own, where two of ``presses``,
     numbered by ``pairs`` (k, 2), are added."""
     core, told = Reconstructor(model), np.zeros(len(pairs), dtype=bool)
@@ -295,7 +291,7 @@ def learning_curve(
 def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | None, list[str]]:
     """The law from strength to force, or where presses have a depth to that, from presses held
     out."""
-    from eitskin.calibration.presses import Presses as Weights
+    from eitskin.calibration.presses import WeighedPresses
 
     given = known_size(presses)
     if given is None:
@@ -312,7 +308,9 @@ def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | Non
     unit = "force in newtons" if presses.force_n is not None else "depth in mm, in place of newtons"
     try:
         places = presses.place_mm[held.which][good]
-        found = calibrate(Weights(size[good], held.strength[good], places), reach, resamples=0)
+        found = calibrate(
+            WeighedPresses(size[good], held.strength[good], places), reach, resamples=0
+        )
     except EitskinError as error:
         return None, [f"touches have no force: {error}"]
     rms = float(np.sqrt(np.mean((found.left_out * size[good]) ** 2)))

@@ -16,21 +16,19 @@ from math import exp, log
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import ProtocolError
 from eitskin.fem.grid import between_pixels, grid_for
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.teaching.checks import check_presses
 from eitskin.teaching.explained import (
     MIRROR_GAIN,
     PIXELS_ACROSS,
-    Progress,
     known_size,
-    quiet_progress,
     shift_note,
     shifts,
     starting_kernel,
@@ -87,7 +85,7 @@ class Deviation(Kernel):
 
 
 @dataclass(frozen=True, eq=False)
-class Session:
+class Prior:
     """What new presses are held against: ``old`` as it is known, its ``kernel``, the skin's
     ``width_mm``; ``unit`` (m,) V, the rms of each row's old answer."""
 
@@ -108,7 +106,7 @@ class Updated:
 
 
 def update(
-    model: Model, presses: Presses, *, where: str = "model", progress: Progress = quiet_progress
+    model: Model, presses: Presses, *, where: str = "model", progress: Progress = silent
 ) -> Updated:
     """``model`` adapted by new ``presses``; ``where`` names it in errors.
 
@@ -127,22 +125,22 @@ def update(
         )
     skin = model.skin if "skin" in model.meta else None
     check_presses(presses, skin)
-    session = _session(old, skin, presses)
-    by = _shift(session, presses)
+    prior = _prior(old, skin, presses)
+    by = _shift(prior, presses)
     presses = shifted(presses, by)
-    session, mirrored = _mirrored_or_not(session, presses)
-    found = {how: adapted(session, presses, how) for how in progress((MOVED, FULL), "candidates")}
-    errors, tried = held_out_errors(model, session, presses, found, progress)
-    chosen = choice(errors, ERROR_FLOOR * session.width_mm)
+    prior, mirrored = _mirrored_or_not(prior, presses)
+    found = {how: adapted(prior, presses, how) for how in progress((MOVED, FULL), "candidates")}
+    errors, tried = held_out_errors(model, prior, presses, found, progress)
+    chosen = choice(errors, ERROR_FLOOR * prior.width_mm)
     before = float(model.meta["teach"].get("error_mm", {}).get("held_out_median", np.inf))
-    strangers = _strangers(session, found[MOVED])
+    strangers = _strangers(prior, found[MOVED])
     notes = [stranger_note(strangers)] if len(strangers) else []
     if by:
         notes.append(shift_note(by))
     if mirrored and chosen != KEPT:
         notes.append("the new places are mirrored against the old; the model follows the new ones")
     medians = {how: float(np.median(one)) for how, one in errors.items()}
-    if medians[chosen] > STILL_POOR * max(before, ERROR_FLOOR * session.width_mm):
+    if medians[chosen] > STILL_POOR * max(before, ERROR_FLOOR * prior.width_mm):
         notes.append(
             f"presses held out are still off by {medians[chosen]:.1f} mm; look at the electrodes"
             " and whether each press has its own place, then teach again with 50 presses"
@@ -176,14 +174,14 @@ def update(
         meta["skin"] = skin_to_table(seen)
         grid = grid_for(seen.outline, PIXELS_ACROSS)
     else:
-        grid = move.grid(model.grid, session.kernel.centre_mm)
+        grid = move.grid(model.grid, prior.kernel.centre_mm)
     new = taught_model(found[chosen], presses.protocol, grid, presses.untouched, least_share, meta)
-    law = _law(model, new, move, session, presses)
+    law = _law(model, new, move, prior, presses)
     new = replace(new, defaults=defaults, load=law, place_factor=model.place_factor)
     return Updated(new, chosen, move, report)
 
 
-def _session(old: Known, skin: Skin | None, presses: Presses) -> Session:
+def _prior(old: Known, skin: Skin | None, presses: Presses) -> Prior:
     begin, width_mm = starting_kernel(presses, skin)
     unit = np.sqrt(np.mean(old.answer**2, axis=0))
     unit = np.maximum(unit, 1e-9 * unit.max())
@@ -191,42 +189,42 @@ def _session(old: Known, skin: Skin | None, presses: Presses) -> Session:
         begin.sensitivity, begin.centre_mm, begin.length_mm,
         old=between_pixels(old.grid, old.answer / unit),
     )  # fmt: skip
-    return Session(old, kernel, width_mm, unit)
+    return Prior(old, kernel, width_mm, unit)
 
 
-def _shift(session: Session, presses: Presses) -> int:
+def _shift(prior: Prior, presses: Presses) -> int:
     """By how many places the presses are off: 0 where the moved old model explains them."""
-    as_given = _unexplained(session, presses)
+    as_given = _unexplained(prior, presses)
     if as_given < ODD:
         return 0
-    tried = {by: _unexplained(session, shifted(presses, by)) for by in shifts(presses)}
+    tried = {by: _unexplained(prior, shifted(presses, by)) for by in shifts(presses)}
     by = min(tried, key=lambda one: tried[one], default=0)
     return by if by and tried[by] < SHIFTED * as_given else 0
 
 
-def _unexplained(session: Session, presses: Presses) -> float:
+def _unexplained(prior: Prior, presses: Presses) -> float:
     """Of the presses' energy, by the old answers at the likeliest new places."""
     process = min(
-        (adapted(one, presses, MOVED) for one in (session, _mirrored(session))),
+        (adapted(one, presses, MOVED) for one in (prior, _mirrored(prior))),
         key=lambda one: -one.log_likelihood,
     ).process
     return float(np.sum(process.left_out() ** 2) / np.sum(process.data**2))
 
 
-def _mirrored(session: Session) -> Session:
-    return replace(session, kernel=replace(session.kernel, move=Move(mirrored=True)))
+def _mirrored(prior: Prior) -> Prior:
+    return replace(prior, kernel=replace(prior.kernel, move=Move(mirrored=True)))
 
 
-def _mirrored_or_not(session: Session, presses: Presses) -> tuple[Session, bool]:
-    """``session``, mirrored where that is far more likely."""
-    other = _mirrored(session)
-    plain, turned = (adapted(one, presses, MOVED).log_likelihood for one in (session, other))
-    return (other, True) if turned > plain + MIRROR_GAIN else (session, False)
+def _mirrored_or_not(prior: Prior, presses: Presses) -> tuple[Prior, bool]:
+    """``prior``, mirrored where that is far more likely."""
+    other = _mirrored(prior)
+    plain, turned = (adapted(one, presses, MOVED).log_likelihood for one in (prior, other))
+    return (other, True) if turned > plain + MIRROR_GAIN else (prior, False)
 
 
-def _strangers(session: Session, learned: Learned) -> npt.NDArray[np.int64]:
+def _strangers(prior: Prior, learned: Learned) -> IntArray:
     """Presses that the others and the old noise do not explain; new noise would hide them."""
-    white = whitening_of(session.old.noise / session.unit / session.unit[:, None])
+    white = whitening_of(prior.old.noise / prior.unit / prior.unit[:, None])
     misfit = np.sum((learned.process.left_out() @ white.T) ** 2, axis=1)
     return np.flatnonzero(misfit > STRANGE * np.median(misfit))
 
@@ -236,24 +234,22 @@ def _move(learned: Learned) -> Move:
     return learned.kernel.move
 
 
-def adapted(
-    session: Session, presses: Presses, how: str, start: Deviation | None = None
-) -> Learned:
+def adapted(prior: Prior, presses: Presses, how: str, start: Deviation | None = None) -> Learned:
     """The answer after ``presses`` by the candidate ``how``; with ``start`` the likelihood is
     searched from there alone."""
-    data, given = presses.difference / session.unit, known_size(presses)
-    old_noise = session.old.noise / session.unit / session.unit[:, None]
+    data, given = presses.difference / prior.unit, known_size(presses)
+    old_noise = prior.old.noise / prior.unit / prior.unit[:, None]
     white = whitening_of(old_noise)
-    kernel = likeliest(session, presses, how, white, start)
+    kernel = likeliest(prior, presses, how, white, start)
     answer = kernel.features(presses.place_mm)
     amplitude = _amplitudes(answer, data, given, white)
     process = condition(kernel, presses.place_mm, amplitude, data, about_own=True)
-    noise = _pooled(old_noise, session.old.presses, process.left_out())
+    noise = _pooled(old_noise, prior.old.presses, process.left_out())
     for _ in range(ROUNDS):
         amplitude = left_out_amplitudes(process, noise, given)
         process = condition(kernel, presses.place_mm, amplitude, data, about_own=True)
-        noise = _pooled(old_noise, session.old.presses, process.left_out())
-    return Learned(process, noise, session.unit, process.log_likelihood)
+        noise = _pooled(old_noise, prior.old.presses, process.left_out())
+    return Learned(process, noise, prior.unit, process.log_likelihood)
 
 
 def _amplitudes(
@@ -271,22 +267,22 @@ def _pooled(old: FloatArray, count: int, residual: FloatArray) -> Noise:
 
 
 def likeliest(
-    session: Session, presses: Presses, how: str, white: FloatArray, start: Deviation | None
+    prior: Prior, presses: Presses, how: str, white: FloatArray, start: Deviation | None
 ) -> Deviation:
     """The kernel with turn, shift, gain's and noise's variances (over delta's) of the greatest
     likelihood; ``MOVED`` has noise alone."""
     from scipy.optimize import minimize
 
-    data, given, place = presses.difference / session.unit, known_size(presses), presses.place_mm
-    sd_mm = SHIFT_SD * session.width_mm
+    data, given, place = presses.difference / prior.unit, known_size(presses), presses.place_mm
+    sd_mm = SHIFT_SD * prior.width_mm
     free = 5 if how == FULL else 3
     fixed = np.array([0, 0, 0, LOG_BOUND, -LOG_BOUND])
 
     def at(numbers: FloatArray) -> Deviation:
         turn, x, y, noise, own = np.concatenate([numbers, fixed[free:]]).tolist()
         noise, own = (min(max(one, -LOG_BOUND), LOG_BOUND) for one in (noise, own))
-        move = replace(session.kernel.move, turn_deg=turn, shift_mm=(x, y))
-        return replace(session.kernel, move=move, noise=exp(noise), own=exp(own))
+        move = replace(prior.kernel.move, turn_deg=turn, shift_mm=(x, y))
+        return replace(prior.kernel, move=move, noise=exp(noise), own=exp(own))
 
     def cost(numbers: FloatArray) -> float:
         kernel = at(numbers)
@@ -324,10 +320,10 @@ def likeliest(
 
 def held_out_errors(
     model: Model,
-    session: Session,
+    prior: Prior,
     presses: Presses,
     found: dict[str, Learned],
-    progress: Progress = quiet_progress,
+    progress: Progress = silent,
 ) -> tuple[dict[str, FloatArray], dict[str, Tried]]:
     """Errors (n,) mm of each candidate for presses that it did not know, as the core solves them;
     of the old model, which knew none, for all. And the models that were tried, each with those
@@ -340,8 +336,8 @@ def held_out_errors(
         known = presses.take(np.flatnonzero(fold != k))
         for how, learned in found.items():
             assert isinstance(learned.kernel, Deviation)
-            less = adapted(session, known, how, learned.kernel)
-            grid = _move(less).grid(model.grid, session.kernel.centre_mm)
+            less = adapted(prior, known, how, learned.kernel)
+            grid = _move(less).grid(model.grid, prior.kernel.centre_mm)
             one = taught_model(
                 less, presses.protocol, grid, known.untouched, model.defaults.touch_min_fraction
             )
@@ -361,13 +357,13 @@ def choice(errors: dict[str, FloatArray], floor_mm: float) -> str:
     return chosen
 
 
-def _law(old: Model, new: Model, move: Move, session: Session, presses: Presses) -> LoadLaw | None:
+def _law(old: Model, new: Model, move: Move, prior: Prior, presses: Presses) -> LoadLaw | None:
     """The old law of force where the skin is now, its strengths in the new model's scale: that of
     presses whose size is known."""
     given = known_size(presses)
     if old.load is None:
         return None
-    law = move.law(old.load, new.grid, session.kernel.centre_mm)
+    law = move.law(old.load, new.grid, prior.kernel.centre_mm)
     if given is None:
         return law
     strength = solve_presses(new, presses)[2]

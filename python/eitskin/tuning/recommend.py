@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from eitskin.model.build import Progress, build_model
+from eitskin.model.build import build_model
 from eitskin.model.eitm import save_model
+from eitskin.progress import Progress, silent
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import build_settings
@@ -135,7 +136,7 @@ def _time_line(board: str, solve_us: float, most_us: float, point: Point) -> str
 
 
 def write_model(
-    path: Path, point: Point, skin: Skin, protocol: Protocol, progress: Progress | None = None
+    path: Path, point: Point, skin: Skin, protocol: Protocol, progress: Progress = silent
 ) -> int:
     """Build and write the model of a point for ``skin``, the solver's settings and t as its
     defaults; returns its bytes. ``progress`` as ``build_model``."""

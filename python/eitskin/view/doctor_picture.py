@@ -9,7 +9,7 @@ import numpy as np
 from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.gain import channel_gains
 from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
-from eitskin.frames.doctor.report import FAULT, Report
+from eitskin.frames.doctor.report import FAULT, DoctorReport
 from eitskin.view.panel_texts import wrapped
 from eitskin.view.panels import check_picture, save_picture
 
@@ -17,7 +17,7 @@ MEASURED, EXPECTED, BAD = "#1f5f99", "#b0b7bd", "#c2410c"
 GAIN_SPAN = 0.3
 
 
-def draw_report(path: str | Path, report: Report, case: Case) -> None:
+def draw_report(path: str | Path, report: DoctorReport, case: Case) -> None:
     """Write the picture of an examined ``case`` to ``path`` (.png, .pdf, .svg)."""
     check_picture(path)
     from matplotlib.backends.backend_agg import FigureCanvasAgg

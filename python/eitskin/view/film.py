@@ -1,7 +1,7 @@
 """A short film of frames: the skin with its image and touches, one scale of colours throughout, in
 the frames' own time."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from eitskin.errors import missing_extra
 from eitskin.fileio import write_beside
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.view.panels import check_path, panels_figure
 from eitskin.view.pictures import Panel, largest
 
@@ -46,7 +47,7 @@ def draw_film(
     panels: Sequence[Panel],
     times_s: Sequence[float],
     *,
-    progress: Callable[..., Iterable[Any]] = lambda items, _: items,
+    progress: Progress = silent,
 ) -> None:
     """``panels``, at ``times_s`` that ascend, as an animated WebP or GIF; of more than 240 evenly
     spaced ones. A frame is seen 40 ms to 2 s."""

@@ -1,12 +1,11 @@
 """Pictures of reconstructed frames, with the truth that they carry."""
 
-from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.scoring.score import FrameScore
 from eitskin.view.film import draw_film, thinned
 from eitskin.view.panels import draw_panels
@@ -42,8 +41,6 @@ def draw_results(
     frames: Frames,
     results: dict[int, Reconstruction],
     scores: dict[int, FrameScore],
-    *,
-    title: str = "",
 ) -> None:
     """A panel a frame, the first 36: image, true touches as circles, found ones as crosses and
     dashed circles."""
@@ -56,7 +53,7 @@ def draw_results(
         panels.append(_panel(heading, frames, number, result))
     more = len(results) > MAX_PANELS
     note = f"the first {MAX_PANELS} of {len(results)} frames" if more else ""
-    draw_panels(path, model.skin, model.grid, panels, title=title, note=note, legend=True)
+    draw_panels(path, model.skin, model.grid, panels, note=note, legend=True)
 
 
 def film_results(
@@ -65,7 +62,7 @@ def film_results(
     frames: Frames,
     results: dict[int, Reconstruction],
     *,
-    progress: Callable[..., Iterable[Any]] = lambda items, _: items,
+    progress: Progress = silent,
 ) -> None:
     """Image, true and found touches frame by frame, in the frames' time, or ten a second where they
     have none."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import write_beside
@@ -63,7 +64,7 @@ class Cell:
 
 
 @dataclass
-class Page:
+class FigurePage:
     """A figure under way: ``height`` grows from its top as things are put in."""
 
     width: float
@@ -159,7 +160,7 @@ def panels_figure(
     columns = columns or _columns(len(panels), cell, size)
     rows = math.ceil(len(panels) / columns)
     width = max(columns * cell.whole + 2 * EDGE, MIN_WIDTH)
-    page = Page(width)
+    page = FigurePage(width)
     if title:
         page.text(wrapped(title, width - 2 * EDGE, 11, "bold"), 11, "bold")
     headings = [_heading(panel.title, cell, size) for panel in panels]
@@ -204,7 +205,7 @@ def panels_figure(
 def frame_figure(
     skin: Skin,
     grid: Grid,
-    image: npt.NDArray[Any],
+    image: AnyArray,
     *,
     truth: Sequence[Mark] = (),
     found: Sequence[Mark] = (),
@@ -219,7 +220,7 @@ def frame_figure(
     cell = _cell(skin, small=False)
     columns = 1 if cell.width > 2 * cell.height else len(panels)
     width = max(columns * cell.whole + 2 * EDGE, MIN_WIDTH)
-    page = Page(width)
+    page = FigurePage(width)
     if title:
         page.text(wrapped(title, width - 2 * EDGE, 11, "bold"), 11, "bold")
     label = "\n".join(wrapped(f"change of conductivity ({unit})", cell.whole - GAP, 9))
@@ -282,7 +283,7 @@ def _heading(title: str, cell: Cell, size: float) -> str:
     return "\n".join(lines)
 
 
-def _figure(page: Page) -> Figure:
+def _figure(page: FigurePage) -> Figure:
     matplotlib = load_matplotlib()
     page.height += EDGE
     with matplotlib.rc_context(STYLE):
@@ -296,7 +297,7 @@ def _figure(page: Page) -> Figure:
     return figure
 
 
-def _axes(figure: Figure, page: Page, place: tuple[float, float, float, float]) -> Axes:
+def _axes(figure: Figure, page: FigurePage, place: tuple[float, float, float, float]) -> Axes:
     """Axes at ``place``: left, top, width and height in inches from the page's upper left."""
     left, top, width, height = place
     bottom = page.height - top - height

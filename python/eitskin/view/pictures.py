@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import missing_extra
 from eitskin.fem.grid import Grid
@@ -80,7 +81,7 @@ class Panel:
     """
 
     title: str
-    values: npt.NDArray[Any] | None = None
+    values: AnyArray | None = None
     truth: tuple[Mark, ...] = ()
     found: tuple[Mark, ...] = ()
     fill_truth: bool = False

@@ -1,12 +1,11 @@
 """A board's frames as a picture: one frame at large, or a panel a frame."""
 
-from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.scoring.stream_check import ComparedFrame, spread
 from eitskin.view.film import MAX_FRAMES, draw_film
 from eitskin.view.panels import draw_frame, draw_panels
@@ -61,7 +60,7 @@ def film_stream(
     model: Model,
     album: Album,
     *,
-    progress: Callable[..., Iterable[Any]] = lambda items, _: items,
+    progress: Progress = silent,
 ) -> None:
     """The album as a film. Raises as ``draw_stream``."""
     frames = album.spread(MAX_FRAMES)

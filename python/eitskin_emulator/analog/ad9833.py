@@ -18,13 +18,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin_emulator.clocktime import TICKS_PER_S
 from eitskin_emulator.peripherals.spi import SpiFrame
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 B28, HLB, FSELECT, PSELECT, RESET, SLEEP1, SLEEP12, OPBITEN, MODE = (
     1 << k for k in (13, 12, 11, 10, 8, 7, 6, 5, 1)

@@ -8,12 +8,14 @@ beyond. No noise: that is the scene's.
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
+
 REFERENCE_V = 3.3
 STEPS = 4096
 GAIN = 1.5
 STEP_V = REFERENCE_V / STEPS / GAIN  # of one code, at the electrodes
 
 
-def codes(v: npt.NDArray[np.float64]) -> npt.NDArray[np.uint16]:
+def codes(v: FloatArray) -> npt.NDArray[np.uint16]:
     """Codes (.,) of the voltages ``v`` (.,) between the electrodes."""
     return np.clip(np.round(STEPS / 2 + v / STEP_V), 0, STEPS - 1).astype(np.uint16)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin_emulator.analog.ad9833 import Ad9833
 from eitskin_emulator.analog.adg1206 import Multiplexers, Switching
 from eitskin_emulator.analog.converter import codes
@@ -47,7 +48,7 @@ class FrontEnd:
         del self._lags[:-KEPT]
         self.drive_switched(switching.at)
 
-    def sample(self, times: npt.NDArray[np.int64], channel: int) -> npt.NDArray[np.uint16]:
+    def sample(self, times: IntArray, channel: int) -> npt.NDArray[np.uint16]:
         """Codes (.,) at ascending ``times`` (ticks)."""
         if channel != INPUT_CHANNEL or not self.connected():
             return np.zeros(len(times), dtype=np.uint16)
@@ -64,7 +65,7 @@ class FrontEnd:
         v = self.source_a * SENSE_OHM * now if flows else 0.0
         return min(max(round(2048 + v * SENSE_STEPS_A_VOLT), 0), 4095)
 
-    def _amplitudes(self, times: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    def _amplitudes(self, times: IntArray) -> FloatArray:
         out = np.empty(len(times))
         for k, (start, target, left) in enumerate(self._lags):
             first = 0 if k == 0 else int(np.searchsorted(times, start))

@@ -15,13 +15,10 @@ give 0 V (counted in ``unknown_rows``); so does a pair that is not joined.
 from collections import Counter
 from typing import Protocol as TypingProtocol
 
-import numpy as np
-import numpy.typing as npt
-
+from eitskin.arrays import FloatArray
 from eitskin.skin.protocol import Protocol
 from eitskin_emulator.clocktime import TICKS_PER_S
 
-FloatArray = npt.NDArray[np.float64]
 Joined = tuple[int | None, int | None, int | None, int | None]
 
 

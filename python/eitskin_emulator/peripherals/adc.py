@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import IntArray
 from eitskin_emulator.clocktime import BoardClock, period_ticks
 from eitskin_emulator.peripherals.adc2 import SingleConverter
 from eitskin_emulator.peripherals.dma import TO_MEMORY, Dma
@@ -104,8 +105,8 @@ class Adc(Registers):
             timer,
         )
         self._event = Event(self._due)
-        self.sample: Callable[[npt.NDArray[np.int64], int], Codes] = lambda times, channel: (
-            np.zeros(len(times), dtype=np.uint16)
+        self.sample: Callable[[IntArray, int], Codes] = lambda times, channel: np.zeros(
+            len(times), dtype=np.uint16
         )
         timer.before_change, timer.after_change = self._take_triggers, self._plan
         self.conversions = self.ignored_triggers = 0
@@ -163,7 +164,7 @@ class Adc(Registers):
                 self._waiting = self._heard(times)
         self._seen = max(self._seen, at)
 
-    def _heard(self, times: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    def _heard(self, times: IntArray) -> IntArray:
         """The waiting triggers and those of ``times`` that do not fall into a conversion."""
         length = self._conversion_ticks()
         if times[0] >= self._last + length and (len(times) < 2 or times[1] - times[0] >= length):

@@ -11,8 +11,8 @@ synchronisation takes on silicon.
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import IntArray
 from eitskin_emulator.clocktime import BoardClock, period_ticks
 from eitskin_emulator.peripherals.nvic import Nvic
 from eitskin_emulator.peripherals.rcc import Rcc
@@ -142,7 +142,7 @@ class Timer(Registers):
             away += self.top + 1
         return self._at - self._part + away * self._step
 
-    def update_times(self, after: int, until: int) -> npt.NDArray[np.int64]:
+    def update_times(self, after: int, until: int) -> IntArray:
         """Times of updates (.,), later than ``after`` and not later than ``until``, on the present
         course."""
         first = self._reaches(0)

@@ -8,8 +8,8 @@ place is common (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin_reference.constants_table import (
     FAST_ANSWERS,
     FAST_APART_MM,
@@ -33,8 +33,6 @@ from eitskin_reference.fast.tracks import (
     summed,
 )
 
-FloatArray = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Held:
@@ -44,7 +42,7 @@ class Held:
     drive: Drive
     white: FloatArray
     factor: FloatArray
-    use: npt.NDArray[np.bool_]
+    use: BoolArray
     news: bool
     number: int
 
@@ -96,7 +94,7 @@ def inverted(h: FloatArray) -> FloatArray | None:
     return summed(half[:, :, None] * half[:, None, :])
 
 
-def apart(places: FloatArray, place: FloatArray) -> npt.NDArray[np.bool_]:
+def apart(places: FloatArray, place: FloatArray) -> BoolArray:
     """Which ``places`` (k, 2) are further than FAST_APART_MM from ``place`` (2,)."""
     x, y = (places - place).T
     return np.asarray(x * x + y * y > FAST_APART_MM * FAST_APART_MM)
@@ -123,7 +121,7 @@ def strengths(answers: FloatArray, white: FloatArray, sign: float) -> FloatArray
 class Births:
     """Looks for touches in drives that wait. ``cells`` (n,) are the pixels that are tried first."""
 
-    def __init__(self, model: RowModel, cells: npt.NDArray[np.int64], sign: float) -> None:
+    def __init__(self, model: RowModel, cells: IntArray, sign: float) -> None:
         self.model, self.cells, self.sign = model, cells, sign
         self._kept: dict[int, FloatArray] = {}
         self.begin()

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.fast import AlignedFrame, FastTouch
 from eitskin.model.model import Model
@@ -77,8 +77,6 @@ from eitskin_reference.fast.tracks import (
     summed,
 )
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 _MEMORY = 32  # drives of which it is known whether they were explained
 _SATURATED, _STALE, _CROWDED = (
     1 << DIAGNOSTICS.index(name) for name in ("saturated", "stale reference", "crowded")

@@ -4,15 +4,12 @@ csrc/src/fast/rows.c."""
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
 from eitskin_reference.constants_table import FAST_SOFT_RADIUS
 from eitskin_reference.fast.tracks import summed
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

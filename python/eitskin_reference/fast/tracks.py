@@ -9,8 +9,8 @@ Navigation, Wiley 2001, ch. 10).
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin_reference.constants_table import (
     FAST_DRIVE_S,
     FAST_MODEL_ERROR,
@@ -18,8 +18,6 @@ from eitskin_reference.constants_table import (
     FAST_STRENGTH_NOISE,
 )
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 X, Y, C, VX, VY, SIZE = range(6)
 
 

@@ -9,8 +9,8 @@ from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.batch import Batch, check_threads
@@ -49,14 +49,12 @@ class BatchTimes:
         return asdict(self)
 
 
-def _batch(batch: Batch, frames: npt.NDArray[np.float64]) -> None:
+def _batch(batch: Batch, frames: FloatArray) -> None:
     for _ in batch.each(frames):
         pass
 
 
-def _c_alone(
-    blob: bytes, quiet: npt.NDArray[np.float64], parts: list[npt.NDArray[np.float64]]
-) -> Callable[[], None]:
+def _c_alone(blob: bytes, quiet: FloatArray, parts: list[FloatArray]) -> Callable[[], None]:
     """One C call a thread: what the machine can give."""
     calls = []
     for part in parts:

@@ -9,7 +9,6 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.model.storage import STORAGES, store
+from eitskin.progress import Progress, silent
 from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
@@ -35,8 +35,6 @@ from eitskin_studies.harness.emulated import (
     run_frames,
 )
 from eitskin_studies.harness.sections import Filling, Tabular, text_table
-
-Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 CLOCK_HZ = 216_000_000
 IMAGE = "eitskin_nucleo_f767zi"
@@ -134,7 +132,12 @@ class BoardCost:
 
 
 def run(
-    scenes: int, seed: int, *, frames: int = 8, build: Path | None = None, progress: Progress = iter
+    scenes: int,
+    seed: int,
+    *,
+    frames: int = 8,
+    build: Path | None = None,
+    progress: Progress = silent,
 ) -> BoardCost:
     """Build, run ``scenes`` random scenes in every storage, cold and warm, and ``frames`` frames on
     the emulated board (0: none).

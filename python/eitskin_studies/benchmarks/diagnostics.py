@@ -6,7 +6,7 @@ reference. Rules and thresholds were chosen under other seeds (docs/reference/di
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import FrameError
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.progress import Progress, silent
 from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
 from eitskin.scoring.score import scorer_for
@@ -38,8 +39,6 @@ from eitskin_studies.benchmarks.diagnostics_scenes import (
 )
 from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import copied
-
-Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 SNRS_DB, HEADLINE_DB, BETWEEN_DB = (40.0, 60.0, 80.0), 60.0, 50.0
 MAX_TOUCHES, SPACINGS = 12, (2.5, 4.0)  # radii
@@ -286,7 +285,7 @@ def _rate(fault: InjectedFault, snr_db: float, samples: Sequence[_Sample]) -> De
 
 
 def rates(
-    seed: int, scenes: int, eye: _Eye, table: CaseMaker, progress: Progress = iter
+    seed: int, scenes: int, eye: _Eye, table: CaseMaker, progress: Progress = silent
 ) -> tuple[DetectionRate, ...]:
     """Every fault at 40, 60 and 80 dB, and clean and detached frames at 50 dB."""
     samples: Samples = defaultdict(list)
@@ -302,7 +301,7 @@ def rates(
 
 
 def crowds(
-    seed: int, frames: int, eye: _Eye, table: CaseMaker, progress: Progress = iter
+    seed: int, frames: int, eye: _Eye, table: CaseMaker, progress: Progress = silent
 ) -> tuple[Crowd, ...]:
     """``frames`` scenes of 1 to 12 touches of radius 9 mm and contrast 5, half of them at least
     2.5, half 4 radii apart."""
@@ -334,7 +333,7 @@ def crowds(
 
 
 def imperfect(
-    seed: int, frames: int, eye: _Eye, table: CaseMaker, progress: Progress = iter
+    seed: int, frames: int, eye: _Eye, table: CaseMaker, progress: Progress = silent
 ) -> tuple[Imperfect, ...]:
     """``frames`` scenes behind each front end, the reference taken behind the same."""
     scenes, found = drawn(seed, frames), []
@@ -355,7 +354,7 @@ def imperfect(
 
 
 def run(
-    seed: int, scenes: int, crowd_frames: int, imperfect_frames: int, *, progress: Progress = iter
+    seed: int, scenes: int, crowd_frames: int, imperfect_frames: int, *, progress: Progress = silent
 ) -> Findings:
     """All three tables.
 

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.core.results import Info
 from eitskin.scene.streams import stream
 from eitskin_studies.benchmarks.diagnostics_scenes import PROTOCOL, ROLE, ROWS, SceneCase
@@ -84,7 +83,7 @@ def _shifted(by: int) -> Spoil:
     return lambda _, values: np.roll(values, by)
 
 
-def _outlier(size: float, rows: npt.NDArray[np.int64]) -> Spoil:
+def _outlier(size: float, rows: IntArray) -> Spoil:
     """One reading of ``rows`` off, up or down; the same row for each size."""
 
     def spoil(case: SceneCase, values: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ little.
 """
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import thread_time_ns
@@ -22,6 +22,7 @@ from eitskin.fileio import write_bytes
 from eitskin.model.build import BuildSettings, linearise, make_model
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.model.model import Model
+from eitskin.progress import Progress, silent
 from eitskin.scene.random_touches import TouchRules, random_touches
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import adjacent
@@ -30,8 +31,6 @@ from eitskin_studies.harness.bare_core import bare_calls
 from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, text_table
-
-Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 SNR_DB, SCENES, SEED, ELEMENTS = 60.0, 8, 5, 3000
 
@@ -166,7 +165,7 @@ def run(
     cache: Path | None = None,
     *,
     points: Sequence[GrowthPoint] = SWEEPS,
-    progress: Progress = iter,
+    progress: Progress = silent,
 ) -> GrowthTimes:
     """Time ``rounds`` rounds over all ``points``; models are kept in the folder ``cache`` (by
     default out/growth).

@@ -31,7 +31,7 @@ from eitskin.live.frame import Frame
 from eitskin.live.session import Session
 from eitskin.live.settings import SessionSettings
 from eitskin.sinks.outputs import Outputs
-from eitskin.sinks.sink import Source
+from eitskin.sinks.sink import TouchSource
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, Tabular
 
@@ -206,7 +206,7 @@ def _sink(name: str, scene: Path, seconds: float) -> FloatArray:
     with Session(f"sim:{scene}?speed=1&loop=1", SessionSettings(frames=frames)) as session:
         assert session.known is not None
         url = f"{name}://127.0.0.1:{ours.recv()}"
-        with Outputs([url], Source(session.url, "", session.known.model)) as outputs:
+        with Outputs([url], TouchSource(session.url, "", session.known.model)) as outputs:
             for frame in session.frames():
                 if isinstance(frame, Frame):
                     arrived.append(frame.arrived_ns)
@@ -231,7 +231,7 @@ def _load(place: Path, scene: Path, seconds: float) -> Load:
         )
         with Session(f"sim:{scene}?speed=1&loop=1", settings) as session:
             assert session.known is not None
-            source = Source(session.url, "", session.known.model)
+            source = TouchSource(session.url, "", session.known.model)
             with Outputs(urls, source) as outputs:
                 early, count, used, start = 0.0, 0, time.process_time(), time.perf_counter()
                 client = _reading(f"ws://127.0.0.1:{port}")

@@ -7,14 +7,15 @@ of its own, once, before timing. The dataset's scenes are drawn, solved, measure
 """
 
 import statistics
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from eitskin.fem.cem import factorise
+from eitskin.progress import Progress, silent
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
@@ -25,8 +26,6 @@ from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin_studies.datasets.dataset import Job, job_of, make_chunk
 from eitskin_studies.datasets.ranges import drawn
 from eitskin_studies.harness.machine import machine
-
-Progress: TypeAlias = Callable[[Sequence[Any]], Iterable[Any]]
 
 PROJECTED = 10_000
 DEFAULTS: dict[str, dict[str, Any]] = {
@@ -53,7 +52,7 @@ def moving_scene(frames: int = 100, elements: int = 3000) -> Scene:
 
 
 def effects_table(
-    frames: int = 100, rounds: int = 3, progress: Progress | None = None
+    frames: int = 100, rounds: int = 3, progress: Progress = silent
 ) -> dict[str, Any]:
     """The moving scene with no effect, with each alone, with all: plain values fit for JSON, times
     in s."""
@@ -62,7 +61,7 @@ def effects_table(
     cases = {"none": {}, **{name: {name: table} for name, table in every.items()}, "all": every}
     workspace, times, rows = MeshCache(), dict[str, list[float]](), {}
     work = [(name, k) for k in range(rounds + 1) for name in cases]
-    for name, k in work if progress is None else progress(work):
+    for name, k in progress(work):
         scene = replace(base, effects=cases[name])
         start = perf_counter()
         compiled = compile_scene(scene, mesh_cache=workspace)
@@ -114,7 +113,7 @@ def scenes_table(
     scenes: int = 500,
     elements: int = 3000,
     rounds: int = 3,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Frames per second of a moving touch, both ways, and the rate of static scenes of a dataset,
     in one process."""
@@ -163,14 +162,14 @@ def scenes_table(
 
 
 def _dataset(
-    scenes: int, elements: int, workspace: MeshCache, progress: Progress | None
+    scenes: int, elements: int, workspace: MeshCache, progress: Progress
 ) -> dict[str, Any]:
     job = job_of(replace(find_scene("random_touches"), elements=elements), scenes, 1)
     make_chunk(replace(job, count=1), 0, workspace)
     chunks, seconds, size = range(job.chunks), 0.0, 0
     parts: list[tuple[float, float]] = []
     time_parts = _timer_of_parts(job, workspace)
-    for chunk in chunks if progress is None else progress(chunks):
+    for chunk in progress(chunks):
         start = perf_counter()
         size += len(make_chunk(job, chunk, workspace))
         seconds += perf_counter() - start

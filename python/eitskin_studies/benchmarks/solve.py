@@ -7,7 +7,7 @@ stopping rule that is too careful.
 """
 
 import gc
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from time import perf_counter, thread_time
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.progress import Progress
 from eitskin_studies.benchmarks.solve_peers import (
     Candidate,
     candidates,
@@ -29,8 +30,6 @@ LEVELS = (1e-2, 1e-4, 1e-6)
 EQUAL_ITERATIONS = (30, 60, 200)
 MAX_S = 3.0
 """A solver that needs longer for one problem has not reached the level."""
-
-Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 
 @dataclass

@@ -6,7 +6,6 @@ training scenes, and the mean MIoU and the mean suboptimality are those of test 
 model.
 """
 
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -14,13 +13,12 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
+from eitskin.progress import Progress
 from eitskin.scene.simulate import Simulated
 from eitskin.scoring import metrics
 from eitskin_studies.benchmarks.solve_problems import bench_options, make_problems, models, sessions
 from eitskin_studies.compare.run import truth_masks
 from eitskin_studies.harness.thresholds import best_threshold, miou_curves
-
-Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 MIN = 1e-7
 """Below this float32 says no more; shown as this."""

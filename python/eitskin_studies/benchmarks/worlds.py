@@ -9,8 +9,9 @@ from eitskin.config import nearest
 from eitskin.core.results import Options
 from eitskin.errors import UsageError
 from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.progress import Progress, silent
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.worlds.score import CoreFinder, Progress, WorldScore, score_worlds
+from eitskin_studies.worlds.score import CoreFinder, WorldScore, score_worlds
 from eitskin_studies.worlds.simulate import WorldFactory
 from eitskin_studies.worlds.worlds import WORLDS
 
@@ -29,7 +30,7 @@ class Settings:
     cache: Path | None = None
 
 
-def run(settings: Settings, progress: Progress | None = None) -> list[WorldScore]:
+def run(settings: Settings, progress: Progress = silent) -> list[WorldScore]:
     """Score the sets by the C core in float32, with the model and the options given.
 
     Raises:

@@ -131,8 +131,8 @@ def add_worlds(what: Any) -> None:
 
 def run_worlds(options: argparse.Namespace) -> int:
     """Count touches in other worlds."""
+    from eitskin.cli.progress import named_bar
     from eitskin_studies.benchmarks import worlds as bench_worlds
-    from eitskin_studies.cli.cmd_compare import progress
     from eitskin_studies.worlds.score import as_text
 
     if options.list:
@@ -151,7 +151,7 @@ def run_worlds(options: argparse.Namespace) -> int:
             tuple(options.option or ()),
             options.cache,
         ),
-        progress,
+        named_bar,
     )
     text = as_text(scores)
     print(json.dumps([one.as_dict() for one in scores], indent=2) if options.json else text)

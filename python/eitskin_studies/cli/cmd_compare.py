@@ -2,13 +2,12 @@
 
 import argparse
 import json
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.progress import bar
+from eitskin.cli.progress import named_bar
 from eitskin.errors import FileError, UsageError
 
 
@@ -82,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         protocol,
         settings,
         families=partial(methods, threads=options.threads),
-        progress=progress,
+        progress=named_bar,
     )
     if options.csv is not None:
         write_bytes(options.csv, to_csv(comparison).encode("utf-8"))
@@ -114,8 +113,3 @@ def _check(options: argparse.Namespace) -> None:
 
         check_picture(options.picture)
         check_picture(options.curves)
-
-
-def progress(items: Iterable[Any], what: str) -> Iterable[Any]:
-    """A bar on stderr where that is a terminal; nothing otherwise."""
-    return bar(what)(items)

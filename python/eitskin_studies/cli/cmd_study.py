@@ -40,8 +40,8 @@ def run(options: argparse.Namespace) -> int:
         print("\n".join(f"{name:12} {text}" for name, text in EXPERIMENTS.items()))
         return 0
 
+    from eitskin.cli.progress import named_bar
     from eitskin.fileio import refuse_unwritable
-    from eitskin_studies.cli.cmd_compare import progress
     from eitskin_studies.experiments.write import to_json, to_text, write_all, write_page
 
     experiment = load(options.name)
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         from eitskin.view.pictures import load_matplotlib
 
         load_matplotlib()
-    outcome = experiment.run(workspace_in(folder, settings, progress))
+    outcome = experiment.run(workspace_in(folder, settings, named_bar))
     write_all(outcome, folder, not options.no_pictures)
     if options.page is not None:
         write_page(outcome, folder, options.page, options.name, settings)

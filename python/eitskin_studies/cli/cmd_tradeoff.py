@@ -49,9 +49,9 @@ def add_parser(subparsers: Any) -> None:
 
 def run_run(options: argparse.Namespace) -> int:
     """Measure, and write tables and pictures."""
+    from eitskin.cli.progress import named_bar
     from eitskin.fileio import refuse_unwritable, write_bytes
     from eitskin.tuning.front import Conditions
-    from eitskin_studies.cli.cmd_compare import progress
     from eitskin_studies.tradeoff.configuration_sets import load_set
     from eitskin_studies.tradeoff.default_set import default_set
     from eitskin_studies.tradeoff.fronts import as_dict, in_short, kept_cells, to_json
@@ -69,7 +69,7 @@ def run_run(options: argparse.Namespace) -> int:
         from eitskin.view.pictures import load_matplotlib
 
         load_matplotlib()
-    front = run(configurations, settings, options.output, progress)
+    front = run(configurations, settings, options.output, named_bar)
     write_bytes(options.output / "front.json", to_json(as_dict(front)).encode())
     recorded = kept_cells(front)
     if options.recorded is not None:

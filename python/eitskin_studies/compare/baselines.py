@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.errors import FrameError, UsageError
 
 
@@ -167,7 +167,7 @@ class ConjugateGradient:
         return np.asarray(image)
 
 
-def _ratio(a: FloatArray, b: FloatArray, where: npt.NDArray[np.bool_]) -> FloatArray:
+def _ratio(a: FloatArray, b: FloatArray, where: BoolArray) -> FloatArray:
     return np.divide(a, b, out=np.zeros_like(a), where=where & (b > 0))
 
 

@@ -7,9 +7,8 @@ middle lies.
 import importlib
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin_studies.benchmarks.jacobian import pyeit_case
 from eitskin_studies.compare.baselines import LinearMethod
@@ -39,7 +38,7 @@ def pyeit_method(setup: Setup) -> Family:
     return Family("lambda", LAMBDAS, make)
 
 
-def _triangle_of(mesh: Mesh, points_mm: FloatArray) -> npt.NDArray[np.int64]:
+def _triangle_of(mesh: Mesh, points_mm: FloatArray) -> IntArray:
     """The number of the triangle around each point (k, 2); the nearest where none is."""
     corners = mesh.nodes_mm[mesh.triangles]
     edges = corners[:, 1:] - corners[:, :1]

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import mesh_for_elements
+from eitskin.progress import Progress, silent
 from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
 from eitskin.scene.simulate import ELEMENTS, Measurement, Simulated, simulate
 from eitskin.scoring import metrics
@@ -35,8 +35,6 @@ from eitskin_studies.harness.thresholds import (
     match_all,
     miou_curves,
 )
-
-Progress = Callable[[Sequence[Any], str], Iterable[Any]]
 
 TOUCH_THRESHOLDS = THRESHOLDS[4::5]
 
@@ -160,13 +158,8 @@ class _Session:
 
     simulated: Simulated
     dv: FloatArray
-    truths: npt.NDArray[np.bool_]
+    truths: BoolArray
     centres_mm: tuple[FloatArray, ...]
-
-
-def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
-    """No progress shown."""
-    return items
 
 
 def compare(
@@ -175,7 +168,7 @@ def compare(
     settings: CompareSettings | None = None,
     *,
     families: Callable[[Setup], Sequence[Family]] = methods,
-    progress: Progress = plain,
+    progress: Progress = silent,
 ) -> Comparison:
     """Run the comparison; the same arguments give the same numbers.
 
@@ -234,7 +227,7 @@ def compare(
     )
 
 
-def truth_masks(touches: TouchSet, points_mm: FloatArray) -> npt.NDArray[np.bool_]:
+def truth_masks(touches: TouchSet, points_mm: FloatArray) -> BoolArray:
     """The touches of each scene on the raster's cells (p, 2): (k, p)."""
     return np.array([scene.mask(points_mm) for scene in touches.scenes])
 

@@ -11,22 +11,23 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import AnyArray
 from eitskin.config import load_toml
 from eitskin.errors import ConfigError, EitskinError, FileError, UsageError, missing_extra
 from eitskin.fileio import parse_json, write_bytes
 from eitskin.frames.arrays import read_npz
 from eitskin.frames.frames import Frames
+from eitskin.progress import Progress, silent
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import Scene
 from eitskin.scene.runner import simulate_frames
@@ -41,8 +42,6 @@ VERSION = 1
 DEFAULT_CHUNK = 100
 MAX_SCENES = 100_000_000
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-Progress: TypeAlias = Callable[[Iterable[int], int], Iterable[int]]
 
 
 @dataclass(frozen=True)
@@ -196,7 +195,7 @@ def write_dataset(
     *,
     jobs: int = 1,
     scheduler: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> dict[str, int]:
     """Make the chunks that ``folder`` does not have yet; returns how many were made and how many
     were there.
@@ -227,7 +226,7 @@ def write_dataset(
             yield len(job.numbers(chunk))
 
     scenes = sum(len(job.numbers(chunk)) for chunk in missing)
-    for _ in written() if progress is None else progress(written(), scenes):
+    for _ in progress(written(), scenes):
         pass
     return {
         "chunks_made": len(missing),
@@ -313,7 +312,7 @@ def _over_dask(job: Job, chunks: list[int], scheduler: str) -> Iterator[tuple[in
             yield futures[future], content
 
 
-def load_chunk(path: str | Path) -> dict[str, npt.NDArray[Any]]:
+def load_chunk(path: str | Path) -> dict[str, AnyArray]:
     """The arrays of one chunk.
 
     Raises:
@@ -327,7 +326,7 @@ def load_chunk(path: str | Path) -> dict[str, npt.NDArray[Any]]:
     return arrays
 
 
-def frames_of(chunk: dict[str, npt.NDArray[Any]], number: int) -> Frames:
+def frames_of(chunk: dict[str, AnyArray], number: int) -> Frames:
     """Scene ``number`` (from 0, in the chunk) as frames with truth, to be reconstructed like any
     others.
 

@@ -3,22 +3,23 @@ as it comes."""
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin import __version__
+from eitskin.arrays import AnyArray
 from eitskin.core.engine import load_core
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import write_beside
+from eitskin.progress import Progress
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
-from eitskin_studies.harness.sessions import Progress, SceneSolver
+from eitskin_studies.harness.sessions import SceneSolver
 from eitskin_studies.harness.store import Store, key_of
 
 SIMULATED_ELEMENTS = 11_000
@@ -113,8 +114,8 @@ class Workspace:
         return self.store.put(whole, make()) if found is None else found
 
     def kept_arrays(
-        self, facts: Mapping[str, Any], make: Callable[[], Mapping[str, npt.NDArray[Any]]]
-    ) -> dict[str, npt.NDArray[Any]]:
+        self, facts: Mapping[str, Any], make: Callable[[], Mapping[str, AnyArray]]
+    ) -> dict[str, AnyArray]:
         """The same for named arrays, in a file of their own below the folder."""
         path = (
             self.folder
@@ -161,8 +162,3 @@ def workspace_in(folder: Path, settings: ExperimentSettings, progress: Progress)
             f"{folder}: cannot make this folder ({error.strerror}); name another with -o"
         ) from None
     return Workspace(settings, folder, progress, Store(folder / "results.jsonl"))
-
-
-def plain(items: Iterable[Any], what: str) -> Iterable[Any]:
-    """No progress shown."""
-    return items

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.model.model import Model
+from eitskin.progress import Progress
 from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.solve.batch import reconstruct_many
-from eitskin_studies.harness.sessions import FrameSession, Progress, SceneSolver
+from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 from eitskin_studies.harness.summary import Summary
 from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 
@@ -57,14 +58,14 @@ class Evaluator:
     image_scorer: metrics.ImageScorer
     gate_mm: float = GATE_MM
 
-    def truths(self, scenes: Sequence[TouchScene]) -> npt.NDArray[np.bool_]:
+    def truths(self, scenes: Sequence[TouchScene]) -> BoolArray:
         """The true discs on the scorer's cells, (k, p)."""
         points = self.image_scorer.raster.points_mm
         return np.array(
             [metrics.disc_mask(points, scene.centres_mm(), scene.radii_mm()) for scene in scenes]
         )
 
-    def discs(self, one: Reconstruction) -> npt.NDArray[np.bool_]:
+    def discs(self, one: Reconstruction) -> BoolArray:
         """The touches found, as discs on the scorer's cells, (p,)."""
         places = np.array([(touch.x_mm, touch.y_mm) for touch in one.touches]).reshape(-1, 2)
         return metrics.disc_mask(

@@ -1,7 +1,6 @@
 """``eitskin bench gestures``: gestures of simulated fingers, told by the C core and judged."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 
 from eitskin.core.gestures import Gestures
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.progress import Progress, silent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.gestures.drawn import EACH, KINDS, NONE, draw_session
@@ -49,9 +49,7 @@ class GestureBench:
         }
 
 
-def run(
-    settings: Settings, progress: Callable[[Sequence[Any]], Iterable[Any]] = lambda items: items
-) -> GestureBench:
+def run(settings: Settings, progress: Progress = silent) -> GestureBench:
     """Draw, simulate, reconstruct and judge ``settings.sessions`` sessions.
 
     Raises:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray
 from eitskin.core.engine import CoreEngine
 
 
@@ -31,7 +32,7 @@ def bare_solve(engine: CoreEngine, y: npt.NDArray[np.floating[Any]]) -> Callable
     return lambda: lib.eits_solve(context, pointer)
 
 
-def bare_solves(engine: CoreEngine, many: npt.NDArray[np.floating[Any]]) -> npt.NDArray[Any]:
+def bare_solves(engine: CoreEngine, many: npt.NDArray[np.floating[Any]]) -> AnyArray:
     """``bare_solve`` of each of ``many`` (k, r), one after another: their x (k, n)."""
     x = np.empty((len(many), engine.n_pixels), dtype=engine.dtype)
     solve, context = engine._lib.eits_solve, engine._context

@@ -11,10 +11,8 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy.typing as npt
-
+from eitskin.arrays import AnyArray
 from eitskin.core.diagnostics_table import STOPS
 from eitskin.core.results import Options
 from eitskin.errors import UsageError
@@ -182,8 +180,8 @@ def run_frames(
     program: Path,
     folder: Path,
     blob: bytes,
-    quiet_v: npt.NDArray[Any],
-    frames_v: npt.NDArray[Any],
+    quiet_v: AnyArray,
+    frames_v: AnyArray,
     options: Options,
     *,
     portable: bool = False,

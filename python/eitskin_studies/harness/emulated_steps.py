@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import AnyArray, BoolArray
 from eitskin.core.options_table import CHOICES
 from eitskin.core.results import Options
 
@@ -31,7 +30,7 @@ class Mask:
     """Leave the protocol rows where ``rows`` (m,) is true out of every frame, and use the
     others."""
 
-    rows: npt.NDArray[np.bool_]
+    rows: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,21 +38,21 @@ class TareStep:
     """Take the reference from quiet frames (k, m), volts, until one is refused; fewer than four:
     each again."""
 
-    quiet_v: npt.NDArray[Any]
+    quiet_v: AnyArray
 
 
 @dataclass(frozen=True, eq=False)
 class Play:
     """Reconstruct frames (k, m), volts."""
 
-    frames_v: npt.NDArray[Any]
+    frames_v: AnyArray
 
 
 @dataclass(frozen=True, eq=False)
 class Solve:
     """The solver alone on reduced data (k, r)."""
 
-    data: npt.NDArray[Any]
+    data: AnyArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +60,7 @@ class Drives:
     """Play scans (k, m), volts, through the fast path, each drive ``step`` after the last; the
     solver sees what that trusts."""
 
-    scans_v: npt.NDArray[Any]
+    scans_v: AnyArray
     step: int
 
 
@@ -97,7 +96,7 @@ def write_steps(folder: Path, steps: Sequence[Step], *, portable: bool = False) 
     (folder / "frames.f32").write_bytes(b"".join(numbers))
 
 
-def _numbers_of(step: TareStep | Play | Solve | Drives) -> tuple[str, npt.NDArray[Any]]:
+def _numbers_of(step: TareStep | Play | Solve | Drives) -> tuple[str, AnyArray]:
     if isinstance(step, TareStep):
         return "quiet", step.quiet_v
     if isinstance(step, Drives):

@@ -8,7 +8,6 @@ Contacts, noise and drift depend on the seed and the role of the touches only, a
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -20,6 +19,7 @@ from eitskin.arrays import BoolArray, FloatArray
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
 from eitskin.fileio import write_beside
+from eitskin.progress import Progress
 from eitskin.scene.random_touches import TouchSet, TrueTouch
 from eitskin.scene.simulate import Measurement, conductivity_with, measure
 from eitskin.scene.streams import stream
@@ -28,8 +28,6 @@ from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import BASE_SAMPLES
 from eitskin_studies.harness.snr import FINE_BITS, FINE_CONVERTER_DB, noise_deviation_v
-
-Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
 
 @dataclass(frozen=True)

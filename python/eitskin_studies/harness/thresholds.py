@@ -89,7 +89,7 @@ def match_all(
 def best_touch_threshold(
     images: FloatArray,
     truths_mm: Sequence[FloatArray],
-    index: npt.NDArray[np.int64],
+    index: IntArray,
     centres_mm: FloatArray,
     thresholds: Sequence[float],
     sign: int = 1,

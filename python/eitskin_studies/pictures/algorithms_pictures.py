@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import BoolArray
 from eitskin.fem.grid import Grid
 from eitskin.scoring import metrics
 from eitskin.skin.skin import Skin
@@ -220,9 +220,7 @@ def _panels(matplotlib: Any, rows: int, columns: int) -> tuple[Any, Any]:
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def _show_cells(
-    axes: "Axes", raster: metrics.Raster, truth: npt.NDArray[np.bool_], mask: npt.NDArray[np.bool_]
-) -> None:
+def _show_cells(axes: "Axes", raster: metrics.Raster, truth: BoolArray, mask: BoolArray) -> None:
     """Hits, false and missed cells in their colours, the truth's edge drawn in."""
     from matplotlib.colors import ListedColormap
 

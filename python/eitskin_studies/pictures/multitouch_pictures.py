@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
 from eitskin.view.panels import draw_panels, save_picture
@@ -172,7 +171,7 @@ def draw_ambiguity(path: str | Path, ambiguities: Ambiguities) -> None:
         save_picture(figure, path)
 
 
-def _groupings(frames: Sequence[ScoredFrame]) -> list[tuple[str, list[str], npt.NDArray[np.int64]]]:
+def _groupings(frames: Sequence[ScoredFrame]) -> list[tuple[str, list[str], IntArray]]:
     found = np.array([f.found for f in frames])
     near = np.digitize([f.nearest for f in frames], NEAREST_EDGES[1:])
     snr = np.array([SNRS_DB.index(f.snr_db) for f in frames])
@@ -187,8 +186,8 @@ def _groupings(frames: Sequence[ScoredFrame]) -> list[tuple[str, list[str], npt.
 def _bars(
     axes: Axes,
     frames: Sequence[ScoredFrame],
-    said: npt.NDArray[np.bool_],
-    group: npt.NDArray[np.int64],
+    said: BoolArray,
+    group: IntArray,
     ticks: Sequence[str],
 ) -> None:
     right = np.array([f.right for f in frames], dtype=np.bool_)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
@@ -137,7 +137,7 @@ def _error(values: npt.ArrayLike) -> dict[str, float | None]:
     return {"median": round(float(median), DIGITS), "p95": round(float(p95), DIGITS)}
 
 
-def _discs(built: Built, result: Reconstruction) -> npt.NDArray[np.bool_]:
+def _discs(built: Built, result: Reconstruction) -> BoolArray:
     places = np.array([(t.x_mm, t.y_mm) for t in result.touches]).reshape(-1, 2)
     return metrics.disc_mask(
         built.image_scorer.raster.points_mm, places, np.array([t.radius_mm for t in result.touches])

@@ -17,13 +17,13 @@ from eitskin.model.build import Linearisation, make_model, with_model_errors
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
 from eitskin.model.model_errors import ModelErrors
+from eitskin.progress import Progress
 from eitskin.scoring import metrics
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.tuning.configuration import ELEMENTS, Configuration, build_settings
-from eitskin_studies.harness.sessions import Progress
 
 
 @dataclass(frozen=True, eq=False)

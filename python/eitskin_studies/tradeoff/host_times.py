@@ -6,12 +6,13 @@ from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
+from eitskin.progress import Progress
 from eitskin.tuning.configuration import Configuration
 from eitskin_studies.harness.bare_core import bare_calls
-from eitskin_studies.harness.sessions import MeasuredFrames, Progress
+from eitskin_studies.harness.sessions import MeasuredFrames
 from eitskin_studies.tradeoff.engines import Built
 
 SCENES = 8
@@ -49,7 +50,7 @@ def host_times(
     return [_row(np.array(times)) for times in samples], engines[0].kernels
 
 
-def _row(times: npt.NDArray[np.float64]) -> dict[str, Any]:
+def _row(times: FloatArray) -> dict[str, Any]:
     """Of ``times`` (scenes, rounds) in us."""
     return {
         "p50": round(float(np.median(times)), 1),

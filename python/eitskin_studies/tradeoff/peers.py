@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.arrays import FloatArray
+from eitskin.progress import Progress
 from eitskin.scene.simulate import Measurement
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
@@ -19,7 +20,6 @@ from eitskin_studies.compare.families import Family, Method, Setup, setup_for
 from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.compare.pyeit_method import pyeit_method
 from eitskin_studies.compare.run import CompareSettings, compare
-from eitskin_studies.harness.sessions import Progress
 
 
 def peer_families(setup: Setup) -> Sequence[Family]:

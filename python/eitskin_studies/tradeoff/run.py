@@ -14,13 +14,14 @@ import numpy as np
 from eitskin import __version__
 from eitskin.core.engine import load_core
 from eitskin.errors import ConfigError, FileError, UsageError
+from eitskin.progress import Progress
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
 from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY
 from eitskin.tuning.configuration import ELEMENTS, Configuration
 from eitskin.tuning.front import Front, Point
 from eitskin_studies.harness.machine import machine
-from eitskin_studies.harness.sessions import FrameSession, Progress
+from eitskin_studies.harness.sessions import FrameSession
 from eitskin_studies.harness.store import Store
 from eitskin_studies.tradeoff.accuracy import SolvedSet, TrainedPoint, score, solve_session, train
 from eitskin_studies.tradeoff.costs import static_costs

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from eitskin.errors import GeometryError, UsageError
+from eitskin.progress import Progress
 from eitskin.scene.random_touches import (
     TouchRules,
     TouchScene,
@@ -26,7 +27,7 @@ from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin_studies.harness.discs import spaced_touches
-from eitskin_studies.harness.sessions import Drift, FrameSession, Progress, SceneSolver
+from eitskin_studies.harness.sessions import Drift, FrameSession, SceneSolver
 
 TRAIN, HEADLINE = "train", "random"
 HEADLINE_DB = 60.0

@@ -6,7 +6,7 @@ Without touches a scene is exact where none is reported.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -15,12 +15,12 @@ import numpy as np
 from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FrameError
+from eitskin.progress import Progress, silent
 from eitskin.scoring.matching import match
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.multitouch.counts import Share, share
 from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
 
-Progress = Callable[[Sequence[Any], str], Iterable[Any]]
 DIGITS = 4
 
 
@@ -155,7 +155,7 @@ def score_worlds(
     *,
     family: str = "tuning",
     snr_db: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> list[WorldScore]:
     """Every set of ``names``, ``count`` scenes each.
 

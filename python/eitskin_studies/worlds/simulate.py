@@ -7,11 +7,10 @@ the family, the set and the part: "tuning" and "judging" share nothing under any
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,9 +18,10 @@ from eitskin.arrays import FloatArray
 from eitskin.config import nearest
 from eitskin.errors import GeometryError, UsageError
 from eitskin.fem.cem import ForwardModel
-from eitskin.fem.deform import Deformation
+from eitskin.fem.deform import MeshDeformation
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.fileio import write_beside
+from eitskin.progress import Progress, silent
 from eitskin.scene.cover import Cover
 from eitskin.scene.random_field import random_field
 from eitskin.scene.random_touches import TouchScene, TrueTouch, rim_distance_mm
@@ -34,7 +34,6 @@ from eitskin_studies.harness.sessions import converter_for
 from eitskin_studies.worlds.worlds import WORLDS, Errors, TouchKinds, World
 
 Generators = Callable[[str], np.random.Generator]
-Progress = Callable[[Sequence[Any], str], Iterable[Any]]
 
 FAMILIES = ("tuning", "judging")
 ELEMENTS = 11_000
@@ -77,8 +76,8 @@ class WorldFactory:
         return ForwardModel(self.mesh, self.skin, self.protocol)
 
     @cached_property
-    def _deformation(self) -> Deformation:
-        return Deformation(self.mesh)
+    def _deformation(self) -> MeshDeformation:
+        return MeshDeformation(self.mesh)
 
     @cached_property
     def _radius_mm(self) -> float:
@@ -92,7 +91,7 @@ class WorldFactory:
         snr_db: float | None = None,
         *,
         family: str = "tuning",
-        progress: Progress | None = None,
+        progress: Progress = silent,
     ) -> WorldScenes:
         """``count`` scenes of the set ``name``; ``snr_db`` replaces the set's own where it has
         noise.
@@ -124,7 +123,7 @@ class WorldFactory:
         errors: Errors,
         drawn: list[tuple[TrueTouch, ...]],
         seed: int,
-        progress: Progress | None,
+        progress: Progress,
     ) -> FloatArray:
         """(k, 2, m): untouched, touched; exact. What is kept holds for these very touches and
         errors."""
@@ -150,17 +149,13 @@ class WorldFactory:
         errors: Errors,
         drawn: list[tuple[TrueTouch, ...]],
         seed: int,
-        progress: Progress | None,
+        progress: Progress,
     ) -> FloatArray:
         def draws(k: int) -> Generators:
             return lambda part: stream(seed, f"{role} {part}", k)
 
-        indices = range(len(drawn))
         return np.array(
-            [
-                self._solve(errors, drawn[k], draws(k))
-                for k in (indices if progress is None else progress(indices, role))
-            ]
+            [self._solve(errors, drawn[k], draws(k)) for k in progress(range(len(drawn)), role)]
         )
 
     def _solve(

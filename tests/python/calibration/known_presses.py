@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.calibration.presses import Presses
+from eitskin.calibration.presses import WeighedPresses
 
 RADIUS_MM = 97.0
 LOADS_N = np.array([0.5, 0.8, 1.0, 1.5, 2.0])
@@ -26,9 +26,13 @@ def gain_of(place_mm: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.asarray(1 + 0.1 * u - 0.05 * v + 0.3 * (u**2 + v**2))
 
 
-def presses(count: int = 24, noise: float = 0.01, bent: bool = True, seed: int = 3) -> Presses:
+def presses(
+    count: int = 24, noise: float = 0.01, bent: bool = True, seed: int = 3
+) -> WeighedPresses:
     """Every load at each of ``count`` places, with ``noise`` of the strength."""
     place = np.repeat(places(count), len(LOADS_N), axis=0)
     load = np.tile(LOADS_N, count)
     scatter = np.exp(noise * np.random.default_rng(seed).standard_normal(len(load)))
-    return Presses(load, saturating(load) * scatter / (gain_of(place) if bent else 1.0), place)
+    return WeighedPresses(
+        load, saturating(load) * scatter / (gain_of(place) if bent else 1.0), place
+    )

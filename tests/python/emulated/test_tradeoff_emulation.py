@@ -1,10 +1,9 @@
 """Instructions of a configuration, counted: what is not in a model's defaults reaches the emulated
 core too."""
 
-from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
+from eitskin.progress import silent
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.tuning.configuration import Configuration
@@ -14,13 +13,9 @@ from eitskin_studies.tradeoff.engines import ModelShop
 from eitskin_studies.tradeoff.scene_sets import SceneFactory
 
 
-def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
-    return items
-
-
 def test_counts_are_exact_and_follow_every_setting(cortex_m7):
     emulator = Emulator(cortex_m7 / "tests" / "emulated" / "frames_m7.elf")
-    session = SceneFactory(paper_skin(), adjacent(16), 5, 1200).session("random", 6, plain)
+    session = SceneFactory(paper_skin(), adjacent(16), 5, 1200).session("random", 6, silent)
     shop = ModelShop(paper_skin(), adjacent(16))
     base = Configuration("base", rank=32, pixels=16, iterations=20)
     counted = {}

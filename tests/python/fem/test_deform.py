@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eitskin.fem.deform import Deformation
+from eitskin.fem.deform import MeshDeformation
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.fem.shaped_touch import PROFILES, ShapedTouch, TouchCover
 from eitskin.skin.electrodes import Electrodes
@@ -25,7 +25,7 @@ def ends_mm(mesh: Mesh, electrode: int) -> np.ndarray:
 
 def test_nothing_moves_by_nothing():
     mesh = mesh_of(ELL)
-    d = Deformation(mesh)
+    d = MeshDeformation(mesh)
     assert d.rim.length_mm == pytest.approx(ELL.perimeter_mm)
     still = d.moved(np.zeros(8), np.ones(8), np.zeros(len(d.rim.nodes)))
     assert still.nodes_mm == pytest.approx(mesh.nodes_mm, abs=1e-9)
@@ -33,7 +33,7 @@ def test_nothing_moves_by_nothing():
 
 def test_electrodes_of_a_disk_turn_along_the_rim():
     mesh = mesh_of(disk(100.0))
-    d = Deformation(mesh)
+    d = MeshDeformation(mesh)
     shift, widths = np.linspace(-1, 1, 8), np.linspace(0.8, 1.2, 8)
     moved = d.moved(shift, widths, np.zeros(len(d.rim.nodes)))
     for k in range(8):
@@ -47,7 +47,7 @@ def test_electrodes_of_a_disk_turn_along_the_rim():
 def test_a_disk_grows_with_its_rim():
     """The movement inside is linear where the rim's is."""
     mesh = mesh_of(disk(100.0))
-    d = Deformation(mesh)
+    d = MeshDeformation(mesh)
     moved = d.moved(np.zeros(8), np.ones(8), np.full(len(d.rim.nodes), 1.0))
     assert moved.nodes_mm == pytest.approx(1.02 * mesh.nodes_mm, abs=0.05)
 
@@ -55,7 +55,7 @@ def test_a_disk_grows_with_its_rim():
 @pytest.mark.parametrize("outline", [ELL, COMB], ids=["ell", "comb"])
 def test_corners_and_fingers_stay_whole(outline):
     mesh = mesh_of(outline, 16)
-    d, draw = Deformation(mesh), np.random.default_rng(3)
+    d, draw = MeshDeformation(mesh), np.random.default_rng(3)
     for _ in range(5):
         waves = np.cos(2 * np.pi * 3 * d.rim.arc_mm / d.rim.length_mm + draw.uniform(0, 6))
         moved = d.moved(0.5 * draw.standard_normal(16), np.ones(16), 0.9 * waves)
@@ -66,7 +66,7 @@ def test_corners_and_fingers_stay_whole(outline):
 
 def test_electrodes_never_meet():
     mesh = mesh_of(disk(100.0))
-    d = Deformation(mesh)
+    d = MeshDeformation(mesh)
     shift = np.where(np.arange(8) % 2, 60.0, -60.0)
     moved = d.moved(shift, np.ones(8), np.zeros(len(d.rim.nodes)))
     angles = np.concatenate([np.angle(ends_mm(moved, k) @ [1, 1j]) for k in range(8)])

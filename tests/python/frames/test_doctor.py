@@ -25,7 +25,7 @@ from injected import (
     wired,
 )
 
-from eitskin.frames.doctor import Finding, Report, examine, subject_from_frames
+from eitskin.frames.doctor import DoctorReport, Finding, examine, subject_from_frames
 from eitskin.frames.doctor.remedy import combined_remedy
 from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import homogeneous, shorted
@@ -50,11 +50,11 @@ def skin_for(protocol: Protocol) -> Skin:
     return replace(PAPER, electrodes=replace(PAPER.electrodes, count=protocol.n_electrodes))
 
 
-def report_of(frames: Frames, skin: Skin | None = PAPER) -> Report:
+def report_of(frames: Frames, skin: Skin | None = PAPER) -> DoctorReport:
     return examine(subject_from_frames(frames, skin))
 
 
-def named(report: Report) -> list[tuple[str, str]]:
+def named(report: DoctorReport) -> list[tuple[str, str]]:
     return [(finding.name, finding.severity) for finding in report.findings]
 
 

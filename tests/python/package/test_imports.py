@@ -13,7 +13,7 @@ CHECKOUT = ("eitskin_emulator", "eitskin_reference", "eitskin_studies")  # not i
 
 # Each imports from its own line and those above it alone.
 ORDER = (
-    {"errors", "arrays"},
+    {"errors", "arrays", "progress"},
     {"fileio"},
     {"config"},
     {"core", "skin", "firmware"},

@@ -12,7 +12,7 @@ from eitskin.device.wire.link_table import Stream
 from eitskin.live.frame import Frame, Report
 from eitskin.live.session import Session
 from eitskin.live.settings import SessionSettings
-from eitskin.sinks.sink import Source
+from eitskin.sinks.sink import TouchSource
 
 os.environ.setdefault("LSLAPICFG", str(Path(__file__).with_name("lsl_local.cfg")))
 
@@ -25,7 +25,7 @@ class Swipe:
     """What was seen, and on which skin."""
 
     items: list[Frame | Report]
-    source: Source
+    source: TouchSource
 
     @property
     def frames(self) -> list[Frame]:
@@ -56,7 +56,7 @@ def swipe() -> Swipe:
     with Session("sim:swipe", settings) as session:
         items = list(seen(session, 40))
         assert session.known is not None
-        return Swipe(items, Source(session.url, "simulated", session.known.model))
+        return Swipe(items, TouchSource(session.url, "simulated", session.known.model))
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from eitskin.errors import EitskinError
 from eitskin.sinks import outputs as module
 from eitskin.sinks.mqtt import open_sink as open_mqtt
 from eitskin.sinks.outputs import DRIVES, Outputs
-from eitskin.sinks.sink import Dropped, Source, Told
+from eitskin.sinks.sink import Dropped, Told, TouchSource
 
 ROOM = 8
 
@@ -180,7 +180,7 @@ def test_passwords_are_not_shown(swipe, made):
 
 def test_tuio_needs_the_skin(swipe):
     with pytest.raises(EitskinError, match="bounding box"):
-        Outputs(["tuio://127.0.0.1"], Source("serial:x"))
+        Outputs(["tuio://127.0.0.1"], TouchSource("serial:x"))
 
 
 @pytest.mark.parametrize("name", ["osc", "tuio", "ws", "mqtt", "lsl", "mcap", "foxglove"])

@@ -402,8 +402,9 @@ import os, signal, sys, time
 from eitskin.cli import live_output
 from eitskin.live.session import Session
 from eitskin.sinks.outputs import Outputs
-from eitskin.sinks.sink import Source
-with Session("sim:swipe") as session, Outputs(sys.argv[1:], Source("x"), patient=True) as outputs:
+from eitskin.sinks.sink import TouchSource
+source = TouchSource("x")
+with Session("sim:swipe") as session, Outputs(sys.argv[1:], source, patient=True) as outputs:
     items = [outputs.put(item) for item in session.frames()]
     until = time.monotonic() + 20
     while min(one["sent"] for one in outputs.counts) < len(items) and time.monotonic() < until:

@@ -8,11 +8,11 @@ import pytest
 
 from eitskin.config import load_toml
 from eitskin.fem.cem import ForwardModel
+from eitskin.progress import silent
 from eitskin_studies.experiments.experiment import (
     ExperimentOutcome,
     ExperimentSettings,
     Workspace,
-    plain,
     workspace_in,
 )
 from eitskin_studies.experiments.write import to_json, write_page
@@ -24,7 +24,7 @@ PAGES = Path(__file__).resolve().parents[3] / "docs" / "results"
 
 
 def workspace(folder: Path, share: float = 1.0, **settings: object) -> Workspace:
-    return workspace_in(folder, ExperimentSettings(share=share, **settings), plain)
+    return workspace_in(folder, ExperimentSettings(share=share, **settings), silent)
 
 
 def coarse(folder: Path, share: float, elements: int = 2500, seed: int = 1) -> Workspace:

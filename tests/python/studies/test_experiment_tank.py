@@ -11,11 +11,12 @@ from study_pages import fills_its_page, goes_on, workspace
 from eitskin.cli.main import main
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
+from eitskin.progress import silent
 from eitskin.scene.random_touches import random_touches
 from eitskin.scoring import metrics
 from eitskin.skin.skin import load_skin
 from eitskin_studies.experiments import tank as study
-from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace, plain, workspace_in
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace, workspace_in
 from eitskin_studies.experiments.tank.discs import VARIANTS
 from eitskin_studies.experiments.tank.imagers import (
     DISCS,
@@ -184,7 +185,7 @@ def test_atoms_show_large_objects_better_than_pixels(outcome):
 def test_a_run_that_goes_on_computes_nothing_again(outcome, monkeypatch):
     shop, first = outcome
     with_few_values(monkeypatch)
-    again = workspace_in(shop.folder, shop.settings, plain)
+    again = workspace_in(shop.folder, shop.settings, silent)
     goes_on(lambda: study.run(again), first, solves=True)
 
 

@@ -2,7 +2,6 @@
 what they are said to be."""
 
 import json
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 from eitskin.errors import EitskinError, UsageError
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.model.build import with_model_errors
+from eitskin.progress import silent
 from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
@@ -37,17 +37,13 @@ PAIR = (
 )
 
 
-def plain(items: Iterable[Any], what: str) -> Iterable[Any]:
-    return items
-
-
 def test_models_get_the_errors_that_each_alone_would_get():
     shop = ModelShop(SKIN, adjacent(16))
     uncertainty = replace(DEFAULT_UNCERTAINTY, samples=2)
     alone = [
         with_model_errors(shop.build(one).model, SKIN, uncertainty).model_errors for one in PAIR[:2]
     ]
-    shop.draw_errors(PAIR[:2], 2, plain)
+    shop.draw_errors(PAIR[:2], 2, silent)
     for one, expected in zip(PAIR, alone, strict=False):
         found = shop.build(one).model.model_errors
         for name in ("error", "drift"):
@@ -71,7 +67,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def front(folder) -> Front:
-    return run(PAIR, TINY, folder, plain)
+    return run(PAIR, TINY, folder, silent)
 
 
 def test_every_configuration_is_measured_on_every_set(front):
@@ -109,7 +105,7 @@ def test_tables_hold_a_row_a_cell(front):
 
 def test_a_second_run_measures_nothing(front, folder):
     before = (folder / RESULTS).read_bytes()
-    again = run(PAIR, TINY, folder, plain)
+    again = run(PAIR, TINY, folder, silent)
     assert to_json(as_dict(again)) == to_json(as_dict(front))
     assert (folder / RESULTS).read_bytes() == before
 
@@ -119,7 +115,7 @@ def test_a_run_that_was_cut_goes_on_to_the_same_table(front, folder, tmp_path, c
     """Cut anywhere, also within a line."""
     whole = (folder / RESULTS).read_bytes()
     (tmp_path / RESULTS).write_bytes(whole[: int(cut * len(whole))])
-    assert comparable(run(PAIR, TINY, tmp_path, plain)) == comparable(front)
+    assert comparable(run(PAIR, TINY, tmp_path, silent)) == comparable(front)
     kept = {json.loads(line)["key"] for line in whole.splitlines()}
     good, torn = [], 0
     for line in (tmp_path / RESULTS).read_bytes().splitlines():
@@ -131,7 +127,7 @@ def test_a_run_that_was_cut_goes_on_to_the_same_table(front, folder, tmp_path, c
 
 
 def session(name: str) -> FrameSession:
-    return SceneFactory(SKIN, adjacent(16), 5, ELEMENTS).session(name, 3, plain)
+    return SceneFactory(SKIN, adjacent(16), 5, ELEMENTS).session(name, 3, silent)
 
 
 def test_random_scenes_are_those_of_compare():
@@ -214,5 +210,5 @@ def test_bad_settings_are_refused(changes, said):
 
 def test_a_rank_that_cannot_be_is_refused_before_the_work(tmp_path):
     with pytest.raises(EitskinError, match="'big': rank = 105 is out of range; use 1 to 104"):
-        run([Configuration("big", rank=105)], TINY, tmp_path / "none", plain)
+        run([Configuration("big", rank=105)], TINY, tmp_path / "none", silent)
     assert not (tmp_path / "none").exists()

@@ -16,7 +16,7 @@ from eitskin.skin.outline import disk
 from eitskin.skin.protocol import adjacent, opposite
 from eitskin.skin.skin import Skin
 from eitskin.teaching.guide import GuideEvent, PressGuide, Step, guide_presses
-from eitskin.teaching.plan import Plan, load_plan, plan_places, save_plan
+from eitskin.teaching.plan import PressPlan, load_plan, plan_places, save_plan
 from eitskin.teaching.press_file import PressFile
 from eitskin.teaching.presses import load_presses
 from small_models import EIGHT_OPPOSITE_TOML
@@ -24,9 +24,9 @@ from small_models import EIGHT_OPPOSITE_TOML
 ROWS = opposite(8)
 
 
-def plan_of(count: int) -> Plan:
+def plan_of(count: int) -> PressPlan:
     place = np.column_stack([np.arange(count) * 10.0, np.zeros(count)])
-    return Plan(place, np.full(count, np.nan), np.full(count, np.nan))
+    return PressPlan(place, np.full(count, np.nan), np.full(count, np.nan))
 
 
 class Finger:

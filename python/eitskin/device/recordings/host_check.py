@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import AnyArray
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.gestures import Gestures, event_numbers
 from eitskin.core.results import Info, Options, Reconstruction
@@ -219,7 +220,7 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
         return twin.follow(follow(device, recorded_kinds(path))), options is not None
 
 
-def same_bits(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> bool:
+def same_bits(one: AnyArray, other: npt.NDArray[np.float32]) -> bool:
     """Whether two images are the same float32 numbers, bit for bit."""
     return one.astype("<f4").tobytes() == other.astype("<f4").tobytes()
 
@@ -247,7 +248,7 @@ def _numbers(touch: Touch) -> bytes:
     return np.array(astuple(touch)[1:], dtype="<f4").tobytes()
 
 
-def _difference(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> float:
+def _difference(one: AnyArray, other: npt.NDArray[np.float32]) -> float:
     if one.shape != other.shape:
         return 1.0
     peak = float(np.abs(other).max()) or 1.0

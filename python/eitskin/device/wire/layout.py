@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import ClassVar, get_type_hints
 
 
-class Layout:
+class PayloadLayout:
     """The struct of C that it is, and its fields in order, each as (name, letters of ``struct``,
     form in Python)."""
 
@@ -37,7 +37,7 @@ class Payload:
     """A payload whose fields lie on the wire as their types say, ``Annotated`` with letters of
     ``struct`` and form; ``c``: the struct of C that it is."""
 
-    LAYOUT: ClassVar[Layout]
+    LAYOUT: ClassVar[PayloadLayout]
     BEFORE: ClassVar[list[tuple[str, str, str]]] = []
 
     def __init_subclass__(cls, c: str = "") -> None:
@@ -45,7 +45,7 @@ class Payload:
             hints = get_type_hints(cls, include_extras=True)
             own = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
             fields = [(name, at[0], at[1]) for name, at in own.items() if at]
-            cls.LAYOUT = Layout(c, [*cls.BEFORE, *fields])
+            cls.LAYOUT = PayloadLayout(c, [*cls.BEFORE, *fields])
 
 
 class Command(Payload):

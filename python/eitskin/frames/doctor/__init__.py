@@ -2,7 +2,14 @@
 check."""
 
 from eitskin.frames.doctor.examine import examine
-from eitskin.frames.doctor.report import Finding, Report
+from eitskin.frames.doctor.report import DoctorReport, Finding
 from eitskin.frames.doctor.subject import Subject, subject_from_frames, subject_from_source
 
-__all__ = ["Finding", "Report", "Subject", "examine", "subject_from_frames", "subject_from_source"]
+__all__ = [
+    "DoctorReport",
+    "Finding",
+    "Subject",
+    "examine",
+    "subject_from_frames",
+    "subject_from_source",
+]

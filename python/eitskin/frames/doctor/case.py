@@ -14,6 +14,7 @@ from eitskin.skin.skin import Skin
 
 GROUP = 12
 SAME = 1e-6
+SHOWN = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +125,10 @@ def correlation(a: FloatArray, b: FloatArray) -> float:
     return cosine(a - a.mean(), b - b.mean()) if a.size else 0.0
 
 
-def short_list(channels: Any, most: int = 8) -> str:
-    """Channel numbers for a sentence, cut after ``most``."""
+def short_list(channels: Any) -> str:
+    """Channel numbers for a sentence, cut after eight."""
     shown = numbers(channels)
-    return ", ".join(map(str, shown[:most])) + (", ..." if len(shown) > most else "")
+    return ", ".join(map(str, shown[:SHOWN])) + (", ..." if len(shown) > SHOWN else "")
 
 
 def numbers(array: Any) -> list[int]:

@@ -15,7 +15,7 @@ from eitskin.frames.doctor.order import check_flips, check_frames, check_sign, c
 from eitskin.frames.doctor.orientation import check_orientation
 from eitskin.frames.doctor.reciprocity import check_reciprocity
 from eitskin.frames.doctor.remedy import combined_remedy, names_numbers
-from eitskin.frames.doctor.report import CheckOutcome, Report
+from eitskin.frames.doctor.report import CheckOutcome, DoctorReport
 from eitskin.frames.doctor.subject import Subject
 from eitskin.frames.doctor.swaps import check_swaps
 from eitskin.frames.doctor.wiring import check_lost, check_wiring
@@ -28,13 +28,13 @@ RENUMBER_FIRST = (
 )
 
 
-def examine(subject: Subject) -> Report:
+def examine(subject: Subject) -> DoctorReport:
     """What is wrong with ``subject``, with evidence and remedy; see docs/guide/import-and-doctor.md
     for every check."""
     return examine_case(subject)[0]
 
 
-def examine_case(subject: Subject) -> tuple[Report, Case]:
+def examine_case(subject: Subject) -> tuple[DoctorReport, Case]:
     """As ``examine``, with the case as the checks left it (for the picture)."""
     cases: list[Case] = []
     finite = CheckOutcome()
@@ -79,7 +79,7 @@ def _case(frames: Frames, subject: Subject) -> Case:
     return Case(frames, subject.skin, prediction, prediction.transfer_ohm, rows, trusted)
 
 
-def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> Report:
+def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> DoctorReport:
     findings = tuple(finding for outcome in outcomes for finding in outcome.findings)
     untold = (*subject.remarks, *(text for outcome in outcomes for text in outcome.untold))
     if any(finding.name == "numbering" for finding in findings):
@@ -95,7 +95,7 @@ def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> Repor
     measured: dict[str, object] = {}
     for outcome in outcomes:
         measured |= outcome.measured
-    return Report(
+    return DoctorReport(
         source=subject.source,
         subject=described,
         findings=findings,

@@ -39,7 +39,7 @@ class CheckOutcome:
 
 
 @dataclass(frozen=True)
-class Report:
+class DoctorReport:
     """The whole examination of ``source``; ``subject`` says in words what was examined.
 
     ``repair``: the options of ``eitskin import`` that together repair all that can be repaired.

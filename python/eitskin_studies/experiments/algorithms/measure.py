@@ -7,9 +7,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import AnyArray, FloatArray
 from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.skin.protocol import Protocol
@@ -21,7 +20,7 @@ from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELE
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 from eitskin_studies.harness.thresholds import best_threshold, match_all, miou_curves
 
-Arrays = dict[str, npt.NDArray[Any]]
+Arrays = dict[str, AnyArray]
 
 SNR_DB = 60.0
 TOUCH_THRESHOLDS = tuple(round(0.1 * k, 1) for k in range(1, 10))

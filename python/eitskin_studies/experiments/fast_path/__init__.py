@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
 from eitskin_studies.experiments.fast_path import adaptive, beyond
@@ -269,7 +269,7 @@ def _glitches(
     return spoiled
 
 
-def _with(player: Player, scan: Scan, rng: np.random.Generator) -> npt.NDArray[np.bool_]:
+def _with(player: Player, scan: Scan, rng: np.random.Generator) -> BoolArray:
     """Which rows (t, 2) drive, and measure, with an electrode that fails."""
     table = player.model.protocol.drive_measure[scan.row] == rng.integers(
         player.model.protocol.n_electrodes

@@ -9,10 +9,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from eitskin.arrays import FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.model.model import Model
+from eitskin.progress import Progress
 from eitskin.scoring.matching import GATE_MM
 from eitskin_reference.constants_table import FAST_MODEL_ERROR
 from eitskin_reference.fast.path import FastPath
@@ -26,9 +27,6 @@ from eitskin_studies.experiments.fast_path.states import (
     States,
     draw_states,
 )
-from eitskin_studies.harness.sessions import Progress
-
-FloatArray = npt.NDArray[np.float64]
 
 MEASURED = {
     "with_false": "scenes with a false touch",

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
@@ -110,7 +109,7 @@ def play(row: Row, count: int, seed: int, number: int, elements: int) -> list[Ou
     ]
 
 
-def _scanned(protocol: Protocol, half: bool) -> tuple[Protocol, npt.NDArray[np.int64]]:
+def _scanned(protocol: Protocol, half: bool) -> tuple[Protocol, IntArray]:
     """What is scanned of a protocol, in its order, and which of its rows these are."""
     if not half:
         return in_order(protocol, f"by {STEP}"), np.arange(protocol.n_rows)
@@ -129,7 +128,7 @@ def _played(
     blob: bytes,
     states: States,
     k: int,
-    measured: npt.NDArray[np.int64],
+    measured: IntArray,
     rng: np.random.Generator,
 ) -> Outcome:
     player = HalfPlayer(model, blob) if row.half else Player(model, blob)

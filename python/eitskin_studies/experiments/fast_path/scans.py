@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.core.engine import CoreEngine
 from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
 from eitskin.core.results import Info, Reconstruction
@@ -24,7 +23,7 @@ GRACE_S = 0.03  # a touch that has lifted may be told so long
 class Scan:
     """Rows ``row`` (t,) of the protocol at ``time_s`` (t,), drive after drive."""
 
-    row: npt.NDArray[np.int64]
+    row: IntArray
     time_s: FloatArray
     frames: int
 

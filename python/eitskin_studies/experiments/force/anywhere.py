@@ -8,7 +8,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.calibration.fit import calibrate
-from eitskin.calibration.presses import Presses
+from eitskin.calibration.presses import WeighedPresses
 from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.force.law import LOADS_G
@@ -67,7 +67,9 @@ def scored(
 ) -> Anywhere:
     """Calibrate on the set ``tuned``, read the set ``reported``."""
     seen = np.isfinite(on.value) & (on.value > 0)
-    presses = Presses(tuned.grams[seen] * NEWTONS_PER_GRAM, on.value[seen], on.place_mm[seen])
+    presses = WeighedPresses(
+        tuned.grams[seen] * NEWTONS_PER_GRAM, on.value[seen], on.place_mm[seen]
+    )
     found = calibrate(presses, radius_mm, resamples=0)
     there = np.isfinite(read.value) & (read.value > 0)
     loads = np.full(len(read.value), np.nan)

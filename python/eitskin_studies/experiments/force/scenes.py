@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scene.streams import stream
 from eitskin_studies.experiments.experiment import Workspace
@@ -38,8 +37,8 @@ class PressSet:
     session: FrameSession
     grams: FloatArray
     place_mm: FloatArray
-    law: npt.NDArray[np.int64]
-    group: npt.NDArray[np.int64]
+    law: IntArray
+    group: IntArray
 
     @property
     def facts(self) -> list[str]:

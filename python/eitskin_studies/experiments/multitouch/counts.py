@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin_studies.harness.thresholds import match_all
 
 NORMAL_95 = 1.959964
@@ -37,7 +37,7 @@ def share(hits: int, count: int) -> Share:
     return Share(hits, count, p, max(0.0, middle - half), min(1.0, middle + half))
 
 
-def share_of(truth: Sequence[bool] | npt.NDArray[np.bool_]) -> Share:
+def share_of(truth: Sequence[bool] | BoolArray) -> Share:
     """Of truth values."""
     values = np.asarray(truth, dtype=np.bool_)
     return share(int(values.sum()), len(values))

@@ -2,12 +2,10 @@
 touches read off it."""
 
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import AnyArray, FloatArray
 from eitskin.errors import GeometryError
 from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TouchScene
@@ -62,9 +60,7 @@ def gallery(touch_data: TouchData, workspace: Workspace) -> list[Example]:
             continue
         trained = touch_data.trained(CLASSICAL[0])
 
-        def make(
-            cell: Cell = cell, trained: TrainedMethod = trained
-        ) -> dict[str, npt.NDArray[Any]]:
+        def make(cell: Cell = cell, trained: TrainedMethod = trained) -> dict[str, AnyArray]:
             measured, grid = touch_data.session(cell).measured(HEADLINE_DB), touch_data.setup.grid
             model = touch_data.model(VARIANTS[0])
             solver = Reconstructor(

@@ -9,12 +9,13 @@ import numpy as np
 from eitskin.arrays import FloatArray
 from eitskin.model.build import make_model, scaled_defaults
 from eitskin.model.model import Model
+from eitskin.progress import silent
 from eitskin.scene.random_touches import TouchSet
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.compare.families import Family, Method, Setup, setup_for
 from eitskin_studies.compare.methods import baseline_methods
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace, plain
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.multitouch.cells import Cell, draw, mixed_cells
 from eitskin_studies.experiments.multitouch.variants import (
     SeenFrame,
@@ -81,7 +82,7 @@ class TouchData:
         if (cell.name, tuning) not in self._sessions:
             name = f"{cell.name}{' tuning' if tuning else ''}"
             self._sessions[cell.name, tuning] = self._scenes.session(
-                self.scenes(cell, tuning), plain, name
+                self.scenes(cell, tuning), silent, name
             )
         return self._sessions[cell.name, tuning]
 

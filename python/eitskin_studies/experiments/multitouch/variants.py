@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import FrameError
 from eitskin.model.build import BuildSettings
 from eitskin.model.model import Model
@@ -124,7 +123,7 @@ def train(
     family: Family,
     frames_v: FloatArray,
     truths_mm: Sequence[FloatArray],
-    index: npt.NDArray[np.int64],
+    index: IntArray,
     centres_mm: FloatArray,
 ) -> TrainedMethod:
     """The parameter and the threshold that together count most scenes exactly; of equals, most hits
@@ -145,7 +144,7 @@ def read_images(
     method: Method,
     frames_v: FloatArray,
     threshold: float,
-    index: npt.NDArray[np.int64],
+    index: IntArray,
     centres_mm: FloatArray,
 ) -> list[FloatArray]:
     """Places (t, 2) in mm that a method's images show."""

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import BoolArray, FloatArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.scene.streams import stream
 from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import touches_in_image
@@ -48,7 +47,7 @@ def signed_curves(
 
 
 def places(
-    image: FloatArray, index: npt.NDArray[np.int64], centres_mm: FloatArray, threshold: float
+    image: FloatArray, index: IntArray, centres_mm: FloatArray, threshold: float
 ) -> tuple[FloatArray, FloatArray]:
     """Conductive and resistive places (k, 2) mm that an image (n,) shows: groups of pixels beyond t
     max|x| of one sign."""

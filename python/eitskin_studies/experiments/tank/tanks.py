@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from eitskin.arrays import BoolArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.errors import UsageError
 from eitskin.frames.frames import Frames
 from eitskin.frames.import_options import ImportOptions
@@ -40,8 +39,8 @@ class Rods:
 
     name: str
     frames: Frames
-    metal_mm: npt.NDArray[np.float64]
-    plastic_mm: npt.NDArray[np.float64]
+    metal_mm: FloatArray
+    plastic_mm: FloatArray
 
 
 def tank() -> tuple[Skin, Protocol]:
@@ -142,14 +141,14 @@ def truth_of(frames: Frames, raster: Raster) -> tuple[BoolArray, BoolArray]:
     return conductive, resistive
 
 
-def objects_of(frames: Frames, number: int, sign: int) -> npt.NDArray[np.int64]:
+def objects_of(frames: Frames, number: int, sign: int) -> IntArray:
     """The objects of frame ``number`` that conduct (+1), or insulate (-1)."""
     assert frames.touch_sign is not None
     there = frames.touches_in(number)
     return np.asarray(there[frames.touch_sign[there] == sign])
 
 
-def reciprocal_share(frames: Frames) -> npt.NDArray[np.float64]:
+def reciprocal_share(frames: Frames) -> FloatArray:
     """For each frame the noise of a reading over the rms of the change, from how far reciprocal
     readings differ: (k,).
 
