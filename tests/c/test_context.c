@@ -200,6 +200,7 @@ TEST(default_options)
     o.track_smooth = 0;
     uint32_t count = 0;
     const eits_option *option = eits_option_table(&count);
+    CHECK(count > 0);
     for (uint32_t k = 0; k < count; ++k)
         CHECK(memcmp((const char *)&o + option[k].offset, (const char *)&usual + option[k].offset,
                      option[k].size) == 0);

@@ -30,6 +30,7 @@ TEST(open_electrodes_are_named_and_left_out)
                 CHECK_EQUAL(ctx->rows.electrode[k], k == e ? EITS_ELECTRODE_OPEN : 0);
             for (uint32_t i = 0; i < SMALL_ROWS; ++i)
                 CHECK((ctx->rows.unusable[i] & EITS_ROW_OPEN) != 0 || !row_uses(ctx, i, e));
+            CHECK_EQUAL(ctx->rows.unusable[SMALL_ROWS], 0); /* no row */
             const eits_real dead = b.frame[last];
             b.frame[last] = ctx->reference.v0[last];
             reconstruct(&b);

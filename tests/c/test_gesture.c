@@ -391,6 +391,11 @@ TEST(another_id_is_the_same_finger)
     frame(both, 2);
     finger(9, 42, 0, 6, 0, 4);
     ENDS("down, up, swipe");
+    begin(); /* two frames later, at its end */
+    finger(1, -12, 0, 6, 0, 7);
+    frame(both, 2);
+    finger(9, 42, 0, 0, 0, 1);
+    ENDS("down, up, swipe");
 }
 
 TEST(half_of_a_touch_is_no_finger_until_it_has_lasted)

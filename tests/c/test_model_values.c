@@ -135,6 +135,9 @@ TEST(numbers_of_the_dimensions)
         CHECK_EQUAL(with_number(TINY, "DIMS", at, 0.0f),
                     sign_free || at == 60 ? EITS_OK : EITS_E_MODEL_VALUE);
     }
+    /* a Lipschitz constant whose inverse is a number, and one too small */
+    CHECK_OK(with_number(TINY, "DIMS", 56, 0x1p-126f));
+    CHECK_EQUAL(with_number(TINY, "DIMS", 56, 0x1p-127f), EITS_E_MODEL_VALUE);
 }
 
 /* Open with rows `from` to before `to` of the protocol on these electrodes of so many, its hash

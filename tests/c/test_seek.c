@@ -333,12 +333,16 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
 }
 
 /* Where the touch is sure, not tested, one of two, on an instrument that fits, or where the image
- * says nothing of that sign: as the test left it. */
+ * says nothing, nothing of that sign, or has two halves with the other sign between them: as the
+ * test left it. */
 TEST(other_touches_stay)
 {
-    static const eits_disc at = {-21, 9, 11, R(0.05), 1, 0};
-    for (int k = 0; k < 6; ++k) {
-        eits_context *ctx = pressed(&at, 1, EITS_SIGN_INCREASE);
+    static const eits_disc at[] = {{-21, 9, 11, R(0.05), 1, 0},
+                                   {9, 9, 11, R(0.05), 1, 0},
+                                   {-6, 9, 11, R(-0.1), -1, 0},
+                                   {0, 0, 90, R(-0.01), -1, 0}};
+    for (int k = 0; k < 8; ++k) {
+        eits_context *ctx = pressed(at + (k == 7 ? 3 : 0), k == 6 ? 3 : 1, EITS_SIGN_INCREASE);
         eits_fit f = one_left(ctx, k == 0 ? (double)EITS_CENTRE_SURE : 0.5);
         f.tested = k != 1;
         f.count = k == 2 ? 2 : k == 3 ? 0 : 1;

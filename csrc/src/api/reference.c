@@ -160,8 +160,8 @@ eits_status eits_reference_finish(eits_context *ctx)
      * and a converter's steps leave is the least. */
     const eits_real noise_v = eits_reference_noise(ctx), floor_v = eits_noise_floor_v(ctx),
                     lambda_floor = eits_lambda_noise_floor(ctx);
-    b->noise_v = noise_v > floor_v ? noise_v : floor_v;
-    b->lambda_noise = b->lambda_noise > lambda_floor ? b->lambda_noise : lambda_floor;
+    b->noise_v = eits_larger(noise_v, floor_v);
+    b->lambda_noise = eits_larger(b->lambda_noise, lambda_floor);
     b->ready = 1;
     return EITS_OK;
 }

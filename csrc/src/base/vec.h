@@ -36,6 +36,11 @@ static inline void eits_copy(eits_real *out, const eits_real *a, size_t count)
     memmove(out, a, count * sizeof *out); /* may be the same place */
 }
 
+static inline eits_real eits_larger(eits_real a, eits_real b)
+{
+    return a > b ? a : b;
+}
+
 static inline eits_real eits_clamp(eits_real v, eits_real low, eits_real high)
 {
     return v < low ? low : (v > high ? high : v);

@@ -203,11 +203,11 @@ static void find_bridged(eits_context *ctx, const eits_real *frame, limits lim,
     }
 }
 
-/* 64 bits name the first 64 electrodes; rows.electrode has the states of all. */
+/* 64 bits name the first 64 electrodes; rows.electrode has the states of all. A frame begins with
+ * none, and none is taken back. */
 void eits_name_electrodes(eits_context *ctx)
 {
     eits_info *info = &ctx->info;
-    info->open_electrodes = info->bridged_electrodes = info->noisy_electrodes = 0;
     for (uint32_t e = 0; e < ctx->model->n_electrodes && e < 64; ++e) {
         const uint64_t bit = (uint64_t)1 << e;
         info->open_electrodes |= (ctx->rows.electrode[e] & EITS_ELECTRODE_OPEN) != 0 ? bit : 0;

@@ -101,7 +101,7 @@ static tolerance find_tolerance(const eits_context *ctx, const eits_scratch *scr
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_real datum = eits_fabs(ctx->frame.d[k]);
-        tol.largest = datum > tol.largest ? datum : tol.largest;
+        tol.largest = eits_larger(datum, tol.largest);
         if (ctx->frame.sides[k] == EITS_SIDE_BOTH)
             scratch->value[count++] = eits_fabs(ctx->frame.reciprocity_error[k]);
     }

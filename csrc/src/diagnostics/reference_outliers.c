@@ -42,7 +42,7 @@ static eits_real oddity(const eits_context *ctx, uint32_t k, const eits_real *ne
         return in_use(ctx, fold.first, older) && in_use(ctx, fold.second, older)
                    ? eits_fabs(first - second)
                    : 0;
-    return eits_fabs(first) > eits_fabs(second) ? eits_fabs(first) : eits_fabs(second);
+    return eits_larger(eits_fabs(first), eits_fabs(second));
 }
 
 /* The greater voltage of fold k's rows. */
@@ -51,7 +51,7 @@ static eits_real size_of(const eits_context *ctx, uint32_t k, const eits_real *o
     const eits_fold fold = ctx->model->fold[k];
     const eits_real first = in_use(ctx, fold.first, older) ? eits_fabs(older[fold.first]) : 0;
     const eits_real second = in_use(ctx, fold.second, older) ? eits_fabs(older[fold.second]) : 0;
-    return first > second ? first : second;
+    return eits_larger(first, second);
 }
 
 /* What an oddity may be; sets `paired` where reciprocals tell. */

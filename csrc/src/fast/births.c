@@ -250,7 +250,7 @@ static eits_real damped_step(const fast_fit *fit, eits_real shorter, eits_real *
         return -1;
     for (uint32_t i = 0; i < n; ++i) {
         step[i] = shorter * fast_dot(inverse[i], fit->b, n);
-        length = eits_fabs(step[i]) > length ? eits_fabs(step[i]) : length;
+        length = eits_larger(eits_fabs(step[i]), length);
     }
     if (!(length > EITS_FAST_MAX_STEP_MM))
         return length;

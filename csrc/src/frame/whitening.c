@@ -216,8 +216,7 @@ eits_real eits_lambda_noise(const eits_context *ctx)
 eits_real eits_detection_threshold(const eits_context *ctx)
 {
     const eits_real least = eits_lambda_noise_floor(ctx), learned = ctx->reference.lambda_noise;
-    return ctx->options.detection_factor * ctx->whitening.noise_ratio *
-           (learned > least ? learned : least);
+    return ctx->options.detection_factor * ctx->whitening.noise_ratio * eits_larger(learned, least);
 }
 
 /* No row is left out: the regularisation alone may differ.

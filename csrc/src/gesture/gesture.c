@@ -156,7 +156,7 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
         return;
     }
     const eits_real far = eits_apart(c->x_mm - c->start_x_mm, c->y_mm - c->start_y_mm);
-    c->farthest_mm = far > c->farthest_mm ? far : c->farthest_mm;
+    c->farthest_mm = eits_larger(far, c->farthest_mm);
 }
 
 /* An event at where the contact is now; what moves from here on is measured from there.

@@ -88,7 +88,7 @@ static eits_real take_pulls(eits_context *ctx, eits_active *a)
     for (uint32_t k = 0; k < ctx->solver.working_count; ++k) {
         eits_real *g = &ctx->solver.gradient[ctx->solver.working[k]];
         a->pull[k] = *g - a->sign[k] * a->lambda;
-        greatest = eits_fabs(a->pull[k]) > greatest ? eits_fabs(a->pull[k]) : greatest;
+        greatest = eits_larger(eits_fabs(a->pull[k]), greatest);
         *g = 0;
     }
     return greatest;
@@ -198,7 +198,7 @@ static int rounds(eits_context *ctx, const eits_scratch *scratch, eits_active *a
             ctx->info.stop = EITS_STOP_OPTIMUM;
             return 1;
         }
-        const int moved = round_of(ctx, scratch, a, stalls > 0 && missing > 1 ? 1 : missing, c);
+        const int moved = round_of(ctx, scratch, a, stalls > 0 ? missing != 0 : missing, c);
         if (a->broken || (a->loose && !a->limited) ||
             !(c->objective <= before * (1 + EITS_MAX_RISE)))
             return 0;

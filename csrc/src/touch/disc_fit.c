@@ -182,8 +182,7 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
     const eits_real expected = eits_expected_radius(o, disc),
                     deviation = EITS_RADIUS_DEVIATION * expected;
     const eits_real by_energy = f->radius_weight * energy, by_noise = f->noise / (eits_real)rank;
-    const eits_real weight =
-        (by_energy > by_noise ? by_energy : by_noise) / (deviation * deviation);
+    const eits_real weight = eits_larger(by_energy, by_noise) / (deviation * deviation);
     const eits_real *column[4] = {scratch->row[5], scratch->row[6], scratch->row[7], atom};
     eits_real h[4][4], g[4], step[4];
     for (int i = 0; i < 4; ++i) {
@@ -225,8 +224,7 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
         const eits_real dx = eits_fabs(trial.x_mm - disc->x_mm),
                         dy = eits_fabs(trial.y_mm - disc->y_mm);
         const eits_real dr = eits_fabs(trial.radius_mm - disc->radius_mm);
-        moved = dx > dy ? dx : dy;
-        moved = dr > moved ? dr : moved;
+        moved = eits_larger(dr, eits_larger(dx, dy));
         *disc = trial;
         eits_copy(atom, trial_atom, rank);
         break;
@@ -244,7 +242,7 @@ void eits_fit_move(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, 
         eits_real farthest = 0;
         for (uint32_t k = first; k <= last; ++k) {
             const eits_real moved = move_disc(ctx, scratch, f, k);
-            farthest = moved > farthest ? moved : farthest;
+            farthest = eits_larger(moved, farthest);
         }
         /* Further moves would not be seen. */
         if (farthest < EITS_SETTLED_PIXELS * (eits_real)ctx->model->pixel_mm)
