@@ -193,7 +193,7 @@ def as_text(result: LiveViews) -> str:
 
 
 def for_page(result: LiveViews, command: str, mark: str) -> Filling:
-    """The texts and tables between the marks of docs/results/live-view.md."""
+    """The texts and tables between the marks of docs/results/outputs.md."""
     return {f"{mark}-run": f"By `{command}`."}, {mark: _table(result)}
 
 

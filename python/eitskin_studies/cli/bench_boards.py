@@ -79,7 +79,7 @@ def add_view(what: Any) -> None:
     )
     option(parser, "--seconds", "for each number of pages", default=30.0)
     option(parser, "--load", "eight pages only, and six sinks beside")
-    add_page_option(parser, "live-view")
+    add_page_option(parser, "outputs")
     parser.set_defaults(run=run_view)
 
 
@@ -97,8 +97,8 @@ def run_view(options: argparse.Namespace) -> int:
         progress=lambda text: print(text, file=sys.stderr),
         sinks=options.load,
     )
-    filling = live_view.for_page(result, command, "load" if options.load else "view")
-    return show(options, result, live_view.as_text(result), filling, "live-view")
+    filling = live_view.for_page(result, command, "view-load" if options.load else "view")
+    return show(options, result, live_view.as_text(result), filling, "outputs")
 
 
 def add_outputs(what: Any) -> None:

@@ -4,7 +4,7 @@ import pytest
 from study_pages import page_copy
 
 from eitskin.scene.description import load_scene
-from eitskin_studies.benchmarks import outputs
+from eitskin_studies.benchmarks import live_view, outputs
 from eitskin_studies.harness.sections import fill_marks
 
 PARTS = ["scan", "solve", "link", "host", "sink udp", "contact to udp", "sink tuio"]
@@ -24,7 +24,11 @@ def test_the_page_has_the_places(tmp_path):
     result = outputs.OutputTimes(times, 23, 24, 960, load, "a machine")
     page = page_copy(tmp_path, "outputs")
     fill_marks(page, "outputs", outputs.for_page(result, "eitskin bench outputs"))
+    views = live_view.LiveViews((live_view.LiveView(1, 47.0, 0.1, 4, 28.0, 46.0, (110.0, 113.0)),))
+    for mark in ("view", "view-load"):
+        fill_marks(page, "outputs", live_view.for_page(views, "eitskin bench view", mark))
     text = page.read_text()
+    assert text.count("| 28.0 ms | 46.0 ms |") == 2
     assert "23 of 24 contacts" in text and "120.5 MB at the end" in text
     assert "23 of 24 contacts" in outputs.as_text(result)
 
