@@ -157,9 +157,7 @@ class _Watch:
         sys.settrace(None)
         threading.settrace(None)
         calls = [
-            (name, code.co_firstlineno)
-            for code, name in seen.items()
-            if name.startswith(PACKAGES)
+            (name, code.co_firstlineno) for code, name in seen.items() if name.startswith(PACKAGES)
         ]
         self.tests[item.nodeid] = (calls, time.process_time() - began)
 
