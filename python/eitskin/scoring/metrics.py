@@ -105,7 +105,7 @@ def lookup_for(points_mm: FloatArray, grid: Grid, kind: str = LOOKUP) -> Lookup:
     surround the cell, leaving out those that are not kept (where none is, the nearest one is
     shown), as smooth pictures do.
     """
-    nearest = _nearest_pixels(points_mm, grid.centres_mm())
+    nearest = _nearest_pixels(points_mm, grid)
     if kind == "nearest":
         return Lookup(nearest[:, None], np.ones((len(points_mm), 1)))
     if kind != "bilinear":
@@ -136,13 +136,18 @@ def lookup_for(points_mm: FloatArray, grid: Grid, kind: str = LOOKUP) -> Lookup:
     return Lookup(np.where((pixels < 0) | alone[:, None], nearest[:, None], pixels), weights)
 
 
-def _nearest_pixels(points_mm: FloatArray, centres_mm: FloatArray) -> IntArray:
-    """For each point (p, 2) the index of the nearest of ``centres_mm`` (n, 2): (p,)."""
-    found = np.empty(len(points_mm), dtype=np.int64)
-    for start in range(0, len(points_mm), 2048):
-        block = points_mm[start : start + 2048]
-        distance = ((block[:, None, :] - centres_mm[None, :, :]) ** 2).sum(axis=2)
-        found[start : start + 2048] = np.argmin(distance, axis=1)
+def _nearest_pixels(points_mm: FloatArray, grid: Grid) -> IntArray:
+    """For each point (p, 2) the index of the nearest kept pixel: (p,). Where that is not the pixel
+    around the point, because it is not kept or the point lies on its edge, all are looked at."""
+    place = (points_mm - np.asarray(grid.origin_mm)) / grid.pixel_mm
+    on_edge = (np.abs(place - np.rint(place)) < 1e-6).any(axis=1)
+    found = np.where(on_edge, -1, grid.locate(points_mm))
+    (others,) = np.nonzero(found < 0)
+    centres_mm = grid.centres_mm()
+    for start in range(0, len(others), 2048):
+        block = others[start : start + 2048]
+        dx, dy = (points_mm[block, None] - centres_mm).transpose(2, 0, 1)
+        found[block] = np.argmin(dx**2 + dy**2, axis=1)
     return found
 
 
