@@ -52,5 +52,6 @@ def build_core() -> Path:
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         run(cmake, "-S", ROOT, "-B", folder / "built", *generator, *settings, *places)
-        run(cmake, "--build", folder / "built", "--parallel", "2", "--target", "eitskin_f32", "eitskin_f64")
+        targets = ["--target", "eitskin_f32", "eitskin_f64"]
+        run(cmake, "--build", folder / "built", "--parallel", "2", *targets)
     return folder
