@@ -52,7 +52,7 @@ changed_since() {
 # packages ARGUMENTS...: what pip's install takes, into the environment. By uv, which fetches and unpacks several at once and
 # says what; by pip where there is no uv, or where uv fails: only pip reads pip's settings. What is built here is built again.
 packages() {
-    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary uv uv 2>/dev/null || true
+    [ -x "$venv/bin/uv" ] || "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary uv uv 2>/dev/null || true
     {
         "$venv/bin/uv" pip install --no-progress --python "$venv/bin/python" \
             --reinstall-package eitskin --reinstall-package eitskin-studies "$@" && touch "$venv/packages-done"

@@ -68,6 +68,11 @@ def listed(items: Sequence[object]) -> str:
     return shown if len(items) <= MAX_LISTED else f"{shown} and {len(items) - MAX_LISTED} more"
 
 
+def first_few(items: Sequence[object], most: int) -> str:
+    """ "a, b, c", or of more than ``most`` these and "..."."""
+    return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
+
+
 def check_keys(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
     """Refuse keys of ``table`` that are not ``known``; ``where`` says file and table."""
     allowed = set(known)

@@ -15,6 +15,7 @@ import numpy as np
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import add_device
 from eitskin.cli.printing import say
+from eitskin.config import first_few
 from eitskin.device.known_model import scanned_protocol
 from eitskin.device.live_frames import LiveFrame
 from eitskin.device.wire.link_table import Stream
@@ -98,7 +99,7 @@ def _with_given(plan: PressPlan, options: argparse.Namespace) -> PressPlan:
 def _say_off(plan: PressPlan, skin: Skin) -> None:
     off = [k + 1 for k in range(len(plan)) if not skin.outline.contains(plan.place_mm[k : k + 1])]
     if off:
-        names = ", ".join(map(str, off[:5])) + (", ..." if len(off) > 5 else "")
+        names = first_few(off, 5)
         say(f"off the skin {skin.name!r}: places {names} of {len(plan)}; are they in mm?")
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.arrays import AnyArray, ComplexArray
+from eitskin.config import first_few
 from eitskin.errors import UsageError
 
 PAIRS = ("real-imag", "magnitude-degrees", "magnitude-radians")
@@ -73,7 +74,7 @@ def paired(names: Sequence[str], values: AnyArray, how: str | None, option: str)
         if how is None:
             raise UsageError(
                 f"{option}: the header does not say of every column what it is"
-                f" ({_some(names)}); say --pairs {' | '.join(PAIRS)}"
+                f" ({first_few(names, SHOWN)}); say --pairs {' | '.join(PAIRS)}"
             )
         said = set()
     if not said:
@@ -88,8 +89,8 @@ def paired(names: Sequence[str], values: AnyArray, how: str | None, option: str)
     told = "real-imag" if said == {"real-imag"} else _polar([names[k] for k in second], how, option)
     if how is not None and how != told:
         raise UsageError(
-            f"--pairs {how}: the header says {told} ({_some(names)}); leave --pairs out, or the"
-            " header with --header-rows"
+            f"--pairs {how}: the header says {told} ({first_few(names, SHOWN)}); leave --pairs out,"
+            " or the header with --header-rows"
         )
     return _checked(values, Paired(first, second, told), option)
 
@@ -140,14 +141,10 @@ def _polar(phases: Sequence[str], how: str | None, option: str) -> str:
     if how is not None and how != "real-imag":
         return how
     raise UsageError(
-        f"{option}: the header says magnitude and phase ({_some(phases)}), but not the phase's"
-        " unit; say --pairs magnitude-degrees or --pairs magnitude-radians"
+        f"{option}: the header says magnitude and phase ({first_few(phases, SHOWN)}), but not the"
+        " phase's unit; say --pairs magnitude-degrees or --pairs magnitude-radians"
     )
 
 
 def _words(name: str) -> list[str]:
     return re.findall(r"[a-z]+|°", name.lower())
-
-
-def _some(names: Sequence[str]) -> str:
-    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")

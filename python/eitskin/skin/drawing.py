@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from eitskin.arrays import FloatArray
+from eitskin.config import first_few
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.fileio import read_bytes
 from eitskin.skin.drawing_shapes import DrawingReading, DrawnShape
@@ -159,5 +160,4 @@ def _without_repeats(points_mm: FloatArray) -> FloatArray:
 
 def _names_of(shapes: Sequence[DrawnShape]) -> str:
     known = sorted({name for one in shapes for name in one.names if name})
-    listed = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
-    return f"names in it are: {listed}" if known else "no shape in it has a name"
+    return f"names in it are: {first_few(known, 12)}" if known else "no shape in it has a name"

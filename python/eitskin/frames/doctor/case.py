@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray, IntArray
+from eitskin.config import first_few
 from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import Homogeneous, voltages_of
 from eitskin.skin.skin import Skin
 
 GROUP = 12
 SAME = 1e-6
-SHOWN = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +127,7 @@ def correlation(a: FloatArray, b: FloatArray) -> float:
 
 def short_list(channels: Any) -> str:
     """Channel numbers for a sentence, cut after eight."""
-    shown = numbers(channels)
-    return ", ".join(map(str, shown[:SHOWN])) + (", ..." if len(shown) > SHOWN else "")
+    return first_few(numbers(channels), 8)
 
 
 def numbers(array: Any) -> list[int]:

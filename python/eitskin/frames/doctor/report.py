@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
 
+from eitskin.config import first_few
+
 FAULT = "fault"
 NOTE = "note"
 EXIT_FAULT = 11
@@ -118,6 +120,5 @@ def _shown(value: Any) -> str:
     if isinstance(value, Mapping):
         return "(" + ", ".join(f"{k} {_shown(v)}" for k, v in list(value.items())[:SHOWN]) + ")"
     if isinstance(value, (list, tuple)):
-        shown = ", ".join(_shown(entry) for entry in value[:SHOWN])
-        return f"[{shown}{', ...' if len(value) > SHOWN else ''}]"
+        return f"[{first_few([_shown(entry) for entry in value], SHOWN)}]"
     return str(value)
