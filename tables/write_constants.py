@@ -46,14 +46,13 @@ def _c_value(value: Any) -> str:
     return f"R({value!r})" if isinstance(value, float) else str(value)
 
 
-def python_constants(tables: Tables, package: str) -> Lines:
-    """Names and values of the core's rooms, those of float64 where there are two, for the numpy
-    reference all, for eitskin what it reads; the table says the rest."""
+def python_constants(tables: Tables) -> Lines:
+    """Names and values that eitskin reads, those of float64 where there are two; the table says the
+    rest."""
     for room in tables["constants"]["room"]:
         rows = [row for group in room["group"] for row in group["rows"]]
-        if package == "eitskin":
-            rows = [row for row in rows if row[0] in room.get("package", ())]
-        if "header" in room or not rows:  # firmware has no twin
+        rows = [row for row in rows if row[0] in room.get("package", ())]
+        if not rows:
             continue
         yield from ("", f"# {room['name']}")
         for name, value, *_ in rows:

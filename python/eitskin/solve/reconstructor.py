@@ -1,10 +1,10 @@
 """Frames to images and touches with one signature, whichever engine does it: the C core or the
-numpy reference."""
+numpy oracle."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,15 +19,12 @@ from eitskin.core.results import (
     check_options,
     check_shape,
 )
-from eitskin.errors import FrameError, ProtocolError, UsageError, missing_checkout
+from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
+from eitskin.oracle.engine import OracleEngine
 from eitskin.skin.protocol import Protocol
-
-if TYPE_CHECKING:
-    from eitskin_reference.engine import ReferenceEngine
-
 
 ENGINES = ("c", "c64", "numpy")
 MIN_CORRELATION = 0.9
@@ -37,14 +34,14 @@ class Reconstructor:
     """One skin's reconstruction: tare on quiet frames, then turn frames into images and touches.
 
     ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or
-    "numpy" (the reference, of a checkout). What is wrong with a frame is found, left out
+    "numpy" (the oracle: what an image is by definition, each frame by itself, slow; its touches are
+    fitted in its own way and have no confidence). What is wrong with a frame is found, left out
     where that helps, and named in ``info.found`` (docs/reference/diagnostics.md); the option
     ``diagnostics`` chooses what is looked for.
 
     Raises:
         ModelError: the C core refuses the model.
         UsageError: an unknown engine, an option out of range, or the core is not built.
-        MissingExtraError: the numpy reference is not installed.
     """
 
     def __init__(
@@ -58,9 +55,9 @@ class Reconstructor:
         if engine not in ENGINES:
             raise UsageError(f"engine {engine!r} is not known; use one of {', '.join(ENGINES)}")
         self.model, self.engine = model, engine
-        self._engine: CoreEngine | ReferenceEngine
+        self._engine: CoreEngine | OracleEngine
         if engine == "numpy":
-            self._engine = _reference_engine(model)
+            self._engine = OracleEngine(model)
         else:
             self._engine = CoreEngine(
                 blob or encode_model(model), "float32" if engine == "c" else "float64"
@@ -165,15 +162,6 @@ class Reconstructor:
         """Forget the warm start and the touches that were followed: the next frame has nothing to
         do with the last."""
         self._engine.forget()
-
-
-def _reference_engine(model: Model) -> "ReferenceEngine":
-    """Of a package that the wheel does not have."""
-    try:
-        from eitskin_reference.engine import ReferenceEngine
-    except ImportError:
-        raise missing_checkout("the engine numpy") from None
-    return ReferenceEngine(model)
 
 
 def _numbers(values: npt.ArrayLike, what: str) -> FloatArray:
