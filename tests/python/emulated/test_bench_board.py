@@ -11,7 +11,7 @@ from eitskin_studies.benchmarks import board as bench_board
 from eitskin_studies.harness import emulated
 from eitskin_studies.harness.sections import fill_marks
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "board-cost.md"
+PAGE = Path(__file__).resolve().parents[3] / "studies" / "results" / "board-cost.md"
 
 
 @pytest.fixture(scope="module")
