@@ -74,7 +74,8 @@ def fills_its_page(
     marks = set(re.findall("<!-- end (.*) -->", text))
     assert said <= marks <= {"command", *outcome.words, *tables, *said}
     assert (
-        f"`eitskin study {name} -o out/{name} --share 0.01 --page studies/results/{name}.md`" in text
+        f"`eitskin study {name} -o out/{name} --share 0.01 --page studies/results/{name}.md`"
+        in text
     )
     assert all(f"pictures/{name}/{picture}" in text for picture in outcome.pictures)
     return text

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from study_pages import PAGES, page_copy
 
 from eitskin.cli.main import main
 from eitskin.model.prebuilt import load_prebuilt
@@ -23,6 +22,7 @@ from eitskin_studies.benchmarks.diagnostics_scenes import (
     drawn,
     swapped,
 )
+from study_pages import PAGES, page_copy
 
 SCENES, SEED = 4, 6
 FIRST_CELL = re.compile(r"^\| ([^|]+) \|", re.MULTILINE)

@@ -3,11 +3,11 @@
 import json
 
 import pytest
-from study_pages import page_copy
 
 from eitskin.cli.main import main
 from eitskin.tuning.front import Conditions, load_front
 from eitskin_studies.benchmarks import energy
+from study_pages import page_copy
 
 
 def test_a_point_takes_the_processor_while_it_solves_and_all_else_for_the_frame():

@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from study_pages import page_copy
 
 from eitskin.cli.main import main
 from eitskin_studies.benchmarks import batches as bench_batches
 from eitskin_studies.benchmarks import growth as bench_growth
 from eitskin_studies.harness.sections import fill_marks
 from eitskin_studies.pictures.growth_picture import draw_growth
+from study_pages import page_copy
 
 POINTS = (
     bench_growth.GrowthPoint("pixels n", across=10, rank=20),

@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from study_pages import page_copy
 
 from eitskin.model.eitm import load_model
 from eitskin.scene.description import load_scene
@@ -13,6 +12,7 @@ from eitskin_studies.benchmarks import latency
 from eitskin_studies.benchmarks.latency import Press, Told, judge
 from eitskin_studies.harness.sections import fill_marks
 from eitskin_studies.pictures.latency_picture import draw_latency
+from study_pages import page_copy
 
 
 def told(number: int, *places: tuple[float, float], named: str = "") -> Told:

@@ -1,11 +1,11 @@
 """``eitskin bench outputs``: parts add up, every contact and frame is counted."""
 
 import pytest
-from study_pages import page_copy
 
 from eitskin.scene.description import load_scene
 from eitskin_studies.benchmarks import live_view, outputs
 from eitskin_studies.harness.sections import fill_marks
+from study_pages import page_copy
 
 PARTS = ["scan", "solve", "link", "host", "sink udp", "contact to udp", "sink tuio"]
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on, workspace
 
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -22,6 +21,7 @@ from eitskin_studies.experiments.algorithms.measure import TUNING, Field
 from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, shown_set, touch_set
 from eitskin_studies.experiments.experiment import ExperimentOutcome
+from study_pages import coarse, fills_its_page, goes_on, workspace
 
 KEPT = (
     *("Gauss-Newton (Tikhonov)", "NOSER", "conjugate gradient", "GREIT-like"),

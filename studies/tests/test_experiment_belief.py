@@ -4,7 +4,6 @@ from functools import partial
 from typing import Any
 
 import pytest
-from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin_studies.experiments import belief
 from eitskin_studies.experiments.belief.tables import counts, coverage, curve
@@ -12,6 +11,7 @@ from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.registry import load
 from eitskin_studies.worlds.simulate import WorldFactory
 from eitskin_studies.worlds.worlds import WORLDS
+from study_pages import fills_its_page, goes_on, workspace
 
 FRAMES: list[dict[str, Any]] = [
     {"true": 1, "crowded": False, "touches": [[True, 0.999, 0.5, 1.0]]},

@@ -1,8 +1,7 @@
 """The study of stretched and bent skins: a fresh tare helps, and its page is filled."""
 
-from study_pages import fills_its_page, workspace
-
 from eitskin_studies.experiments import deformation
+from study_pages import fills_its_page, workspace
 
 
 def test_it_fills_its_page_and_a_stretch_costs_touches(tmp_path, monkeypatch):

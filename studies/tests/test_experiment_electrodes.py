@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
@@ -16,6 +15,7 @@ from eitskin.skin.protocol import adjacent, skip
 from eitskin.skin.skin import Skin
 from eitskin_studies.experiments import electrodes
 from eitskin_studies.experiments.electrodes import measuring, patterns, tables, tuning
+from study_pages import coarse, fills_its_page, goes_on
 
 
 @pytest.mark.parametrize("pattern", list(patterns.PATTERNS))

@@ -1,9 +1,8 @@
 """The study of the fast path: it fills its page."""
 
-from study_pages import fills_its_page, workspace
-
 from eitskin_studies.experiments import fast_path
 from eitskin_studies.experiments.fast_path import adaptive, beyond
+from study_pages import fills_its_page, workspace
 
 
 def test_it_fills_its_page(tmp_path, monkeypatch):

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin_studies.experiments import force
 from eitskin_studies.experiments.experiment import ExperimentOutcome
@@ -21,6 +20,7 @@ from eitskin_studies.experiments.force.readouts import (
     from_lists,
 )
 from eitskin_studies.experiments.write import to_json
+from study_pages import coarse, fills_its_page, goes_on
 
 
 @pytest.fixture(scope="module")

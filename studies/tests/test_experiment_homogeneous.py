@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin.errors import FileError, FrameError
 from eitskin.frames.homogeneous import homogeneous as predicted
@@ -20,6 +19,7 @@ from eitskin_studies.experiments.homogeneous.uniformity import (
     fold_for,
     uniformity,
 )
+from study_pages import fills_its_page, goes_on, workspace
 
 PROTOCOL = adjacent(16)
 ROWS = PROTOCOL.drive_measure.astype(np.int64)

@@ -4,12 +4,12 @@ it was."""
 from pathlib import Path
 
 import pytest
-from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin_studies.experiments import levers
 from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
 from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM
+from study_pages import coarse, fills_its_page, goes_on
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on, workspace
 
 from eitskin.errors import GeometryError
 from eitskin.scene.library_scenes import find_scene
@@ -36,6 +35,7 @@ from eitskin_studies.experiments.multitouch.cells import (
 )
 from eitskin_studies.experiments.multitouch.counts import auc, quantile, roc, score, share
 from eitskin_studies.experiments.multitouch.variants import VARIANTS, SeenFrame
+from study_pages import coarse, fills_its_page, goes_on, workspace
 
 OUTLINE = paper_skin().outline
 

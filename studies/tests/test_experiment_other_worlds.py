@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.scene.touch_shape import named_shape
@@ -18,6 +17,7 @@ from eitskin_studies.experiments.other_worlds.tables import HEADLINES
 from eitskin_studies.experiments.registry import load
 from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
 from eitskin_studies.worlds.worlds import WORLDS
+from study_pages import fills_its_page, goes_on, workspace
 
 
 def _run(folder: Path) -> ExperimentOutcome:

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on
 
 from eitskin.scene.random_touches import rim_distance_mm
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import paper
+from study_pages import coarse, fills_its_page, goes_on
 
 
 @pytest.mark.parametrize("from_rim_mm", paper.READINGS.values())

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from study_pages import coarse, fills_its_page, goes_on, workspace
 
 from eitskin.fem.grid import grid_for
 from eitskin.model.build import linearise
@@ -25,6 +24,7 @@ from eitskin_studies.experiments.shapes.example_drawings import (
 )
 from eitskin_studies.experiments.shapes.rounded import as_outline
 from eitskin_studies.experiments.shapes.variants import ShapeVariant, variants
+from study_pages import coarse, fills_its_page, goes_on, workspace
 
 
 @pytest.fixture(scope="module")

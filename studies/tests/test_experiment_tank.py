@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin.cli.main import main
 from eitskin.errors import UsageError
@@ -38,6 +37,7 @@ from eitskin_studies.experiments.tank.tanks import (
     rods,
     tank,
 )
+from study_pages import fills_its_page, goes_on, workspace
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "tank_kit4.toml"
 

@@ -3,7 +3,6 @@ stopped."""
 
 import numpy as np
 import pytest
-from study_pages import fills_its_page, goes_on, workspace
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.scene.touch_path import Keyframe, TouchTrack
@@ -20,6 +19,7 @@ from eitskin_studies.experiments.tracking.streams import (
     passing_streams,
     random_streams,
 )
+from study_pages import fills_its_page, goes_on, workspace
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
-from study_pages import PAGES, workspace
 
 from eitskin.cli.main import main
 from eitskin.errors import ConfigError, UsageError
@@ -18,6 +17,7 @@ from eitskin_studies.experiments.experiment import (
     Workspace,
 )
 from eitskin_studies.experiments.write import to_json, write_all, write_page
+from study_pages import PAGES, workspace
 
 
 class Small:

@@ -27,7 +27,7 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.harness.emulated import (
+from eitskin_emulator.core_on_qemu import (
     PROGRAM,
     build_cortex_m7,
     checkout_root,

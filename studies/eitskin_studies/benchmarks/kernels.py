@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import UsageError
-from eitskin_studies.harness.emulated import checkout_root, need_tools
+from eitskin_emulator.core_on_qemu import checkout_root, need_tools
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import text_table
 

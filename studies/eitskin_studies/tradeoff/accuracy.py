@@ -89,8 +89,8 @@ def train(built: Built, session: FrameSession, solved: SolvedSet) -> TrainedPoin
 def score(
     built: Built, session: FrameSession, solved: SolvedSet, trained: TrainedPoint
 ) -> dict[str, Any]:
-    """Everything about the accuracy in plain values fit for JSON; see ``studies/results/tradeoff.md``
-    for what each is."""
+    """Everything about the accuracy in plain values fit for JSON; ``studies/results/tradeoff.md``
+    says what each is."""
     truths = session.truths(built.image_scorer.raster)
     image = miou_curves(built.image_scorer, solved.images, truths, [trained.threshold])[:, 0]
     discs = [

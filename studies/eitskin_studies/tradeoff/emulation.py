@@ -10,7 +10,7 @@ import numpy as np
 
 from eitskin.errors import UsageError, VerificationError
 from eitskin.tuning.configuration import Configuration
-from eitskin_studies.harness.emulated import (
+from eitskin_emulator.core_on_qemu import (
     BUILD_TOOLS,
     PROGRAM,
     QEMU,

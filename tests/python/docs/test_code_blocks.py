@@ -66,7 +66,9 @@ def test_pages_link_to_files_that_exist():
 
 def test_paths_that_pages_name_exist():
     """Files and folders of the tree, but for those with a placeholder in capitals."""
-    named = re.compile(r"`((?:csrc|python|firmware|studies|tests|scripts|examples|tables)/[\w./-]+)`")
+    named = re.compile(
+        r"`((?:csrc|python|firmware|studies|tests|scripts|examples|tables)/[\w./-]+)`"
+    )
     for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("studies/**/*.md")]:
         for path in named.findall(page.read_text(encoding="utf-8")):
             if not re.search(r"[A-Z]{4}", path):

@@ -16,7 +16,7 @@ from eitskin.arrays import AnyArray
 from eitskin.core.diagnostics_table import STOPS
 from eitskin.core.results import Options
 from eitskin.errors import UsageError
-from eitskin_studies.harness.emulated_steps import (
+from eitskin_emulator.core_steps import (
     Choose,
     Drives,
     Load,

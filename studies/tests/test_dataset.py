@@ -4,16 +4,18 @@ import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from scene_helpers import ELEMENTS, still_scene
 
 from eitskin.errors import ConfigError, FileError, MissingExtraError, UsageError
 from eitskin.scene.compiler import compile_scene
+from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
+from eitskin.scene.touch_path import always
 from eitskin_studies.cli import cmd_dataset
 from eitskin_studies.datasets import dataset
 from eitskin_studies.datasets.dataset import (
@@ -26,6 +28,16 @@ from eitskin_studies.datasets.dataset import (
     write_dataset,
 )
 from eitskin_studies.datasets.ranges import drawn, ranges_of
+
+ELEMENTS = 600  # a coarse mesh
+
+
+def still_scene(**changes: Any) -> Scene:
+    """A touch that stays."""
+    given = {
+        "touches": (always(-30, 20, 10),), "frames": 3, "quiet_frames": 2, "elements": ELEMENTS,
+    }  # fmt: skip
+    return Scene("still", **{**given, **changes})
 
 
 def dataset_command(*arguments: str) -> int:

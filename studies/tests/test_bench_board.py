@@ -7,11 +7,11 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.errors import UsageError
+from eitskin_emulator import core_on_qemu
 from eitskin_studies.benchmarks import board as bench_board
-from eitskin_studies.harness import emulated
 from eitskin_studies.harness.sections import fill_marks
 
-PAGE = Path(__file__).resolve().parents[3] / "studies" / "results" / "board-cost.md"
+PAGE = Path(__file__).resolve().parents[1] / "results" / "board-cost.md"
 
 
 @pytest.fixture(scope="module")
@@ -74,11 +74,11 @@ def test_it_says_what_it_needs(monkeypatch, tmp_path, capsys):
     assert main(["bench", "board", "--frames", "1"]) == 2
     assert main(["bench", "board", "--page", str(tmp_path / "no" / "page.md")]) == 3
     capsys.readouterr()
-    monkeypatch.setattr(emulated, "__file__", str(tmp_path / "a" / "b" / "c" / "d.py"))
+    monkeypatch.setattr(core_on_qemu, "__file__", str(tmp_path / "a" / "b" / "c" / "d.py"))
     monkeypatch.chdir(tmp_path)
     assert main(["bench", "board"]) == 2
     line = capsys.readouterr().err
     assert "source checkout" in line and line.count("\n") == 1
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(UsageError, match="arm-none-eabi-gcc, cmake, ninja"):
-        emulated.need_tools(*emulated.BUILD_TOOLS)
+        core_on_qemu.need_tools(*core_on_qemu.BUILD_TOOLS)
