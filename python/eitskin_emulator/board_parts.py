@@ -36,7 +36,7 @@ from eitskin_emulator.record import Record
 from eitskin_emulator.schedule import Schedule
 from eitskin_emulator.serial_line import SerialLine
 
-# the owner's settings (firmware/app/kept.h, two sectors of 256 KB)
+# the owner's settings (firmware/app/safety/owner_record.h, two sectors of 256 KB)
 PAGES, PAGES_BYTES, RECORD_BYTES, MAGIC = 0x08140000, 0x80000, 32, 0x54455345
 FSYNC_PIN, ENABLE_PIN, MCO_PIN, ADC_PIN, SENSE_PIN = 2, 12, 8, 3, 0
 SCK_PIN, MOSI_PIN, TX_PIN, RX_PIN = 10, 12, 8, 9

@@ -17,7 +17,7 @@ def acquisition_us(one: Configuration, rows: int, unique_rows: int) -> int:
 
 def slot_us(samples: int) -> int:
     """From one measurement to the next: burst, settling, switching; a whole number of excitation
-    periods where that costs at most a quarter more (fw_slot_us in firmware/app/scan.c)."""
+    periods where that costs at most a quarter more (fw_slot_us in firmware/app/acquire/scan.c)."""
     least = samples * SAMPLE_US + SETTLE_US + SWITCH_US
     whole = -(-least // EXCITATION_PERIOD_US) * EXCITATION_PERIOD_US
     return whole if whole <= least + least // 4 else least
