@@ -31,11 +31,11 @@ from typing import Any
 from mutants import ROOT, Mutant
 
 PACKAGE = ROOT / "python"
-ROOMS = ("solve", "device", "frames", "model")
-FOLDERS = (*(f"eitskin/{room}" for room in ROOMS), "eitskin_reference")
-PACKAGES = ("eitskin.", "eitskin_reference.")
+ROOMS = ("solve", "oracle", "device", "frames", "model")
+FOLDERS = tuple(f"eitskin/{room}" for room in ROOMS)
+PACKAGES = ("eitskin.",)
 TESTS = ROOT / "tests" / "python"
-TEST_FOLDERS = (*ROOMS, "reference", "bytes", "core", "calibration")
+TEST_FOLDERS = (*ROOMS, "bytes", "core", "calibration")
 LIBRARIES = (
     "numpy",
     "scipy.sparse.linalg",

@@ -329,7 +329,7 @@ class OracleEngine:
         if coupled:
             o = replace(o, touch_radius_weight=FINAL_RADIUS * o.touch_radius_weight)
         fit = DiscFit(model, seen.s, seen.y, noise, o)
-        starts = fit.peaks(image)
+        starts = self.starts(fit, image)
         if o.touch_sweeps == 0:
             return fit, fit.with_strengths(starts)
         discs = fit.fitted(starts)
@@ -339,6 +339,10 @@ class OracleEngine:
             fit = replace(fit, y=seen.y if much else seen.y - added)
             discs = fit.improved(discs)
         return fit, discs
+
+    def starts(self, fit: DiscFit, image: FloatArray) -> list[Disc]:
+        """Where a fit begins: at the peaks of ``image`` (n,)."""
+        return fit.peaks(image)
 
     def reduced(self, seen: Explained, d: FloatArray) -> FloatArray:
         """Folded data ``d`` (k,) as this frame's are whitened and projected (r,)."""

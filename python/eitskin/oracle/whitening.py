@@ -68,16 +68,16 @@ def _of_physics(model: Model, known: BoolArray, asked: float) -> Whitening:
     """With J_o the known rows of the Jacobian, the metric of their data is (J_o J_o' + mu s_1^2)^-1
     on the range of J_o, scaled so that the strongest direction keeps its weight."""
     assert model.row_form is not None
-    mu, none = model.row_form.mu, np.zeros((model.rank, 0))
+    mu = model.row_form.mu
     of_all = asked if asked > REGULARISATION_KEPT * mu else mu
-    whole = _root_of_metric(model, np.ones_like(known), of_all, 0.0)
+    none = np.zeros((model.rank, 0))
+    if of_all == mu and known.all():
+        return Whitening(model.projection.astype(float), model.sensitivity, mu, 1.0, none)
     stored = float(np.linalg.norm(model.sensitivity.T @ model.projection.astype(float)))
+    whole = _root_of_metric(model, np.ones_like(known), of_all, 0.0)
     all_ratio = whole.noise / stored if of_all > mu else 1.0
     if known.all():
-        data, seen = whole.data, whole.seen
-        if of_all == mu:
-            data, seen = model.projection.astype(float), model.sensitivity
-        return Whitening(data, seen, of_all, all_ratio, none)
+        return Whitening(whole.data, whole.seen, of_all, all_ratio, none)
     left = float(known.mean())
     lowered = max(left**REST_POWER, MIN_REGULARISATION_FRACTION) * mu
     raised = max(lowered, left * asked, MIN_REGULARISATION)
