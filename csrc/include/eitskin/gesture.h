@@ -2,8 +2,8 @@
  * spread, rotate.
  *
  * Each frame's tracked touches go in, in the frame's time; what happened comes out. The caller owns
- * the state, a plain struct; nothing is allocated. Sums have one order and no fma, so that a board,
- * a host and the numpy reference give the same bits. docs/guide/gestures.md says what makes each
+ * the state, a plain struct; nothing is allocated. Sums have one order and no fma, so that a
+ * host and a board give the same bits. docs/guide/gestures.md says what makes each
  * gesture, zone.h which named zones are pressed.
  */
 #ifndef EITSKIN_GESTURE_H

@@ -261,7 +261,7 @@ class OracleEngine:
         solved_ns, unexplained = perf_counter_ns(), 0.0
         reported: tuple[Touch, ...] = ()
         if touches and x.any():
-            fit, discs = self._discs(seen, x * weight, ref)
+            fit, discs = self._discs(seen, x * weight)
             if self.options.second_pass and len(discs) > 1:
                 problem, x, iterations, stop = self._solve(fit.y, seen, lambda_noise)
             left = fit.residual(discs)
@@ -316,25 +316,32 @@ class OracleEngine:
 
     # ---- touches ----
 
-    def _discs(
-        self, seen: Explained, image: FloatArray, ref: Reference
-    ) -> tuple[DiscFit, list[Disc]]:
+    def disc_fit(self, seen: Explained) -> DiscFit:
+        """The fit of discs to a frame's data."""
+        o, ref = self.options, self.reference
+        assert ref is not None
+        each = noise_energy(self.model, seen.folded, ref) / len(seen.folded.d)
+        noise = each * float(np.sum(seen.whitening.data**2)) / self.model.rank
+        if self._interact:
+            o = replace(o, touch_radius_weight=FINAL_RADIUS * o.touch_radius_weight)
+        return DiscFit(self.model, seen.s, seen.y, noise, o)
+
+    @property
+    def _interact(self) -> bool:
+        """Whether what touches do to each other is taken out of the data."""
+        model, wanted = self.model, bool(self.options.touch_fit & INTERACTION)
+        return model.fields is not None and model.data_kind == "difference" and wanted
+
+    def _discs(self, seen: Explained, image: FloatArray) -> tuple[DiscFit, list[Disc]]:
         """Discs from the peaks of ``image`` (n,), fitted to the data less what they do to each
         other, and those data."""
-        o, model = self.options, self.model
-        each = noise_energy(model, seen.folded, ref) / len(seen.folded.d)
-        noise = each * float(np.sum(seen.whitening.data**2)) / model.rank
-        coupled = model.fields is not None and model.data_kind == "difference"
-        coupled = coupled and bool(o.touch_fit & INTERACTION)
-        if coupled:
-            o = replace(o, touch_radius_weight=FINAL_RADIUS * o.touch_radius_weight)
-        fit = DiscFit(model, seen.s, seen.y, noise, o)
+        fit = self.disc_fit(seen)
         starts = self.starts(fit, image)
-        if o.touch_sweeps == 0:
+        if self.options.touch_sweeps == 0:
             return fit, fit.with_strengths(starts)
         discs = fit.fitted(starts)
-        for _ in range(ROUNDS if coupled and len(discs) > 1 else 0):
-            added = self.reduced(seen, interaction(model, discs))
+        for _ in range(ROUNDS if self._interact and len(discs) > 1 else 0):
+            added = self.reduced(seen, interaction(self.model, discs))
             much = added @ added > INTERACTION_MAX * (seen.y @ seen.y)
             fit = replace(fit, y=seen.y if much else seen.y - added)
             discs = fit.improved(discs)

@@ -1,22 +1,20 @@
-"""The fast path on rows in time: touches land, move and lift within a scan; C against numpy."""
+"""The fast path on rows in time: touches land, move and lift within a scan, and are reported soon,
+where they are, and no others; with the same decisions in both widths."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
-from eitskin.core.results import Info, Reconstruction
+from eitskin.core.fast import FastCore, FastTouch
+from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
-from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin_reference.fast.path import FastPath
-from eitskin_reference.row_gains import row_gains
 from eitskin_studies.experiments import fast_path
 from eitskin_studies.experiments.fast_path.scans import Outcome, Player
 from eitskin_studies.experiments.fast_path.states import States, draw_states
@@ -24,65 +22,29 @@ from eitskin_studies.experiments.fast_path.states import States, draw_states
 SEED, ELEMENTS = 5, 3500
 
 
-@cache
-def uncorrected() -> Model:
-    """The prebuilt model, whose fast path reports where its own skin has touches, as the twin does:
-    tests/c/test_fast.c has what the reference makes of places."""
-    model = load_prebuilt()[0]
-    assert model.model_errors is not None
-    return replace(model, model_errors=replace(model.model_errors, places=None))
-
-
 @pytest.fixture(scope="module")
 def solved() -> dict[str, States]:
-    model = uncorrected()
+    model = load_prebuilt()[0]
     return {
         kind: draw_states(model, kind, count, SEED, ELEMENTS)
         for kind, count in (("presses", 2), ("pairs", 1), ("swipes", 1))
     }
 
 
-class Twins(Player):
-    """C and numpy side by side."""
+class Recorder(Player):
+    """What is reported after each drive and each frame."""
 
     def tare(self, v0: np.ndarray, sigma: float, rng: np.random.Generator) -> None:
         super().tare(v0, sigma, rng)
-        lib, ffi, _, context = self.engine.handles
-        learned = ffi.new("eits_reference_info *")
-        lib.eits_get_reference(context, learned)
-        v0 = np.array(ffi.unpack(learned.v0, len(v0)))
-        gains = row_gains(self.model, np.isfinite(v0), learned.gain * v0)[0]
-        self.path, self.off_mm = FastPath(self.model), 0.0
-        self.path.tare(v0, learned.noise_v, learned.gain * gains)
-
-    def both(self, c: list[FastTouch], numpy: list[FastTouch]) -> list[FastTouch]:
-        if self.engine.dtype == np.float64:
-            assert c == numpy
-        assert [(one.id, one.confirmed) for one in c] == [(one.id, one.confirmed) for one in numpy]
-        for one, other in zip(c, numpy, strict=True):
-            off = np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm)
-            self.off_mm = max(self.off_mm, float(off))
-        return c
+        self.reports: list[list[FastTouch]] = []
 
     def drive(self, number: int, volts: np.ndarray, time_s: float) -> list[FastTouch]:
-        drive = number, volts, time_s
-        return self.both(super().drive(*drive), self.path.drive(*drive))
-
-    def aligned(self, frame: np.ndarray) -> AlignedFrame:
-        c, numpy = super().aligned(frame), self.path.aligned(frame)
-        assert (c.explained, c.trusted) == (numpy.explained, numpy.trusted)
-        assert self.engine.dtype == np.float32 or c.volts.tobytes() == numpy.volts.tobytes()
-        return c
-
-    def named(self, found: Info) -> Info:
-        c = super().named(found)
-        assert c.diagnostics == self.path.named(found.diagnostics)
-        return c
+        self.reports.append(super().drive(number, volts, time_s))
+        return self.reports[-1]
 
     def confirm(self, found: Reconstruction) -> list[FastTouch]:
-        info = found.info
-        named = (*info.open_electrodes, *info.bridged_electrodes, *info.noisy_electrodes)
-        return self.both(super().confirm(found), self.path.confirm(found.touches, named))
+        self.reports.append(super().confirm(found))
+        return self.reports[-1]
 
 
 def played(
@@ -126,13 +88,24 @@ def test_touches_are_told_soon_where_they_are_and_no_others(solved, name):
 
 
 @pytest.mark.parametrize("name", [*SCENES, "light press"])
-def test_numpy_has_the_cores_bits_in_double_and_its_decisions_in_single_width(solved, name):
-    """In single width places are within .1 mm, with faults that frames have yet to name 1 mm."""
+def test_single_width_decides_as_double_does(solved, name):
+    """Places are within .1 mm, with faults that frames have yet to name 1 mm; and an id is never
+    given twice, nor taken up again once its touch was gone."""
     kind, make = SCENES[name][:2] if name in SCENES else ("presses", SCENES["sudden press"][1])
-    for width in ("float64", "float32"):
-        twins = Twins(uncorrected(), encode_model(uncorrected()), width)
-        played(make, solved[kind], 0, 60.0 if name in SCENES else 40.0, twins)
-        assert twins.off_mm < (1 if "electrode" in name else 0.1)
+    wide, narrow = (Recorder(*load_prebuilt(), width) for width in ("float64", "float32"))
+    for player in (wide, narrow):
+        played(make, solved[kind], 0, 60.0 if name in SCENES else 40.0, player)
+    assert len(wide.reports) == len(narrow.reports)
+    before, gone = set[int](), set[int]()
+    for here, there in zip(wide.reports, narrow.reports, strict=True):
+        assert [(t.id, t.confirmed) for t in here] == [(t.id, t.confirmed) for t in there]
+        for one, other in zip(here, there, strict=True):
+            off = np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm)
+            assert off < (1 if "electrode" in name else 0.1)
+        now = {t.id for t in here}
+        assert len(now) == len(here) and not now & gone
+        gone |= before - now
+        before = now
 
 
 def test_quiet_frames_keep_their_bits_and_hold_no_touch(solved):
@@ -156,8 +129,6 @@ def test_light_touches_come_from_whole_frames(solved):
 
 def test_a_model_without_fields_has_no_fast_path():
     model = replace(load_prebuilt()[0], fields=None)
-    with pytest.raises(UsageError, match="no fields"):
-        FastPath(model)
     with pytest.raises(UsageError, match="no fields"):
         FastCore(CoreEngine(encode_model(model)))
 
