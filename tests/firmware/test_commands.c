@@ -189,7 +189,7 @@ TEST(test_solver)
     SOLVER(c.solver = 4, 28, 3);
     SOLVER(c.diagnostics = EITS_DIAGNOSTICS_ALL + 1, 36, EITS_DIAGNOSTICS_ALL);
     SOLVER(c.track = 2, 40, 1);
-    const eits_options *options = eits_get_options(b.host.instrument.engine.ctx);
+    const eits_options *options = eits_get_options(b.host.instrument.solve.engine.ctx);
     CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
     CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
     CHECK_EQUAL(options->warm_start, 0);
@@ -266,15 +266,15 @@ TEST(test_sent_again)
         host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
     }
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_REPLY), 0);
-    CHECK(b.host.instrument.tare.taken >= 7);
+    CHECK(b.host.instrument.solve.tare.taken >= 7);
     REPLY(host_reply(&b.host, 6000), EITS_REPLY_OK, 0, 0);
     (void)host_info(&b.host);
     REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
-    const uint32_t scanned = b.host.instrument.last_frame;
+    const uint32_t scanned = b.host.instrument.safety.faults.frame;
     host_forget(&b.host);
     host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
     REPLY(host_reply(&b.host, 6000), EITS_REPLY_OK, 0, 0);
-    CHECK(b.host.instrument.last_frame - scanned <= 1); /* at once */
+    CHECK(b.host.instrument.safety.faults.frame - scanned <= 1); /* at once */
 }
 
 TEST(test_stats_again)
@@ -322,10 +322,10 @@ TEST(test_busy)
           EITS_PACKET_TARE, 0);
     REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 0), EITS_REPLY_OK, 0, 0);
     REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
-    CHECK(!b.host.instrument.reset_wanted);
+    CHECK(!b.host.instrument.link.reset_wanted);
     REPLY(host_plain(&b.host, EITS_PACKET_RESET), EITS_REPLY_OK, 0, 0);
-    CHECK(b.host.instrument.reset_wanted);
-    b.host.instrument.reset_wanted = false;
+    CHECK(b.host.instrument.link.reset_wanted);
+    b.host.instrument.link.reset_wanted = false;
     REPLY(host_reply(&b.host, 8000), EITS_REPLY_OK, 0, 0);
     REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
 }
@@ -354,7 +354,7 @@ TEST(test_bad_bytes)
     CHECK(after.link_overruns > before.link_overruns);
     CHECK(after.link_packets >= before.link_packets + 3);
     CHECK_EQUAL(f->resets, 0);
-    CHECK(!b.host.instrument.reset_wanted);
+    CHECK(!b.host.instrument.link.reset_wanted);
 }
 
 int main(void)

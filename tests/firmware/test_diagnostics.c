@@ -28,7 +28,7 @@ static void test_open_while_nobody_looks(uint16_t every)
     for (uint32_t e = 2; e < 16; e += 6) {
         host_forget(&b.host);
         detach(e, true);
-        const uint32_t before = b.host.instrument.last_frame;
+        const uint32_t before = b.host.instrument.safety.faults.frame;
         host_run(&b.host, 60);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
         CHECK(fault != NULL && fault->index == (int32_t)e && fault->frame <= before + 2);
@@ -112,7 +112,7 @@ TEST(test_outlier)
 TEST(test_switched_off)
 {
     start();
-    const eits_options *o = eits_get_options(b.host.instrument.engine.ctx);
+    const eits_options *o = eits_get_options(b.host.instrument.solve.engine.ctx);
     eits_command_solver solver = {.iterations = o->iterations,
                                   .max_touches = o->max_touches,
                                   .lambda_rel = o->lambda_rel,

@@ -2,7 +2,7 @@
  * with a fault planted in it. */
 #include "steps.h"
 
-#include "app/main_loop.h"
+#include "app/instrument.h"
 #include "app/safety/current_enable.h"
 
 enum { MS = 1000000, ALL = 0xF0000, ROW = 0x3210, NEXT = 0x4321, FULL = 0x2000, RESET = 0x2100 };
@@ -131,10 +131,10 @@ static const char *run(fw_lines_ops ops, bool asked, bool heard)
     fw_instrument_init(instrument, &b.board.board);
     if (asked)
         drive_monitor_heard(&b.board.monitor, b.board.now_ns);
-    (void)fw_drive_on(instrument);
+    (void)fw_current_on(&instrument->safety);
     const uint64_t until_ns = b.board.now_ns + (uint64_t)2000 * MS;
     while (b.board.now_ns < until_ns && b.board.monitor.violation == NULL) {
-        fw_drive_heard(instrument);
+        fw_current_heard(&instrument->safety);
         if (heard)
             drive_monitor_heard(&b.board.monitor, b.board.now_ns);
         if (!fw_instrument_step(instrument))

@@ -2,6 +2,8 @@
  * board says of its last end. */
 #include "steps.h"
 
+#include "app/safety/faults.h"
+
 static uint32_t told(eits_fault code, bool raised)
 {
     uint32_t count = 0;
@@ -86,12 +88,12 @@ TEST(test_multiplexer_bus)
     STREAM(7, 1, 0);
     host_run(&b.host, 30);
     for (uint32_t at = 0; at < 3; ++at) {
-        const uint32_t repeated = b.host.instrument.scan.slots_repeated;
+        const uint32_t repeated = b.host.instrument.acquire.scan.slots_repeated;
         host_forget(&b.host);
         b.board.lines_fail_from = b.board.lines_calls + at;
         b.board.lines_fails = 1;
         host_run(&b.host, 70);
-        CHECK(b.host.instrument.scan.slots_repeated > repeated);
+        CHECK(b.host.instrument.acquire.scan.slots_repeated > repeated);
         CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
         CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
         for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
@@ -134,6 +136,11 @@ TEST(test_bus_at_the_start_of_a_scan)
     CHECK(buses >= 3);
 }
 
+static bool is_raised(eits_fault code)
+{
+    return (fw_faults_raised(&b.host.instrument.safety) >> code & 1u) != 0;
+}
+
 /* So many frames with a fault and then without it: when it rises and goes, each electrode by
  * itself; a frame in between begins the count anew. */
 TEST(test_hysteresis)
@@ -146,39 +153,39 @@ TEST(test_hysteresis)
                  {EITS_FAULT_MODEL_MISMATCH, 3}, {EITS_FAULT_STALE_REFERENCE, 3},
                  {EITS_FAULT_UNLIKE_MODEL, 3}};
     bench_start(&b, NULL);
-    fw_faults *faults = &b.host.instrument.faults;
+    fw_safety *safety = &b.host.instrument.safety;
     for (size_t k = 0; IN_TABLE(k, kinds); ++k) {
         const eits_fault code = kinds[k].code;
         const fw_fault_detail detail = {.index = 9, .value = 5};
         for (uint32_t frame = 1; frame < kinds[k].shown; ++frame)
-            fw_fault_observe(faults, code, true, detail);
-        CHECK(!fw_fault_is(faults, code));
+            fw_fault_observe(safety, code, true, detail);
+        CHECK(!is_raised(code));
         if (kinds[k].shown > 1)
-            fw_fault_observe(faults, code, false, detail);
+            fw_fault_observe(safety, code, false, detail);
         for (uint32_t frame = 1; frame <= kinds[k].shown; ++frame) {
-            CHECK(!fw_fault_is(faults, code));
-            fw_fault_observe(faults, code, true, detail);
+            CHECK(!is_raised(code));
+            fw_fault_observe(safety, code, true, detail);
         }
-        CHECK(fw_fault_is(faults, code));
+        CHECK(is_raised(code));
         for (uint32_t again = 0; again < 2; ++again) {
             for (uint32_t frame = 1; frame < EITS_FAULT_CLEAR_FRAMES; ++frame)
-                fw_fault_observe(faults, code, false, detail);
-            CHECK(fw_fault_is(faults, code));
+                fw_fault_observe(safety, code, false, detail);
+            CHECK(is_raised(code));
             if (again == 0)
-                fw_fault_observe(faults, code, true, detail);
+                fw_fault_observe(safety, code, true, detail);
         }
-        fw_fault_observe(faults, code, false, detail);
-        CHECK(!fw_fault_is(faults, code));
+        fw_fault_observe(safety, code, false, detail);
+        CHECK(!is_raised(code));
         host_run(&b.host, 5);
         CHECK_EQUAL(told(code, true), 1);
         CHECK_EQUAL(told(code, false), 1);
         CHECK_EQUAL(host_fault(&b.host, code, true, 0)->value, 5);
     }
     for (int32_t e = 0; e < 16; e += 15)
-        fw_fault_observe(faults, EITS_FAULT_BRIDGED, true, (fw_fault_detail){.index = e});
-    CHECK_EQUAL(faults->there[EITS_FAULT_BRIDGED], 1u << 15 | 1u);
-    fw_faults_clear(faults, 0);
-    CHECK_EQUAL(faults->raised, 0);
+        fw_fault_observe(safety, EITS_FAULT_BRIDGED, true, (fw_fault_detail){.index = e});
+    CHECK_EQUAL(safety->faults.there[EITS_FAULT_BRIDGED], 1u << 15 | 1u);
+    fw_faults_clear(safety);
+    CHECK_EQUAL(fw_faults_raised(safety), 0);
 }
 
 TEST(test_watchdog_is_fed)

@@ -2,6 +2,8 @@
  * back-pressure. */
 #include "steps.h"
 
+#include "app/solve/tare.h"
+
 #include "context/context.h"
 
 /* The core as a host runs it beside the board, on the frames that the board sends. */
@@ -23,9 +25,9 @@ static void mirror_start(uint32_t untouched)
     CHECK_OK(eits_init(mirror.workspace, eits_workspace_size(&b.open, 0), &b.open, &mirror.ctx));
     eits_options options = *eits_get_options(mirror.ctx);
     CHECK_OK(eits_options_track(&options)); /* as the firmware does */
-    options.noise_floor_v = eits_get_options(b.host.instrument.engine.ctx)->noise_floor_v;
+    options.noise_floor_v = eits_get_options(b.host.instrument.solve.engine.ctx)->noise_floor_v;
     options.warm_start = 1; /* of both, so that a frame depends on those before it */
-    b.host.instrument.engine.ctx->options.warm_start = 1;
+    b.host.instrument.solve.engine.ctx->options.warm_start = 1;
     CHECK_OK(eits_set_options(mirror.ctx, &options));
     if (untouched > 1)
         CHECK_OK(eits_reference_begin(mirror.ctx, untouched));
@@ -137,11 +139,11 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     TARE(untouched);
     STREAM(15, every, 0);
     mirror_follow();
-    CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.99f);
-    CHECK(same_bits(mirror.ctx->reference.v0, b.host.instrument.engine.ctx->reference.v0,
+    CHECK(b.host.instrument.solve.engine.ctx->reference.correlation > 0.99f);
+    CHECK(same_bits(mirror.ctx->reference.v0, b.host.instrument.solve.engine.ctx->reference.v0,
                     4 * b.open.n_rows));
     CHECK(same_bits(&mirror.ctx->reference.lambda_noise,
-                    &b.host.instrument.engine.ctx->reference.lambda_noise, 4));
+                    &b.host.instrument.solve.engine.ctx->reference.lambda_noise, 4));
     const uint32_t ms = busy_ms > 0 ? 1500 : 150;
     touch(2, -3, 4);
     host_run(&b.host, ms);
@@ -181,8 +183,8 @@ TEST(test_phase_of_the_voltages)
         b.board.extra_turn = k / 9.0;
         STREAM(EITS_STREAM_RAW, 1, 0);
         TARE(8);
-        CHECK_NEAR(b.host.instrument.engine.ctx->reference.gain, 1, 1e-3);
-        CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.9999f);
+        CHECK_NEAR(b.host.instrument.solve.engine.ctx->reference.gain, 1, 1e-3);
+        CHECK(b.host.instrument.solve.engine.ctx->reference.correlation > 0.9999f);
         host_run(&b.host, 3000); /* the generator, 12 mHz off, would turn by 13 degrees */
         CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 1) <= 0.5);
         /* what turns after the tare is not followed: half of a voltage is left */
@@ -231,14 +233,14 @@ TEST(test_back_pressure)
     bench_start(&b, &SKIN_ADJACENT);
     TARE(1);
     STREAM(7, 1, 0);
-    const uint32_t sent = b.host.instrument.tx_queue.sent;
+    const uint32_t sent = b.host.instrument.link.tx_queue.sent;
     b.host.gaps = 0;
     b.board.host_room = 3000;
     host_run(&b.host, 200);
-    const uint32_t frames = b.host.instrument.last_frame;
+    const uint32_t frames = b.host.instrument.safety.faults.frame;
     b.board.host_room = SIZE_MAX;
     host_run(&b.host, 200);
-    CHECK(b.host.instrument.last_frame >= frames + 9);
+    CHECK(b.host.instrument.safety.faults.frame >= frames + 9);
     const eits_packet_stats stats = host_stats(&b.host, 0);
     CHECK(stats.packets_dropped >= 15);
     CHECK_EQUAL(b.host.gaps, stats.packets_dropped);
@@ -253,7 +255,7 @@ TEST(test_failed_tare)
     TARE(16);
     STREAM(EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0);
     mirror_start(0);
-    const fw_engine *engine = &b.host.instrument.engine;
+    const fw_engine *engine = &b.host.instrument.solve.engine;
     static float v0[256];
     memcpy(v0, engine->ctx->reference.v0, sizeof(float) * 208);
     const eits_reference before = engine->ctx->reference;
@@ -345,8 +347,8 @@ TEST(test_tare_begins_with_the_command)
 {
     static const uint32_t commands[] = {1000, 0, 0xFFFFFFFFu, 0x80000000u};
     for (int k = 0; k < 4; ++k) {
-        const fw_tare tare = {.active = true, .since_us = commands[k]},
-                      over = {.since_us = commands[k]};
+        const fw_solve tare = {.tare = {.active = true, .since_us = commands[k]}},
+                       over = {.tare = {.since_us = commands[k]}};
         for (int late = -2; late <= 2; ++late) {
             const fw_frame frame = {.time_us = commands[k] + (uint32_t)late};
             CHECK_EQUAL(fw_tare_wants(&tare, &frame), late >= 0);

@@ -98,7 +98,7 @@ static void test_open(bool tared, uint16_t check_every)
         }
         detach(e, false);
         /* the frame under way may still be without it */
-        const uint32_t back = b.host.instrument.last_frame + 1;
+        const uint32_t back = b.host.instrument.safety.faults.frame + 1;
         host_run(&b.host, 300);
         const eits_packet_fault *gone = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0);
         CHECK(gone != NULL && gone->index == (int32_t)e);
@@ -117,12 +117,12 @@ TEST(test_two_open)
         b.sheet.detached[3] = true;
         detach(other, true);
         host_run(&b.host, 60);
-        CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN],
+        CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN],
                     1u << 3 | 1u << other);
         b.sheet.detached[3] = false;
         detach(other, false);
         host_run(&b.host, 300);
-        CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
+        CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
     }
 }
 
@@ -139,7 +139,7 @@ TEST(test_open_at_the_rail)
     tare();
     b.board.volts = to_the_rail;
     host_run(&b.host, 60);
-    CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 6);
+    CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 6);
     const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_SATURATED, true, 0);
     CHECK(fault != NULL);
 }
@@ -182,7 +182,7 @@ TEST(test_masked_row_is_not_judged)
     }
     detach(5, true);
     host_run(&b.host, 60);
-    CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 5);
+    CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 5);
 }
 
 /* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half
@@ -200,7 +200,7 @@ static void test_touches_are_not_open(bool tared)
                         factors[f]);
             sheet_solve(&b.sheet);
             host_run(&b.host, 45);
-            CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
+            CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
         }
     }
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);

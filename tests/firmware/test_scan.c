@@ -24,7 +24,7 @@ static void test_order(const skin_spec *spec, uint32_t rows)
     CHECK_EQUAL(b.open.scan_order[13], spec->order == 7 ? 7 * 13 : 13);
     CHECK_EQUAL(wrong, 0);
     CHECK(b.board.monitor.violation == NULL);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, 0);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.slots_repeated, 0);
     CHECK_EQUAL(b.board.setup.slot_us, 100);
 }
 
@@ -76,20 +76,20 @@ TEST(test_late_switch)
     bench_start(&b, &SKIN_ADJACENT);
     STREAM(EITS_STREAM_RAW, 1, 0);
     host_run(&b.host, 30);
-    const uint32_t before = b.host.instrument.scan.slots_repeated;
+    const uint32_t before = b.host.instrument.acquire.scan.slots_repeated;
     b.board.late_once_ns = 5000; /* of 20 us from burst to burst, 16 are for settling */
     host_run(&b.host, 2);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 1);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.slots_repeated, before + 1);
     /* made 84.3 us after the slot's start: 15.7 us, though the clock says 84 */
     b.board.late_once_ns = 3440;
     host_run(&b.host, 2);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 2);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.slots_repeated, before + 2);
     b.board.late_once_ns = 2900; /* 16.2 us */
     host_run(&b.host, 2);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 2);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.slots_repeated, before + 2);
     b.board.lose = 2;
     host_run(&b.host, 2);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 4);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.slots_repeated, before + 4);
     host_run(&b.host, 60);
     const host_packet *packet = NULL;
     for (uint32_t k = 0; (packet = host_packet_of(&b.host, EITS_PACKET_RAW, k)) != NULL; ++k)

@@ -163,7 +163,7 @@ TEST(test_time_and_restart)
     const eits_command_plain reset = {.request = 500};
     send(&a, EITS_PACKET_RESET, &reset, sizeof reset);
     CHECK_EQUAL(a.sim.now_us, us);
-    CHECK(!a.sim.instrument.engine.tared && a.sim.instrument.engine.open);
+    CHECK(!a.sim.instrument.solve.engine.tared && a.sim.instrument.solve.engine.open);
     stream(&a, EITS_STREAM_RAW, 1);
     CHECK_EQUAL(scan(&a), UNTOUCHED + FRAMES - 1);
     CHECK(!sim_wants_frame(&a.sim));
@@ -258,9 +258,9 @@ TEST(test_frames_given)
 {
     float given[2 * ROWS] = {0};
     start_given(&a, 20000, true);
-    CHECK_EQUAL(a.sim.instrument.engine.open, true);
+    CHECK_EQUAL(a.sim.instrument.solve.engine.open, true);
     /* nothing is known of a converter, so that its steps bound no noise from below */
-    CHECK(eits_get_options(a.sim.instrument.engine.ctx)->noise_floor_v == 0);
+    CHECK(eits_get_options(a.sim.instrument.solve.engine.ctx)->noise_floor_v == 0);
     stream(&a, EITS_STREAM_RAW, 0);
     for (uint32_t i = 0; i < ROWS; ++i)
         given[2 * i] = 1e3f * volts[i] + 1e-7f;
@@ -270,14 +270,14 @@ TEST(test_frames_given)
     collect(&a);
     CHECK_EQUAL(a.raws, 2);
     CHECK_EQUAL(a.head.time_us, 44000);
-    CHECK_EQUAL(a.sim.instrument.settings.frame_period_us, 22000);
+    CHECK_EQUAL(a.sim.instrument.acquire.settings.frame_period_us, 22000);
     for (uint32_t i = 0; i < ROWS; ++i)
         CHECK(i == 3 ? isnan(a.raw[i]) : fabsf(a.raw[i]) == fabsf(given[2 * i]));
     const uint32_t stalled = 1u << EITS_FAULT_SCAN_STALLED;
     sim_let_pass(&a.sim, 1000000);
-    CHECK((a.sim.instrument.faults.raised & stalled) != 0);
+    CHECK((a.sim.instrument.safety.faults.raised & stalled) != 0);
     sim_give_frame(&a.sim, given, 20000, 22000);
-    CHECK((a.sim.instrument.faults.raised & stalled) == 0);
+    CHECK((a.sim.instrument.safety.faults.raised & stalled) == 0);
     const eits_command_scan scan = {.request = 900,
                                     .excitation_millihz = 50000000,
                                     .sample_rate_hz = 1000000,
@@ -285,14 +285,15 @@ TEST(test_frames_given)
                                     .settle_us = 16,
                                     .check_every = 1};
     send(&a, EITS_PACKET_SCAN, &scan, sizeof scan);
-    CHECK_EQUAL(a.sim.instrument.reply.status, EITS_REPLY_RANGE);
+    CHECK_EQUAL(a.sim.instrument.link.replies.reply.status, EITS_REPLY_RANGE);
     collect(&a);
     const uint32_t raws = a.raws;
     sim_give_frame(&a.sim, given, 20000, 22000);
     collect(&a);
     CHECK_EQUAL(a.raws, raws + 1);
-    fw_engine_close(&a.sim.instrument.engine); /* without a model there is nothing to give to */
-    fw_stop_scan(&a.sim.instrument);
+    fw_engine_close(
+        &a.sim.instrument.solve.engine); /* without a model there is nothing to give to */
+    fw_acquire_stop(&a.sim.instrument.acquire);
     sim_give_frame(&a.sim, given, 20000, 22000);
     collect(&a);
     CHECK_EQUAL(a.raws, raws + 1);

@@ -1,7 +1,7 @@
 /* Starting: without a model, on another model than before, and how the main loop ends. */
 #include "steps.h"
 
-#include "app/main_loop.h"
+#include "app/instrument.h"
 
 TEST(test_no_model)
 {
@@ -85,7 +85,8 @@ TEST(test_starts_and_ends)
     CHECK(memcmp(info->serial, "00112233445566778899AABB", 24) == 0);
     CHECK_EQUAL(info->excitation_millihz, 50000012);
     CHECK_EQUAL(info->volts_per_code_nv, 805664);
-    CHECK_NEAR(eits_get_options(b.host.instrument.engine.ctx)->noise_floor_v, 73.547e-6, 1e-9);
+    CHECK_NEAR(eits_get_options(b.host.instrument.solve.engine.ctx)->noise_floor_v, 73.547e-6,
+               1e-9);
     CHECK_EQUAL(info->slot_us, 100);
     fake_restart(&b.board);
     b.board.ended = true;

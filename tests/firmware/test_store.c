@@ -201,9 +201,9 @@ TEST(test_offsets)
     /* left for ten seconds: the old model goes on; then the host comes back and goes on where it
      * was */
     host_run(&b.host, 9000);
-    CHECK_EQUAL(b.host.instrument.scan.running, 0);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.running, 0);
     host_run(&b.host, 1500);
-    CHECK_EQUAL(b.host.instrument.scan.running, 1);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.running, 1);
     TARE(1);
     reply = begin_with(size, opposite.crc);
     TAKEN(reply);

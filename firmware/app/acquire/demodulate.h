@@ -8,12 +8,8 @@
 #ifndef FW_DEMODULATE_H
 #define FW_DEMODULATE_H
 
+#include "app/acquire/frame.h"
 #include "hal/hal.h"
-
-/* volts at the electrodes: amplitude times cosine and sine of the phase */
-typedef struct fw_iq {
-    float i, q;
-} fw_iq;
 
 typedef struct fw_demodulator {
     uint32_t samples;

@@ -1,11 +1,7 @@
 #include "app/acquire/scan.h"
 
+#include "app/clock.h"
 #include "eitskin/link.h"
-
-static uint32_t now_us(const fw_scan *scan)
-{
-    return scan->board->system->time_us(scan->board->system_ctx);
-}
 
 void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *demodulator)
 {
@@ -50,7 +46,7 @@ static void switch_to(fw_scan *scan, uint32_t position)
     const uint8_t *electrodes = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, position);
     scan->position = position;
     scan->switched = fw_adg1206_select(&scan->mux, electrodes) == FW_OK;
-    scan->switched_us = now_us(scan);
+    scan->switched_us = fw_now_us(scan->board);
 }
 
 static bool same_drive(const fw_scan *scan, uint32_t position, uint32_t other)
@@ -138,7 +134,7 @@ static void end_frame(fw_scan *scan, uint32_t start_us)
 static void on_burst(void *user, const fw_burst *burst)
 {
     fw_scan *scan = user;
-    const uint32_t entered_us = now_us(scan);
+    const uint32_t entered_us = fw_now_us(scan->board);
     atomic_fetch_add_explicit(&scan->bursts, 1, memory_order_relaxed);
     /* the clock was read after the switch and rounded down: one more microsecond makes it sure */
     const bool settled = scan->switched && (int32_t)(burst->start_us - scan->switched_us) >
@@ -176,7 +172,7 @@ static void on_burst(void *user, const fw_burst *burst)
         frame->z[row] = (fw_iq){0, 0};
         frame->quality[row] = EITS_QUALITY_UNSETTLED;
     }
-    frame->busy_us += now_us(scan) - entered_us;
+    frame->busy_us += fw_now_us(scan->board) - entered_us;
     if (drive_ends)
         tell_drive(scan, position, burst->start_us, last);
     if (last)
@@ -212,7 +208,7 @@ fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const f
         return status;
     plan_frame(scan);
     switch_to(scan, 0);
-    scan->watched_us = now_us(scan);
+    scan->watched_us = fw_now_us(scan->board);
     scan->watched_bursts = atomic_load(&scan->bursts);
     status = scan->switched ? capture->ops->start(capture->ctx) : FW_E_BUS;
     scan->running = status == FW_OK;

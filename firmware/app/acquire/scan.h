@@ -8,6 +8,7 @@
 #define FW_SCAN_H
 
 #include "app/acquire/demodulate.h"
+#include "app/acquire/frame.h"
 #include "drivers/adg1206.h"
 #include "hal/hal.h"
 
@@ -18,52 +19,6 @@
 #define FW_MIN_RATE_HZ 1000u
 #define FW_MAX_RATE_HZ 5000000u
 
-typedef struct fw_scan_settings {
-    uint32_t excitation_millihz, sample_rate_hz;
-    uint32_t samples, settle_us;
-    /* 1: every frame is full; n > 1: reciprocal-unique, every n-th full; 0: never full */
-    uint32_t check_every;
-    uint32_t frame_period_us; /* 0: as fast as it goes */
-} fw_scan_settings;
-
-#define FW_SCAN_DEFAULT               \
-    {.excitation_millihz = 50000000u, \
-     .sample_rate_hz = 1000000u,      \
-     .samples = 80,                   \
-     .settle_us = 16,                 \
-     .check_every = 1}
-
-typedef struct fw_frame {
-    uint32_t number, time_us; /* when its first burst began */
-    uint32_t scan_us;         /* until its last burst ended */
-    uint32_t end_us;          /* time_us + scan_us */
-    uint32_t busy_us;         /* spent in the interrupt */
-    uint32_t bus_errors;      /* multiplexers that could not be switched */
-    uint16_t flags;           /* EITS_RAW_RECIPROCAL or EITS_RAW_CHECK */
-    fw_iq *z;                 /* n_rows */
-    float *volts;             /* n_rows, and right behind it: */
-    uint8_t *quality;         /* n_rows */
-} fw_frame;
-
-/* What is measured: rows of a protocol, and those that are left when reciprocals are taken as
- * known. */
-typedef struct fw_scan_table {
-    const uint8_t *protocol; /* n_rows x 4 */
-    uint32_t n_rows;
-    const uint16_t *order;  /* n_rows, as they are measured; NULL: as they stand */
-    const uint16_t *unique; /* n_unique rows, as they are measured */
-    uint32_t n_unique;
-} fw_scan_table;
-
-/* The rows of a drive, measured; they are the places `first` on of its frame. */
-typedef struct fw_scan_drive {
-    uint32_t frame, first, count;
-    uint32_t time_us; /* the middle, were no measurement repeated */
-    uint32_t end_us;
-    const fw_iq *z; /* of the frame */
-    const uint8_t *quality;
-    bool last; /* of the frame */
-} fw_scan_drive;
 #define FW_SCAN_DRIVES 32u
 
 typedef struct fw_scan {

@@ -3,7 +3,7 @@
 #ifndef FW_ENGINE_H
 #define FW_ENGINE_H
 
-#include "app/acquire/scan.h"
+#include "app/acquire/frame.h"
 #include "eitskin/eitskin.h"
 #include "hal/hal.h"
 

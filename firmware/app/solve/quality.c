@@ -1,5 +1,7 @@
 #include "app/solve/quality.h"
 
+#include "drivers/adg1206.h"
+
 #include <math.h>
 #include <string.h>
 

@@ -160,33 +160,34 @@ TEST(test_cuts)
         store = b.board.board.store;
         uint32_t done = 0;
         for (; done < 7; ++done)
-            CHECK_EQUAL(fw_kept_save(&store, done, 100 + done), FW_OK);
+            CHECK_EQUAL(fw_owner_record_save(&store, done, 100 + done), FW_OK);
         b.board.cut_at = b.board.flash_steps + step;
         saved = done;
         if (setjmp(b.board.cut) == 0) {
             for (; saved < 14; ++saved)
-                (void)fw_kept_save(&store, saved, 100 + saved);
+                (void)fw_owner_record_save(&store, saved, 100 + saved);
         }
         b.board.cut_at = 0;
-        const fw_kept kept = fw_kept_load(&store);
-        CHECK(kept.magic == FW_KEPT_MAGIC && kept.current_limit_ua_rms == 100 + kept.settings);
+        const fw_owner_record kept = fw_owner_record_load(&store);
+        CHECK(kept.magic == FW_OWNER_RECORD_MAGIC &&
+              kept.current_limit_ua_rms == 100 + kept.settings);
         CHECK(kept.settings + 1 == saved || kept.settings == saved);
         for (uint32_t more = 20; more < 40; ++more) { /* and it goes on */
-            CHECK_EQUAL(fw_kept_save(&store, more, 100 + more), FW_OK);
-            CHECK_EQUAL(fw_kept_load(&store).settings, more);
+            CHECK_EQUAL(fw_owner_record_save(&store, more, 100 + more), FW_OK);
+            CHECK_EQUAL(fw_owner_record_load(&store).settings, more);
         }
         CHECK_EQUAL(b.board.rewrites, 0);
     }
     store.page_bytes = 0;
-    CHECK_EQUAL(fw_kept_save(&store, 1, 1), FW_E_RANGE);
-    CHECK_EQUAL(fw_kept_load(&store).magic, 0);
+    CHECK_EQUAL(fw_owner_record_save(&store, 1, 1), FW_E_RANGE);
+    CHECK_EQUAL(fw_owner_record_load(&store).magic, 0);
 }
 
 TEST(test_limit)
 {
     start_unheard();
     TAKEN(set(0, EITS_LIMIT_KEPT));
-    CHECK_EQUAL(fw_kept_load(&b.board.board.store).current_limit_ua_rms, 0);
+    CHECK_EQUAL(fw_owner_record_load(&b.board.board.store).current_limit_ua_rms, 0);
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 437); /* 1.25 times 350 */
     b.board.current_ua = 500;
     STREAM(EITS_STREAM_RAW, 1, 0);
