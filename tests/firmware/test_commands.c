@@ -225,13 +225,19 @@ TEST(test_mask_row)
 {
     REPLY(mask_row(208, 1), EITS_REPLY_RANGE, 4, 207);
     REPLY(mask_row(207, 2), EITS_REPLY_RANGE, 6, 1);
-    for (uint16_t bad = 1; bad < 2; --bad) {
-        REPLY(mask_row(207, bad), EITS_REPLY_OK, 0, 0);
+    const struct {
+        const char *name;
+        uint16_t masked;
+        uint8_t quality;
+    } cases[] = {{"masked", 1, EITS_QUALITY_MASKED}, {"not masked", 0, 0}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
+        REPLY(mask_row(207, cases[k].masked), EITS_REPLY_OK, 0, 0);
         REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 2), EITS_REPLY_OK, 0, 0);
         host_run(&b.host, 70);
         const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
-        CHECK_EQUAL(raw_quality(packet, 207), bad ? EITS_QUALITY_MASKED : 0);
-        CHECK_EQUAL(isnan(raw_volts(packet, 207)) != 0, bad);
+        CHECK_EQUAL(raw_quality(packet, 207), cases[k].quality);
+        CHECK_EQUAL(isnan(raw_volts(packet, 207)) != 0, cases[k].masked);
     }
 }
 

@@ -130,22 +130,32 @@ TEST(test_lock)
     bench_restart(&b);
     CHECK_EQUAL(host_info(&b.host).settings, EITS_SETTING_LOCKED);
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 400);
+    const struct {
+        const char *name;
+        bool button;
+        uint16_t status;
+        bool reported;
+        uint32_t settings; /* afterwards */
+    } cases[] = {
+        {"button not held", false, EITS_REPLY_LOCKED, true, EITS_SETTING_LOCKED},
+        {"button held", true, EITS_REPLY_OK, false, EITS_SETTING_SENSE},
+    };
     eits_command_model_begin begin = {0, 64, 0};
     eits_command_scan scan = host_default_scan();
-    for (int held = 0; held < 2; ++held) {
-        b.board.button = held != 0;
-        const uint16_t wanted = held ? EITS_REPLY_OK : EITS_REPLY_LOCKED;
+    scan.excitation_millihz = 25000000;
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
+        b.board.button = cases[k].button;
         host_forget(&b.host);
-        scan.excitation_millihz = 25000000;
-        CHECK_EQUAL(scan_with(scan).status, wanted);
+        CHECK_EQUAL(scan_with(scan).status, cases[k].status);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_LOCKED, true, 0);
-        CHECK((fault != NULL) == !held);
+        CHECK_EQUAL(fault != NULL, cases[k].reported);
         CHECK(fault == NULL || fault->index == EITS_PACKET_SCAN);
         CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MODEL_BEGIN, &begin, sizeof begin).status,
-                    wanted);
-        host_run(&b.host, 11000); /* the upload is given up */
-        CHECK_EQUAL(set(EITS_SETTING_SENSE, 0).status, wanted);
-        CHECK_EQUAL(host_info(&b.host).settings, held ? EITS_SETTING_SENSE : EITS_SETTING_LOCKED);
+                    cases[k].status);
+        host_run(&b.host, 11000); /* the upload times out */
+        CHECK_EQUAL(set(EITS_SETTING_SENSE, 0).status, cases[k].status);
+        CHECK_EQUAL(host_info(&b.host).settings, cases[k].settings);
     }
 }
 
@@ -254,20 +264,28 @@ TEST(test_resets_are_reported)
 /* Examples of FIPS 180-2, appendix B, and lengths about a block. */
 TEST(test_sha256)
 {
-    static const uint8_t EMPTY[4] = {0xe3, 0xb0, 0xc4, 0x42}, ABC[4] = {0xba, 0x78, 0x16, 0xbf},
-                         TWO[4] = {0x24, 0x8d, 0x6a, 0x61}, MANY[4] = {0xcd, 0xc7, 0x6e, 0x5c};
-    static const char text[] = "abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq";
-    static uint8_t a[1000000];
-    uint8_t digest[32];
-    fw_sha256(NULL, 0, digest);
-    CHECK(memcmp(digest, EMPTY, 4) == 0);
-    fw_sha256((const uint8_t *)"abc", 3, digest);
-    CHECK(memcmp(digest, ABC, 4) == 0);
-    fw_sha256((const uint8_t *)text, sizeof text - 1, digest);
-    CHECK(memcmp(digest, TWO, 4) == 0);
-    memset(a, 'a', sizeof a);
-    fw_sha256(a, sizeof a, digest);
-    CHECK(memcmp(digest, MANY, 4) == 0);
+    static uint8_t million[1000000];
+    memset(million, 'a', sizeof million);
+    const struct {
+        const char *name;
+        const void *bytes;
+        size_t size;
+        uint8_t digest[4]; /* its beginning */
+    } cases[] = {
+        {"no bytes", NULL, 0, {0xe3, 0xb0, 0xc4, 0x42}},
+        {"three bytes", "abc", 3, {0xba, 0x78, 0x16, 0xbf}},
+        {"two blocks",
+         "abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq",
+         56,
+         {0x24, 0x8d, 0x6a, 0x61}},
+        {"a million times a", million, sizeof million, {0xcd, 0xc7, 0x6e, 0x5c}},
+    };
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        uint8_t digest[32];
+        CASE(cases[k].name);
+        fw_sha256(cases[k].bytes, cases[k].size, digest);
+        CHECK(memcmp(digest, cases[k].digest, 4) == 0);
+    }
 }
 
 TEST(test_hashes)

@@ -6,6 +6,7 @@
 #include "fake_board.h"
 
 #include <math.h>
+#include <string.h>
 
 #define TURN 6.283185307179586
 
@@ -72,13 +73,18 @@ TEST(test_scale)
 TEST(test_amplitudes)
 {
     const struct {
+        const char *name;
         uint32_t millihertz, rate, samples;
         double steps;
-    } cases[] = {{50000000, 1000000, 80, 0.45},   {50000000, 1000000, 20, 0.45},
-                 {30000000, 1000000, 100, 0.3},   {250000000, 1000000, 64, 0.64},
-                 {125000000, 2000000, 1024, 0.5}, {1000000, 27000, 27, 0.3}};
+    } cases[] = {{"as after a start", 50000000, 1000000, 80, 0.45},
+                 {"one period", 50000000, 1000000, 20, 0.45},
+                 {"3 periods of 33.3 samples", 30000000, 1000000, 100, 0.3},
+                 {"4 samples per period", 250000000, 1000000, 64, 0.64},
+                 {"the longest burst", 125000000, 2000000, 1024, 0.5},
+                 {"an odd number of samples", 1000000, 27000, 27, 0.3}};
     const double lsb_v = 3.3 / 4096;
-    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; ++n) {
+    for (size_t n = 0; IN_TABLE(n, cases); ++n) {
+        CASE(cases[n].name);
         const uint32_t tuning = fw_ad9833_tuning(8000000, cases[n].millihertz);
         CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, tuning, cases[n].millihertz,
                                         cases[n].rate, cases[n].samples),
@@ -110,7 +116,7 @@ TEST(test_phase_followed)
                              4294967200u,
                              4294967296u + 100u,
                              5 * 4294967296u + 12345u};
-    for (size_t k = 0; k < sizeof when / sizeof when[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, when); ++k) {
         const double turns =
             (double)((unsigned __int128)when[k] * tuning * 8u % 268435456u) / 268435456.0;
         fw_iq z;
@@ -162,15 +168,21 @@ TEST(test_phase_from_either_row)
                                       {.first = 2, .second = 3, .sign = -1}};
     static const float V_REF[2] = {2, -1};
     static const float volts[4] = {2, 2, -1, 1};
-    for (int lost = 0; lost < 3; ++lost) {
+    const struct {
+        const char *name;
+        uint8_t quality[4];
+    } cases[] = {{"first rows are lost", {1, 0, 1, 0}},
+                 {"second rows are lost", {0, 1, 0, 1}},
+                 {"no row is lost", {0}}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
         for (int turn = 0; turn < 16; ++turn) {
             const double angle = TURN * (turn + 0.25) / 16;
             fw_iq z[4];
-            uint8_t quality[4] = {0};
-            for (int i = 0; i < 4; ++i) {
+            uint8_t quality[4];
+            memcpy(quality, cases[k].quality, sizeof quality);
+            for (int i = 0; i < 4; ++i)
                 z[i] = (fw_iq){(float)(volts[i] * cos(angle)), (float)(volts[i] * sin(angle))};
-                quality[i] = lost < 2 && i % 2 == lost;
-            }
             fw_engine engine = {.model = {.n_rows = 4, .n_folded = 2, .fold = FOLD, .v_ref = V_REF},
                                 .cosine = 1};
             const fw_frame frame = {.z = z, .quality = quality};

@@ -94,7 +94,7 @@ static void mirror_events(const host_packet *packet)
 }
 
 /* Take the packets that have come since the last call. */
-static void mirror_follow(void)
+static void mirror_catch_up(void)
 {
     for (; mirror.taken < b.host.packets; ++mirror.taken) {
         const host_packet *packet = &b.host.packet[mirror.taken];
@@ -124,48 +124,55 @@ static void mirror_follow(void)
 
 /* Images and touches have the bits of the core run on the frames that were sent; warm starts
  * included, whatever is masked. */
-static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t every,
-                           uint16_t check_every, uint32_t busy_ms)
+typedef struct stream_case {
+    const char *name;
+    const skin_spec *spec;
+    uint32_t untouched;
+    uint16_t every, check_every;
+    uint32_t busy_ms, run_ms; /* of each write; of each part of the test */
+} stream_case;
+
+static void test_same_bits(const stream_case *c)
 {
-    bench_start(&b, spec);
+    CASE(c->name);
+    bench_start(&b, c->spec);
     b.board.noise_codes = 2;
-    b.board.write_cost_ns = busy_ms * 1000000u; /* meanwhile the scan goes on, as far as it may */
-    if (check_every != 1) {
-        check_each(check_every);
-    }
+    b.board.write_cost_ns =
+        c->busy_ms * 1000000u; /* meanwhile the scan goes on, as far as it may */
+    if (c->check_every != 1)
+        check_each(c->check_every);
     STREAM(EITS_STREAM_RAW, 1, 0);
     host_forget(&b.host);
-    mirror_start(untouched);
-    TARE(untouched);
-    STREAM(15, every, 0);
-    mirror_follow();
+    mirror_start(c->untouched);
+    TARE(c->untouched);
+    STREAM(15, c->every, 0);
+    mirror_catch_up();
     CHECK(b.host.instrument.solve.engine.ctx->reference.correlation > 0.99f);
     CHECK(same_bits(mirror.ctx->reference.v0, b.host.instrument.solve.engine.ctx->reference.v0,
                     4 * b.open.n_rows));
     CHECK(same_bits(&mirror.ctx->reference.lambda_noise,
                     &b.host.instrument.solve.engine.ctx->reference.lambda_noise, 4));
-    const uint32_t ms = busy_ms > 0 ? 1500 : 150;
     touch(2, -3, 4);
-    host_run(&b.host, ms);
+    host_run(&b.host, c->run_ms);
     touch(-4, 1, 3);
-    host_run(&b.host, ms);
-    mirror_follow();
+    host_run(&b.host, c->run_ms);
+    mirror_catch_up();
     STREAM(EITS_STREAM_RAW, 1, 0);
-    if (untouched > 1)
-        CHECK_OK(eits_reference_begin(mirror.ctx, untouched));
+    if (c->untouched > 1)
+        CHECK_OK(eits_reference_begin(mirror.ctx, c->untouched));
     /* with the touches: they are gone, and their ids */
-    TARE(untouched);
-    STREAM(15, every, 0);
+    TARE(c->untouched);
+    STREAM(15, c->every, 0);
     touch(4, -2, 3);
-    host_run(&b.host, ms);
-    mirror_follow();
+    host_run(&b.host, c->run_ms);
+    mirror_catch_up();
     TAKEN(mask_row(17, 1));
-    host_run(&b.host, ms);
-    mirror_follow(); /* the row comes as not a number: nothing else is to be told */
+    host_run(&b.host, c->run_ms);
+    mirror_catch_up(); /* the row comes as not a number: nothing else is to be told */
     sheet_init(&b.sheet);
-    host_run(&b.host, ms);
-    mirror_follow();
-    CHECK(mirror.images >= 25u / every);
+    host_run(&b.host, c->run_ms);
+    mirror_catch_up();
+    CHECK(mirror.images >= 25u / c->every);
     CHECK_EQUAL(mirror.images, mirror.touches);
     CHECK_EQUAL(mirror.images, mirror.frames_of_events);
     CHECK(mirror.events > 0);
@@ -324,15 +331,15 @@ TEST(test_self_test_keeps_the_tare)
     STREAM(7, 1, 0);
     touch(3, 3, 4);
     host_run(&b.host, 100);
-    mirror_follow();
+    mirror_catch_up();
     STREAM(EITS_STREAM_RAW, 1, 0);
     TAKEN(host_plain(&b.host, EITS_PACKET_SELF_TEST));
     STREAM(7, 1, 0);
-    mirror_follow();
+    mirror_catch_up();
     eits_forget(mirror.ctx);          /* a self-test forgets the warm start */
     mirror.ctx->projection.stale = 1; /* and the basis, which costs MACs to build anew */
     host_run(&b.host, 100);
-    mirror_follow();
+    mirror_catch_up();
     CHECK(mirror.images >= 8);
     CHECK_EQUAL(mirror.different, 0);
     /* nor does it forget the voltages' angle: what turns now is not followed */
@@ -345,12 +352,19 @@ TEST(test_self_test_keeps_the_tare)
 /* A tare takes frames whose scan began with the command or later, also where the clock wraps. */
 TEST(test_tare_begins_with_the_command)
 {
-    static const uint32_t commands[] = {1000, 0, 0xFFFFFFFFu, 0x80000000u};
-    for (int k = 0; k < 4; ++k) {
-        const fw_solve tare = {.tare = {.active = true, .since_us = commands[k]}},
-                       over = {.tare = {.since_us = commands[k]}};
+    static const struct {
+        const char *name;
+        uint32_t since_us;
+    } commands[] = {{"no wrap", 1000},
+                    {"the clock is at 0", 0},
+                    {"the clock is about to wrap", 0xFFFFFFFFu},
+                    {"half of the clock's range", 0x80000000u}};
+    for (size_t k = 0; IN_TABLE(k, commands); ++k) {
+        CASE(commands[k].name);
+        const fw_solve tare = {.tare = {.active = true, .since_us = commands[k].since_us}},
+                       over = {.tare = {.since_us = commands[k].since_us}};
         for (int late = -2; late <= 2; ++late) {
-            const fw_frame frame = {.time_us = commands[k] + (uint32_t)late};
+            const fw_frame frame = {.time_us = commands[k].since_us + (uint32_t)late};
             CHECK_EQUAL(fw_tare_wants(&tare, &frame), late >= 0);
             CHECK(!fw_tare_wants(&over, &frame));
         }
@@ -359,10 +373,14 @@ TEST(test_tare_begins_with_the_command)
 
 int main(void)
 {
-    test_same_bits(&SKIN_ADJACENT, 8, 1, 1, 0);
-    test_same_bits(&SKIN_ADJACENT, 1, 2, 1, 0);
-    test_same_bits(&SKIN_OPPOSITE, 5, 1, 4, 0);
-    test_same_bits(&SKIN_ADJACENT, 4, 1, 1, 50);
+    const stream_case cases[] = {
+        {"every frame", &SKIN_ADJACENT, 8, 1, 1, 0, 150},
+        {"one untouched frame, every second frame", &SKIN_ADJACENT, 1, 2, 1, 0, 150},
+        {"reciprocal scans of an opposite protocol", &SKIN_OPPOSITE, 5, 1, 4, 0, 150},
+        {"a slow link", &SKIN_ADJACENT, 4, 1, 1, 50, 1500},
+    };
+    for (size_t k = 0; k < COUNT_OF(cases); ++k)
+        test_same_bits(&cases[k]);
     run_tests();
     bench_stop(&b);
     return checks_report("instrument");

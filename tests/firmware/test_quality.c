@@ -113,7 +113,13 @@ TEST(test_two_open)
 {
     start(1);
     tare();
-    for (uint32_t other = 4; other < 12; other += 4) {
+    const struct {
+        const char *name;
+        uint32_t other;
+    } cases[] = {{"neighbours", 4}, {"far apart", 8}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        const uint32_t other = cases[k].other;
+        CASE(cases[k].name);
         b.sheet.detached[3] = true;
         detach(other, true);
         host_run(&b.host, 60);
@@ -192,12 +198,18 @@ static void test_touches_are_not_open(bool tared)
     start(1);
     if (tared)
         tare();
-    const double factors[] = {0.02, 0.3, 3, 10};
-    for (size_t f = 0; IN_TABLE(f, factors); ++f) {
-        for (int place = 0; place < 5; ++place) {
+    const struct {
+        const char *name;
+        double factor; /* of conductivity */
+    } touches[] = {{"almost insulating", 0.02}, {"insulating", 0.3}, {"light", 3}, {"strong", 10}};
+    const struct {
+        double x, y, radius;
+    } places[] = {{0, 0, 1}, {1.7, -0.4, 2}, {3.4, -0.8, 3}, {5.1, -1.2, 4}, {6.8, -1.6, 2.5}};
+    for (size_t k = 0; IN_TABLE(k, touches); ++k) {
+        CASE(touches[k].name);
+        for (size_t p = 0; p < COUNT_OF(places); ++p) {
             sheet_init(&b.sheet);
-            sheet_touch(&b.sheet, 1.7 * place, -0.4 * place, place == 4 ? 2.5 : 1 + place,
-                        factors[f]);
+            sheet_touch(&b.sheet, places[p].x, places[p].y, places[p].radius, touches[k].factor);
             sheet_solve(&b.sheet);
             host_run(&b.host, 45);
             CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
@@ -315,13 +327,23 @@ TEST(test_dead)
 
 int main(void)
 {
-    test_open(false, 1);
-    test_open(true, 1);
-    test_open(true, 4);
+    const struct {
+        const char *name;
+        bool tared;
+        uint16_t check_every;
+    } open[] = {{"no reference", false, 1},
+                {"reference, full scans", true, 1},
+                {"reference, every fourth scan is full", true, 4}};
+    for (size_t k = 0; k < COUNT_OF(open); ++k) {
+        CASE(open[k].name);
+        test_open(open[k].tared, open[k].check_every);
+    }
     run_tests();
     test_touches_are_not_open(true);
     test_touches_are_not_open(false);
+    CASE("every scan is full");
     test_reciprocity(1);
+    CASE("every third scan is full");
     test_reciprocity(3);
     bench_stop(&b);
     return checks_report("quality");

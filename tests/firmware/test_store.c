@@ -20,15 +20,17 @@ static void start_with_adjacent(void)
 TEST(test_newest)
 {
     const struct {
-        uint32_t first, second, bank;
-    } cases[] = {{1, 2, 1},
-                 {2, 1, 0},
-                 {0xFFFFFFFFu, 0, 1},
-                 {0, 0xFFFFFFFFu, 0},
-                 {0x80000006u, 5, 1},
-                 {0x80000001u, 5, 0},
-                 {7, 7, 0}};
+        const char *name;
+        uint32_t first, second, bank; /* generations, and the newest bank */
+    } cases[] = {{"second is newer", 1, 2, 1},
+                 {"first is newer", 2, 1, 0},
+                 {"second is newer over the wrap", 0xFFFFFFFFu, 0, 1},
+                 {"first is newer over the wrap", 0, 0xFFFFFFFFu, 0},
+                 {"second is newer by 2^31 - 1", 0x80000006u, 5, 1},
+                 {"first is newer by 2^31 - 4", 0x80000001u, 5, 0},
+                 {"both are as new", 7, 7, 0}};
     for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
         bench_start(&b, NULL);
         fake_put_model(&b.board, 0, cases[k].first, adjacent.blob, adjacent.size);
         fake_put_model(&b.board, 1, cases[k].second, opposite.blob, opposite.size);
@@ -153,17 +155,23 @@ TEST(test_memory)
     TAKEN(host_upload(&b.host, big.blob, big.size, big.crc, 4096));
     const size_t needs = fw_engine_needs(&model);
     CHECK(needs < FAKE_WORKSPACE);
-    TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096));
-    for (int fits = 1; fits >= 0; --fits) {
-        b.board.board.workspace_bytes = (needs + 15) / 16 * 16 - (fits ? 0 : 16);
+    const size_t enough = (needs + 15) / 16 * 16;
+    const struct {
+        const char *name;
+        size_t bytes;
+        uint16_t status;
+        uint32_t rank; /* of the open model afterwards */
+    } cases[] = {{"just enough memory", enough, EITS_REPLY_OK, 60},
+                 {"16 bytes too few", enough - 16, EITS_REPLY_MODEL_SIZE, 24}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
+        TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096));
+        b.board.board.workspace_bytes = cases[k].bytes;
         bench_restart(&b);
         const eits_packet_reply reply = host_upload(&b.host, big.blob, big.size, big.crc, 4096);
-        CHECK_EQUAL(reply.status, fits ? EITS_REPLY_OK : EITS_REPLY_MODEL_SIZE);
-        CHECK_EQUAL(host_info(&b.host).rank, fits ? 60 : 24);
-        if (fits)
-            TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096));
-        else
-            CHECK_EQUAL(reply.detail[0], (long long)b.board.board.workspace_bytes);
+        CHECK_EQUAL(reply.status, cases[k].status);
+        CHECK_EQUAL(host_info(&b.host).rank, cases[k].rank);
+        CHECK(reply.status == EITS_REPLY_OK || reply.detail[0] == (long long)cases[k].bytes);
     }
     fake_put_model(&b.board, 0, 100, big.blob, big.size);
     fake_put_model(&b.board, 1, 99, adjacent.blob, adjacent.size);

@@ -189,7 +189,9 @@ TEST(test_a_place_that_frames_find)
 int main(void)
 {
     run_tests();
+    CASE("an idle main loop");
     test_a_touch(0, 0);
+    CASE("a busy main loop and a slow link");
     test_a_touch(2000, 900000);
     bench_stop(&b);
     return checks_report("tracker");
