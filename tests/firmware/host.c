@@ -39,7 +39,7 @@ static void collect(host *h)
     h->board->to_host_size = 0;
 }
 
-/* As if a keepalive came all the time; it would change the counters. */
+/* The same effect as a constant keepalive, which would change the counters. */
 static void listen(host *h)
 {
     if (h->quiet)

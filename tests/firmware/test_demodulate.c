@@ -1,5 +1,5 @@
-/* Demodulation: amplitudes and phases against the formula, the generator's own phase followed
- * across wraps, ends of range. */
+/* Demodulation: amplitudes and phases against the formula, the generator's own phase across wraps
+ * of the clock, ends of the range. */
 #include "app/acquire/sincos.h"
 #include "app/solve/phase.h"
 #include "check.h"
@@ -58,7 +58,7 @@ TEST(test_scale)
     CHECK_EQUAL(fw_volts_per_code_nv(&CAPTURE), 805664); /* 3.3 V / 4096 */
     const fw_capture gained = {NULL, NULL, 4095, 3300000, 2500000};
     CHECK_EQUAL(fw_volts_per_code_nv(&gained), 322266);
-    /* 4 periods of 20 samples, 12 of 25 that are no more than 25 phases */
+    /* 4 periods of 20 samples, 12 of 25 samples, which have only 25 different phases */
     CHECK_NEAR(fw_rounding_v(805664, 50000000, 1000000, 80), 805.664e-6 / sqrt(6 * 20), 1e-10);
     CHECK_NEAR(fw_rounding_v(805664, 40000000, 1000000, 300), 805.664e-6 / sqrt(6 * 25), 1e-10);
     CHECK_EQUAL(fw_demodulate_setup(&d, &gained, 8000000, 1677722, 50000000, 1000000, 80), FW_OK);
@@ -68,8 +68,8 @@ TEST(test_scale)
     CHECK_NEAR(z.i, 0.5, 0.3 * 322e-6);
 }
 
-/* Amplitudes and phases within what rounding to whole codes leaves: 4 / pi times half a step at
- * worst, less where the samples of a burst fall on many places of the period. */
+/* The errors of amplitude and phase come from rounding to whole codes alone: at most 4 / pi times
+ * half a step, and less if the samples of a burst have many different phases. */
 TEST(test_amplitudes)
 {
     const struct {
@@ -101,9 +101,9 @@ TEST(test_amplitudes)
     }
 }
 
-/* The generator's frequency is not quite the nominal one; the phase stays where it is, over hours
- * and the clock's wrap. */
-TEST(test_phase_followed)
+/* The generator's frequency differs slightly from the nominal one. The measured phase stays
+ * constant over hours and wraps of the clock. */
+TEST(test_phase_is_constant)
 {
     const uint32_t tuning = fw_ad9833_tuning(8000000, 50000000);
     const double turn_per_us = tuning * 8.0 / 268435456.0;
@@ -147,7 +147,7 @@ TEST(test_ends_of_range)
                 FW_E_ARGUMENT);
 }
 
-/* The greatest sum of 16-bit codes over the longest burst does not overflow. */
+/* The largest sum of 16-bit codes over the longest burst does not overflow. */
 TEST(test_wide_converter)
 {
     const fw_capture wide = {NULL, NULL, 65535, 3300000, 1000000};
@@ -160,8 +160,8 @@ TEST(test_wide_converter)
     CHECK_NEAR(z.q, 0, 1e-4);
 }
 
-/* Two pairs of the model, upside down and half a turn away from what it expects: the phase follows,
- * whichever row of each pair can be used. */
+/* Two pairs of the model, also inverted, half a turn from the expected phase. The phase is learned
+ * from whichever row of each pair can be used. */
 TEST(test_phase_from_either_row)
 {
     static const eits_fold FOLD[2] = {{.first = 0, .second = 1, .sign = 1},

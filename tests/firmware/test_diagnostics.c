@@ -1,8 +1,8 @@
-/* What the core finds reaches the host by name: in the frame's head, and what persists as faults;
- * on frames of the sheet. */
+/* Diagnostics reach the host by name: in the frame's head, and as faults if they persist; on frames
+ * of the sheet. */
 #include "steps.h"
 
-/* Tared, and everything is streamed. */
+/* Start with a reference, and stream everything. */
 static void start(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -16,7 +16,7 @@ static const eits_packet_solved *head_of(const host_packet *packet)
     return (const void *)packet->payload;
 }
 
-/* Nothing is streamed, or every fifth frame: it is told all the same, in the frame that shows it.
+/* An open electrode is reported in the frame that shows it, whether or not that frame is streamed.
  */
 static void test_open_while_nobody_looks(uint16_t what, uint16_t every)
 {
@@ -36,11 +36,11 @@ static void test_open_while_nobody_looks(uint16_t what, uint16_t every)
     }
 }
 
-/* Two electrodes that are merged: both named, each with the other. */
+/* Two electrodes that are connected are both named, each with the other. */
 static double bridged(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;
-    /* of the sheet with 6 and 7 as one: the pair's transfer impedances are their mean */
+    /* the sheet with electrodes 6 and 7 as one, whose transfer impedances are the mean of both */
     double volts = 0;
     for (int k = 0; k < 16; ++k) {
         uint8_t row[4];
@@ -75,7 +75,8 @@ TEST(test_bridged)
     CHECK_EQUAL(host_info(&b.host).faults >> EITS_FAULT_BRIDGED & 1u, 0);
 }
 
-/* One reading that is off for a frame: left out, in the head and in STATS, and no fault. */
+/* A single reading that is wrong for one frame is masked and counted, in the head and in STATS; it
+ * is not a fault. */
 static double one_row_off(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -95,7 +96,7 @@ TEST(test_outlier)
     uint32_t rows = 0;
     for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_TOUCHES); ++k) {
         const eits_packet_solved *head = head_of(host_packet_of(&b.host, EITS_PACKET_TOUCHES, k));
-        /* noise that passed for a touch may be said to be a guess */
+        /* a touch made of noise may be reported as crowded */
         const uint32_t crowded = EITS_DIAGNOSTIC_CROWDED;
         CHECK_EQUAL(head->diagnostics & ~crowded, head->outliers > 0 ? EITS_DIAGNOSTIC_OUTLIER : 0);
         CHECK(head->outliers <= 2 && head->masked == head->outliers);
@@ -106,7 +107,7 @@ TEST(test_outlier)
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_FAULT), 0);
 }
 
-/* What is not looked for is not found. */
+/* A diagnostic that is switched off reports nothing. */
 TEST(test_switched_off)
 {
     start();

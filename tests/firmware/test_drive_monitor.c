@@ -1,5 +1,5 @@
-/* The monitor of the drive sees what must never be: in traces by hand, and done by an instrument
- * with a fault planted in it. */
+/* The drive monitor finds violations: in traces written by hand, and in an instrument with a
+ * planted fault. */
 #include "steps.h"
 
 #include "app/instrument.h"
@@ -27,7 +27,7 @@ typedef struct step {
 #define LATE {WAIT, DRIVE_MONITOR_SILENT_NS + 1}
 
 static const struct trace {
-    const char *violation; /* NULL: there is none */
+    const char *violation; /* NULL: none */
     step steps[12];
 } TRACES[] = {
     {NULL, {{HOST, 0}, RUNS, JOIN, OPEN, {ADDRESSES, NEXT}, {ENABLES, ALL}, {LOOK, 0}}},
@@ -118,7 +118,8 @@ static void does_not_wait(void *ctx, uint32_t ns)
     (void)ns;
 }
 
-/* The sentence about two seconds of an instrument before a host, or one that believes so. */
+/* The monitor's sentence after two seconds of an instrument with a host, or of one that wrongly
+ * assumes a host. */
 static const char *run(fw_lines_ops ops, bool asked, bool heard)
 {
     b.host.quiet = true;

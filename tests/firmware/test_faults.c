@@ -1,5 +1,5 @@
-/* Faults: told once when they rise and once when they go; buses that fail and recover; what the
- * board says of its last end. */
+/* Faults: reported once when raised and once when cleared; buses that fail and recover; the report
+ * on the last reset. */
 #include "steps.h"
 
 #include "app/safety/faults.h"
@@ -25,7 +25,7 @@ TEST(test_last_reset)
         CHECK_EQUAL(crash->words[k], b.board.board.last_reset.words[k]);
     CHECK_EQUAL(reports(EITS_FAULT_WATCHDOG, true), 1);
     host_run(&b.host, 100);
-    /* until they are cleared */
+    /* they stay until they are cleared */
     CHECK_EQUAL(host_info(&b.host).faults, 1u << EITS_FAULT_CRASH | 1u << EITS_FAULT_WATCHDOG);
     CHECK((b.board.leds & 4u) != 0);
     TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
@@ -36,7 +36,7 @@ TEST(test_last_reset)
     CHECK((b.board.leds & 4u) == 0);
 }
 
-/* What is cleared by command and still there rises again. */
+/* A fault that is cleared by command and still there is raised again. */
 TEST(test_cleared_but_there)
 {
     bench_start(&b, NULL);
@@ -54,7 +54,8 @@ TEST(test_cleared_but_there)
     CHECK_EQUAL(reports(EITS_FAULT_ELECTRODE_OPEN, false), 1);
 }
 
-/* The generator cannot be written at start-up: told, tried again, and the scan begins when it can.
+/* If the generator cannot be written at start-up, this is reported and tried again, and the scan
+ * begins once it works.
  */
 TEST(test_generator_bus)
 {
@@ -79,8 +80,8 @@ TEST(test_generator_bus)
     }
 }
 
-/* Multiplexers that cannot be switched: once is measured again, always is told; then rows are no
- * numbers. */
+/* If the multiplexers fail once, the row is measured again; if they fail always, BUS is reported
+ * and rows are NaN. */
 TEST(test_multiplexer_bus)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -116,7 +117,7 @@ TEST(test_multiplexer_bus)
     CHECK_EQUAL(host_info(&b.host).faults, 0);
 }
 
-/* A bus that fails while a scan starts is told as that, and not as a converter that gives nothing.
+/* A bus that fails while a scan starts is reported as BUS, and not as a stalled scan.
  */
 TEST(test_bus_at_the_start_of_a_scan)
 {
@@ -141,8 +142,8 @@ static bool is_raised(eits_fault code)
     return (fw_faults_raised(&b.host.instrument.safety) >> code & 1u) != 0;
 }
 
-/* So many frames with a fault and then without it: when it rises and goes, each electrode by
- * itself; a frame in between begins the count anew. */
+/* After how many frames a fault is raised and cleared, for each electrode by itself. A frame that
+ * contradicts begins the count again. */
 TEST(test_hysteresis)
 {
     const struct {

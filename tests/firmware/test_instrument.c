@@ -1,5 +1,5 @@
-/* From tare to stream: the reference, images with the core's own bits, streaming every n-th frame,
- * back-pressure. */
+/* From tare to stream: the reference, images with the same bits as the core's, streaming every n-th
+ * frame, back-pressure. */
 #include "steps.h"
 
 #include "app/solve/tare.h"
@@ -26,7 +26,7 @@ static void mirror_start(uint32_t untouched)
     eits_options options = *eits_get_options(mirror.ctx);
     CHECK_OK(eits_options_track(&options)); /* as the firmware does */
     options.noise_floor_v = eits_get_options(b.host.instrument.solve.engine.ctx)->noise_floor_v;
-    options.warm_start = 1; /* of both, so that a frame depends on those before it */
+    options.warm_start = 1; /* for both, so that a frame depends on earlier ones */
     b.host.instrument.solve.engine.ctx->options.warm_start = 1;
     CHECK_OK(eits_set_options(mirror.ctx, &options));
     if (untouched > 1)
@@ -70,7 +70,7 @@ static void mirror_touches(const host_packet *packet)
     mirror.found_count = count;
 }
 
-/* The board's events are those that its touches give here. */
+/* The board's events are the ones that follow from its touches here. */
 static void mirror_events(const host_packet *packet)
 {
     const eits_packet_events *head = (const eits_packet_events *)(const void *)packet->payload;
@@ -122,8 +122,8 @@ static void mirror_catch_up(void)
     }
 }
 
-/* Images and touches have the bits of the core run on the frames that were sent; warm starts
- * included, whatever is masked. */
+/* Images and touches have the same bits as those that the core computes here from the frames that
+ * were sent, with warm starts and masked rows. */
 typedef struct stream_case {
     const char *name;
     const skin_spec *spec;
@@ -138,7 +138,7 @@ static void test_same_bits(const stream_case *c)
     bench_start(&b, c->spec);
     b.board.noise_codes = 2;
     b.board.write_cost_ns =
-        c->busy_ms * 1000000u; /* meanwhile the scan goes on, as far as it may */
+        c->busy_ms * 1000000u; /* meanwhile the scan continues while it has a free frame */
     if (c->check_every != 1)
         check_each(c->check_every);
     STREAM(EITS_STREAM_RAW, 1, 0);
@@ -160,7 +160,7 @@ static void test_same_bits(const stream_case *c)
     STREAM(EITS_STREAM_RAW, 1, 0);
     if (c->untouched > 1)
         CHECK_OK(eits_reference_begin(mirror.ctx, c->untouched));
-    /* with the touches: they are gone, and their ids */
+    /* a tare of touched frames: the touches and their ids are gone */
     TARE(c->untouched);
     STREAM(15, c->every, 0);
     touch(4, -2, 3);
@@ -168,7 +168,7 @@ static void test_same_bits(const stream_case *c)
     mirror_catch_up();
     TAKEN(mask_row(17, 1));
     host_run(&b.host, c->run_ms);
-    mirror_catch_up(); /* the row comes as not a number: nothing else is to be told */
+    mirror_catch_up(); /* the row comes as NaN, and nothing else is needed */
     sheet_init(&b.sheet);
     host_run(&b.host, c->run_ms);
     mirror_catch_up();
@@ -181,8 +181,7 @@ static void test_same_bits(const stream_case *c)
     CHECK_EQUAL(host_info(&b.host).tared, 1);
 }
 
-/* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the
- * angle. */
+/* If the skin is the model's, the gain is 1 and voltages have the right sign at every phase. */
 TEST(test_phase_of_the_voltages)
 {
     for (int k = 0; k < 9; ++k) {
@@ -194,7 +193,7 @@ TEST(test_phase_of_the_voltages)
         CHECK(b.host.instrument.solve.engine.ctx->reference.correlation > 0.9999f);
         host_run(&b.host, 3000); /* the generator, 12 mHz off, would turn by 13 degrees */
         CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 1) <= 0.5);
-        /* what turns after the tare is not followed: half of a voltage is left */
+        /* a turn after the tare is not corrected: half of the voltage is left */
         b.board.extra_turn += 1 / 6.0;
         host_run(&b.host, 60);
         CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 0.5) <= 0.5);
@@ -217,12 +216,12 @@ TEST(test_streaming)
         CHECK_EQUAL(now->frame - last->frame, 3);
         CHECK(now->age_us < 1000);
     }
-    CHECK_EQUAL(host_info(&b.host).streaming, 0); /* five, and no more */
+    CHECK_EQUAL(host_info(&b.host).streaming, 0); /* it stops after five */
     CHECK_EQUAL(host_stats(&b.host, 0).frames_solved, 5);
     host_forget(&b.host);
     STREAM(EITS_STREAM_EVENTS, 1, 4);
     host_run(&b.host, 200);
-    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_EVENTS), 4); /* whether any happened or not */
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_EVENTS), 4); /* also if nothing happened */
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 0);
     CHECK_EQUAL(host_packet_of(&b.host, EITS_PACKET_EVENTS, 0)->size, sizeof(eits_packet_events));
     STREAM(EITS_STREAM_IMAGE, 2, 0);
@@ -234,7 +233,7 @@ TEST(test_streaming)
     CHECK_EQUAL(b.host.packets, 0);
 }
 
-/* Where the link takes no more, whole packets are dropped and counted, and nothing waits. */
+/* If the link is full, whole packets are dropped and counted, and nothing waits. */
 TEST(test_back_pressure)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -255,7 +254,7 @@ TEST(test_back_pressure)
     CHECK_EQUAL(b.host.decoder.crc_errors + b.host.decoder.framing_errors, 0);
 }
 
-/* A tare that fails leaves the last reference, its angle and its images. */
+/* A tare that fails keeps the last reference, its phase and its images. */
 TEST(test_failed_tare)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -297,8 +296,8 @@ TEST(test_failed_tare)
     CHECK(peak < 1e-5f);
 }
 
-/* Frames whose scan began before the command are not untouched ones; frames of a tare are all sent,
- * whatever `every` is. */
+/* Frames whose scan began before the command do not count as untouched. All frames of a tare are
+ * sent, whatever `every` is. */
 TEST(test_reference_frames)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -337,19 +336,19 @@ TEST(test_self_test_keeps_the_tare)
     STREAM(7, 1, 0);
     mirror_catch_up();
     eits_forget(mirror.ctx);          /* a self-test forgets the warm start */
-    mirror.ctx->projection.stale = 1; /* and the basis, which costs MACs to build anew */
+    mirror.ctx->projection.stale = 1; /* and the basis, which costs MACs to build again */
     host_run(&b.host, 100);
     mirror_catch_up();
     CHECK(mirror.images >= 8);
     CHECK_EQUAL(mirror.different, 0);
-    /* nor does it forget the voltages' angle: what turns now is not followed */
+    /* nor does it forget the phase: a turn now is not corrected */
     b.board.extra_turn += 1 / 6.0;
     host_run(&b.host, 60);
     const float volts = raw_volts(host_last(&b.host, EITS_PACKET_RAW), 0);
     CHECK_NEAR(volts, 0.5 * bench_volts(&b, 0), 0.5 * fake_lsb_v(&b.board));
 }
 
-/* A tare takes frames whose scan began with the command or later, also where the clock wraps. */
+/* A tare takes frames whose scan began with the command or later, also if the clock wraps. */
 TEST(test_tare_begins_with_the_command)
 {
     static const struct {

@@ -1,5 +1,5 @@
-/* Quality: open electrodes by name within one frame and never for touches, saturation, reciprocity,
- * on frames of the sheet. */
+/* Quality: open electrodes are named within one frame, and touches are not taken for them;
+ * saturation; reciprocity; on frames of the sheet. */
 #include "steps.h"
 
 static void start(uint16_t check_every)
@@ -26,8 +26,8 @@ static const eits_packet_solved *head_of(const host_packet *packet)
     return (const void *)packet->payload;
 }
 
-/* The first frame that RAW (without a reference: by its quality) or the head (with one) says
- * electrode e is open in; 0: none. */
+/* The first frame in which electrode e is open, by the head, or without a reference by the quality
+ * in RAW; 0: none. */
 static uint32_t first_named(uint32_t e, bool tared)
 {
     for (uint32_t k = 0; tared && k < host_count(&b.host, EITS_PACKET_IMAGE); ++k) {
@@ -47,8 +47,8 @@ static uint32_t first_named(uint32_t e, bool tared)
     return 0;
 }
 
-/* Rows of a frame that is wholly without electrode e: without a reference they are marked and no
- * numbers; with one the core gets them as they are. */
+/* Rows of a frame that was measured wholly without electrode e. Without a reference they are marked
+ * and NaN; with one the core gets them as they are. */
 static void check_rows(const host_packet *packet, uint32_t e, bool tared)
 {
     for (uint32_t i = 0; i < 208; ++i) {
@@ -57,8 +57,8 @@ static void check_rows(const host_packet *packet, uint32_t e, bool tared)
     }
 }
 
-/* An electrode comes off, with and without a tare, in full and reciprocal scans: named in the first
- * frame that is wholly so, by a fault and in the frame; gone eight frames after it is back. */
+/* An electrode comes off. It is named in the first frame that was measured wholly without it, by a
+ * fault and in the frame. The fault is cleared eight frames after the electrode is back. */
 static void test_open(bool tared, uint16_t check_every)
 {
     start(check_every);
@@ -72,7 +72,7 @@ static void test_open(bool tared, uint16_t check_every)
         host_run(&b.host, 60);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
         CHECK(fault != NULL && fault->index == (int32_t)e);
-        /* that one alone, and once */
+        /* only this electrode, and once */
         CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 1) == NULL);
         CHECK(fault != NULL && fault->frame == first_named(e, tared));
         uint32_t whole = 0;
@@ -86,7 +86,7 @@ static void test_open(bool tared, uint16_t check_every)
             check_rows(packet, e, tared);
         }
         CHECK(whole >= 1);
-        if (tared) { /* the image goes on, without those rows */
+        if (tared) { /* images continue without those rows */
             const eits_packet_solved *image = head_of(host_last(&b.host, EITS_PACKET_IMAGE));
             CHECK_EQUAL(image->status, 0);
             uint32_t lost = 0;
@@ -97,7 +97,7 @@ static void test_open(bool tared, uint16_t check_every)
                         EITS_DIAGNOSTIC_ELECTRODE_OPEN);
         }
         detach(e, false);
-        /* the frame under way may still be without it */
+        /* the frame under way may still have been measured without it */
         const uint32_t back = b.host.instrument.safety.faults.frame + 1;
         host_run(&b.host, 300);
         const eits_packet_fault *gone = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0);
@@ -108,7 +108,7 @@ static void test_open(bool tared, uint16_t check_every)
     }
 }
 
-/* Two at once, neighbours or not. */
+/* Two electrodes are open at once. */
 TEST(test_two_open)
 {
     start(1);
@@ -132,7 +132,7 @@ TEST(test_two_open)
     }
 }
 
-/* An electrode behind an amplifier that runs into its limit is open too. */
+/* An electrode is open also if its amplifier saturates. */
 static double to_the_rail(void *user, const uint8_t electrodes[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -150,7 +150,7 @@ TEST(test_open_at_the_rail)
     CHECK(fault != NULL);
 }
 
-/* A skin of other voltages than the model's by far: the tare says what is to be expected. */
+/* A skin with far smaller voltages than the model's: the tare gives the scale. */
 static double faint(void *user, const uint8_t electrodes[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -168,8 +168,7 @@ TEST(test_faint_skin)
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
 }
 
-/* One row that reads something whatever is connected, and is masked for that: it does not speak for
- * its electrodes. */
+/* A row that reads a constant, and is masked for that, is not counted for its electrodes. */
 static double stuck_row(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -191,8 +190,8 @@ TEST(test_masked_row_is_not_judged)
     CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 5);
 }
 
-/* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half
- * the skin. Nothing is open. */
+/* Touches do not open electrodes, whether light or strong, near the rim, over electrodes, over half
+ * the skin, or insulating. */
 static void test_touches_are_not_open(bool tared)
 {
     start(1);
@@ -236,7 +235,8 @@ TEST(test_saturation)
     if (fault != NULL) {
         const uint8_t *row = b.open.protocol + 4 * (size_t)fault->index;
         CHECK(row[0] == 2 && row[2] == 9);
-        CHECK(fault->value == 2 || fault->value == 1); /* the frame of the change may have one */
+        CHECK(fault->value == 2 ||
+              fault->value == 1); /* the frame of the change may have only one */
     }
     const host_packet *raw = host_last(&b.host, EITS_PACKET_RAW);
     uint32_t marked = 0;
@@ -260,7 +260,7 @@ static double broken_reciprocity(void *user, const uint8_t e[4], uint64_t at_ns)
     return sheet_volts(user, e) * (e[0] == 2 && e[2] == 5 ? 1.6 : 1);
 }
 
-/* Reciprocal rows that disagree are marked at once, and told when it lasts. */
+/* Reciprocal rows that disagree are marked at once, and reported if it lasts. */
 static void test_reciprocity(uint16_t check_every)
 {
     start(check_every);
@@ -269,7 +269,8 @@ static void test_reciprocity(uint16_t check_every)
     CHECK(host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0) == NULL);
     b.board.volts = broken_reciprocity;
     host_run(&b.host, 30);
-    CHECK(host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0) == NULL); /* not for a frame */
+    CHECK(host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0) ==
+          NULL); /* not for a single frame */
     host_run(&b.host, 70u * check_every + 30);
     const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0);
     CHECK(fault != NULL);
@@ -309,12 +310,12 @@ TEST(test_dead)
     tare();
     b.board.volts = nothing;
     host_run(&b.host, 60);
-    /* a cable unplugged looks like this */
+    /* this is what an unplugged cable looks like */
     CHECK(host_fault(&b.host, EITS_FAULT_SOLVER, true, 0) != NULL);
     const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
     const eits_packet_solved *head = (const void *)image->payload;
     CHECK_EQUAL((int16_t)head->status, -EITS_E_FRAME_ZERO);
-    CHECK_EQUAL(head->open_electrodes, 0); /* it is not the electrodes */
+    CHECK_EQUAL(head->open_electrodes, 0); /* the electrodes are not blamed */
     for (uint32_t j = 0; j < b.open.n_pixels; ++j) {
         float value;
         memcpy(&value, image->payload + sizeof *head + 4 * j, 4);

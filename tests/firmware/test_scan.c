@@ -8,8 +8,8 @@ static const eits_packet_raw *raw_head(uint32_t k)
     return packet == NULL ? NULL : (const eits_packet_raw *)(const void *)packet->payload;
 }
 
-/* Rows are measured in the model's order, each with its own four electrodes, and never is one made
- * before another broke. */
+/* Rows are measured in the model's order, each with its own four electrodes, and always break
+ * before make. */
 static void test_order(const skin_spec *spec, uint32_t rows)
 {
     bench_start(&b, spec);
@@ -112,7 +112,7 @@ TEST(test_late_switch)
     CHECK_EQUAL(host_stats(&b.host, 0).slots_repeated, repeated);
 }
 
-/* Rows that cannot be measured at all are given up, marked, and are not a number. */
+/* Rows that cannot be measured are marked, and are NaN. */
 TEST(test_never_settles)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -121,7 +121,7 @@ TEST(test_never_settles)
     host_run(&b.host, 400);
     const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
     CHECK(packet != NULL);
-    /* a row measured again has been selected for a whole slot: settled */
+    /* a row that is measured again has been selected for a whole slot, so it has settled */
     CHECK(packet != NULL && !isnan(raw_volts(packet, 0)));
     b.board.latency_ns = 600;
     b.board.lose = 1000000;
@@ -149,7 +149,7 @@ typedef struct reciprocal_case {
     uint8_t first, second; /* quality of the fold's rows then */
 } reciprocal_case;
 
-/* One reciprocal frame, or full one that checks: its flags, its time and its rows. */
+/* The flags, the time and the rows of a reciprocal frame, or of a full one. */
 static void check_reciprocal_frame(uint32_t k, bool full)
 {
     const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
@@ -228,18 +228,18 @@ TEST(test_frame_period)
         CHECK_EQUAL(raw_head(k)->frame, raw_head(k - 1)->frame + 1);
         CHECK_NEAR(raw_head(k)->time_us - raw_head(k - 1)->time_us, 33333, 100);
     }
-    /* nothing is lost in the long run: slots are 100 us, periods are not */
+    /* no drift in the long run, although a period is not a whole number of slots */
     CHECK_NEAR((double)(raw_head(frames - 1)->time_us - raw_head(0)->time_us),
                33333.0 * (frames - 1), 100);
     CHECK_EQUAL(host_stats(&b.host, 0).deadlines_missed, 0);
-    /* one that is a whole number of slots is kept to the microsecond, from the first frame on */
+    /* a period of a whole number of slots is kept to the microsecond, from the first frame on */
     scan.frame_period_us = 30000;
     TAKEN(scan_with(scan));
     hear(200);
     for (uint32_t k = 1; k < host_count(&b.host, EITS_PACKET_RAW); ++k)
         CHECK_EQUAL(raw_head(k)->time_us - raw_head(k - 1)->time_us, 30000);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 5);
-    b.board.clock_cost_ns = 15000000; /* the solver, as it were */
+    b.board.clock_cost_ns = 15000000; /* in place of a slow solver */
     TARE(1);
     host_run(&b.host, 1000);
     CHECK(host_stats(&b.host, 0).deadlines_missed > 0);
@@ -249,19 +249,19 @@ TEST(test_frame_period)
     CHECK(host_fault(&b.host, EITS_FAULT_DEADLINE, false, 0) != NULL);
 }
 
-/* While the main loop is busy, one frame is filled, then the scan waits; no frame is half old and
- * half new. */
+/* While the main loop is busy, one frame is filled, and then the scan waits. No frame mixes two
+ * scans. */
 TEST(test_two_buffers)
 {
     bench_start(&b, &SKIN_ADJACENT);
     STREAM(EITS_STREAM_RAW, 1, 0);
-    b.board.write_cost_ns = 90000000; /* four frames' time */
+    b.board.write_cost_ns = 90000000; /* as long as four frames */
     host_run(&b.host, 2000);
     const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
     CHECK(frames >= 15 && frames <= 30);
     for (uint32_t k = 0; k < frames; ++k) {
         const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
-        /* scanned frames are all there */
+        /* no scanned frame is missing */
         CHECK(k == 0 || raw_head(k)->frame == raw_head(k - 1)->frame + 1);
         CHECK_EQUAL(raw_head(k)->scan_us, 20780);
         CHECK_NEAR(raw_volts(packet, 207), bench_volts(&b, 207), 0.5 * fake_lsb_v(&b.board));
@@ -277,18 +277,18 @@ TEST(test_stall)
     b.board.stalled = true;
     host_run(&b.host, 60);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 0) != NULL);
-    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 1) == NULL); /* said once */
+    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 1) == NULL); /* reported once */
     eits_command_tare tare = {.frames = 4};
     CHECK_EQUAL(host_command(&b.host, EITS_PACKET_TARE, &tare, sizeof tare).status,
                 EITS_REPLY_CORE);
-    CHECK_EQUAL(host_info(&b.host).tared, 1); /* by the last one */
+    CHECK_EQUAL(host_info(&b.host).tared, 1); /* by the tare before */
     b.board.stalled = false;
     hear(600);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, false, 0) != NULL);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) > 10);
-    /* the generator was not touched: its phase is the one that the tare knows */
+    /* the generator kept running, so the phase of the tare is still right */
     CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 1) <= 0.5);
-    b.board.configure_status = FW_E_TIMEOUT; /* the converter does not even start */
+    b.board.configure_status = FW_E_TIMEOUT; /* now the converter does not even start */
     b.board.stalled = true;
     hear(2000);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 0) != NULL);

@@ -1,5 +1,5 @@
-/* Touches after each drive: drives are looked at while the main loop is busy, none is left out or
- * told twice, whole frames are brought to one instant, and all begins anew where it must. */
+/* Touches after each drive: drives are tracked while the main loop is busy, none is skipped or
+ * reported twice, whole frames are aligned, and the tracker begins again when it must. */
 #include "steps.h"
 
 #include "app/link/tracks.h"
@@ -49,8 +49,8 @@ TEST(test_what_is_refused)
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
 }
 
-/* A still skin: one packet says that it begins, all frames are brought to one instant and solved,
- * with the bits that they have. */
+/* An untouched skin: one packet reports the beginning; all frames are aligned, unchanged to the
+ * bit, and solved. */
 TEST(test_a_still_skin)
 {
     set_up(&SKIN_WITH_FIELDS);
@@ -71,7 +71,7 @@ TEST(test_a_still_skin)
     CHECK_EQUAL(b.host.gaps, 0);
 }
 
-/* A touch: packets of drives in the order that they are measured, each for its own instant. */
+/* A touch: packets come in the order in which drives are measured, each for its own instant. */
 static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
 {
     set_up(&SKIN_WITH_FIELDS);
@@ -97,7 +97,7 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
         CHECK_EQUAL(now.time_us - before.time_us, DRIVE_US);
         CHECK_EQUAL(now.frame - before.frame, now.drive == 0);
     }
-    /* the scan went on, whatever the main loop did */
+    /* the scan continued whatever the main loop did */
     const uint64_t scans = (b.board.now_ns - from_ns) / (DRIVES * DRIVE_US * 1000u);
     CHECK(b.host.instrument.acquire.scan.frames_scanned - scanned + 1 >= scans);
     CHECK_EQUAL(b.host.instrument.acquire.scan.slots_repeated, 0);
@@ -106,8 +106,8 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
     CHECK(b.host.instrument.solve.tracker.running);
 }
 
-/* A main loop that is slower than the scan: frames are left out, drives are not, and a frame that
- * is looked at is the one that was scanned last. */
+/* If the main loop is slower than the scan, frames are skipped, but drives are not, and each frame
+ * that is taken is the latest one. */
 TEST(test_a_slow_main_loop)
 {
     set_up(&SKIN_WITH_FIELDS);
@@ -127,9 +127,9 @@ TEST(test_a_slow_main_loop)
     CHECK_EQUAL(b.host.instrument.solve.tracker.begun, begun);
 }
 
-/* Commands that change what drives build on begin anew; questions do not. Drives that waited too
- * long are left out: then too. */
-TEST(test_beginning_anew)
+/* The tracker begins again after commands that change what it reads, but not after questions. It
+ * also begins again if drives had to be skipped because they waited too long. */
+TEST(test_beginning_again)
 {
     set_up(&SKIN_WITH_FIELDS);
     STREAM(ALL, 1, 0);
@@ -145,9 +145,9 @@ TEST(test_beginning_anew)
     CHECK(tracker->begun > begun && tracker->running);
     begun = tracker->begun;
     fw_tracks_hold(&b.host.instrument.link);
-    const uint32_t looked_at = b.host.instrument.acquire.scan.drives_taken;
+    const uint32_t tracked = b.host.instrument.acquire.scan.drives_taken;
     fake_advance(&b.board, 3 * SCAN_MS * 1000000u);
-    CHECK_EQUAL(b.host.instrument.acquire.scan.drives_taken, looked_at);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.drives_taken, tracked);
     fw_tracks_release(&b.host.instrument.link);
     host_run(&b.host, 3 * SCAN_MS);
     CHECK(tracker->begun > begun && tracker->running);
@@ -160,8 +160,8 @@ TEST(test_beginning_anew)
     CHECK(!tracker->running && b.host.instrument.acquire.scan.drive_done == NULL);
 }
 
-/* A touch that only frames find is one once two of them have found it; a frame that is brought to
- * one instant and not solved, for its drives are not explained, finds nothing. */
+/* A touch that only frames find is tracked once two of them have found it. A frame that is aligned
+ * and not solved does not count. */
 TEST(test_a_place_that_frames_find)
 {
     set_up(&SKIN_WITH_FIELDS);

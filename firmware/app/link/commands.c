@@ -46,7 +46,7 @@ static bool fraction_outside(fw_answer *out, size_t offset, float value)
 {
     if (value >= 0 && value <= 1)
         return false;
-    *out = fw_refuse(EITS_REPLY_RANGE, (int32_t)offset, value > 1 ? 1 : 0); /* NaN is neither */
+    *out = fw_refuse(EITS_REPLY_RANGE, (int32_t)offset, value > 1 ? 1 : 0); /* NaN: 0 */
     return true;
 }
 
@@ -123,7 +123,7 @@ static fw_answer locked(void)
     return fw_refuse(EITS_REPLY_LOCKED, 0, 0);
 }
 
-/* What is wrong with scan settings by themselves; OK where nothing is. */
+/* Check the ranges of scan settings, and whether they fit together. */
 static fw_answer check_scan(const fw_host_link *link, const eits_command_scan *c)
 {
     fw_answer bad;
@@ -139,7 +139,7 @@ static fw_answer check_scan(const fw_host_link *link, const eits_command_scan *c
                 MAX_PERIOD_US))
         return bad;
     const uint64_t half_rate_millihz = (uint64_t)c->sample_rate_hz * 500u;
-    if (c->excitation_millihz >= half_rate_millihz) /* more than two samples a period */
+    if (c->excitation_millihz >= half_rate_millihz) /* more than two samples per period */
         return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
                          (int32_t)(half_rate_millihz - 1));
     if (fw_ad9833_tuning(link->board->mclk_hz, c->excitation_millihz) == 0)
@@ -162,7 +162,7 @@ static fw_answer on_scan(fw_host_link *link, const void *payload, size_t size)
         return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, sample_rate_hz), 0);
     if (checked.status != EITS_REPLY_OK)
         return checked;
-    /* the limit on current falls with the frequency */
+    /* at a lower frequency less current is safe: only the owner may lower it */
     if (c.excitation_millihz < fw_acquire_settings(link->acquire)->excitation_millihz &&
         fw_owner_refuses(link->safety, EITS_PACKET_SCAN))
         return locked();
@@ -184,7 +184,7 @@ static fw_answer on_scan(fw_host_link *link, const void *payload, size_t size)
     return checked;
 }
 
-/* What tracking changes is the model's own without it. */
+/* The options that tracking changes; without tracking they have the model's defaults. */
 static void set_tracking(const eits_model *model, eits_options *options, bool track)
 {
     eits_options defaults;
@@ -332,7 +332,8 @@ static fw_answer on_settings(fw_host_link *link, const void *payload, size_t siz
         return bad;
     if (fw_owner_refuses(link->safety, EITS_PACKET_SETTINGS))
         return locked();
-    if (fw_current_state(link->safety) != EITS_DRIVE_TRIPPED) /* the flash may have to be erased */
+    if (fw_current_state(link->safety) !=
+        EITS_DRIVE_TRIPPED) /* erasing the flash may take seconds */
         fw_current_off(link->safety, EITS_DRIVE_OFF);
     if (fw_owner_save(link->safety, c.settings, c.current_limit_ua_rms) != FW_OK)
         return fw_refuse(EITS_REPLY_FLASH, 0, 0);
@@ -350,12 +351,12 @@ static fw_answer on_get_hashes(fw_host_link *link, const void *payload, size_t s
     return (fw_answer){.later = true};
 }
 
-/* When a command has to wait: during a tare, or an upload. */
+/* A command may be refused during a tare, or an upload. */
 enum { NOT_IN_TARE = 1, NOT_IN_UPLOAD = 2, MORE_BYTES = 4 };
 
 typedef struct command {
     eits_packet_type type;
-    uint16_t size; /* of the payload, or of what precedes the bytes */
+    uint16_t size; /* of the payload; with MORE_BYTES, of the part before them */
     uint16_t rules;
     fw_answer (*run)(fw_host_link *link, const void *payload, size_t size);
 } command;
@@ -395,14 +396,14 @@ static fw_answer dispatch(fw_host_link *link, const eits_link_packet *packet)
         if ((c->rules & NOT_IN_UPLOAD) != 0 && link->upload.active)
             return busy_with(EITS_PACKET_MODEL_BEGIN);
         const fw_answer answer = c->run(link, packet->payload, packet->size);
-        if (c->rules != 0) /* it may have changed what drives build on */
+        if (c->rules != 0) /* it may have changed what the tracker reads */
             fw_tracks_restart(link);
         return answer;
     }
     return fw_refuse(EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
 }
 
-/* A command that was answered already, or is under way, is not run again. */
+/* A command that was answered, or that is under way, is not run again. */
 static bool sent_again(fw_host_link *link, eits_packet_type type, uint32_t request)
 {
     const eits_packet_reply *last = &link->replies.reply;

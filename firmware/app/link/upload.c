@@ -14,10 +14,10 @@ static void pause_scan(fw_host_link *link)
     if (upload->active)
         return;
     upload->active = true;
-    fw_scanning_restart(link); /* which stops it, and the generator */
+    fw_scanning_restart(link); /* stops it, and the generator */
 }
 
-/* The model in use goes on. */
+/* The model in use is scanned again. */
 static void leave(fw_host_link *link)
 {
     link->upload.active = false;
@@ -31,7 +31,7 @@ fw_answer fw_upload_begin(fw_host_link *link, uint32_t bytes, uint32_t crc)
     if (bytes > fw_store_room(store))
         return fw_refuse(EITS_REPLY_MODEL_SIZE, (int32_t)fw_store_room(store), 0);
     pause_scan(link);
-    /* cut short earlier: goes on where it was */
+    /* an upload that was interrupted is resumed */
     if (upload->begun && upload->bytes == bytes && upload->crc == crc)
         return fw_refuse(EITS_REPLY_OK, (int32_t)upload->offset, 0);
     upload->bank = fw_models_spare_bank(link->solve);
@@ -53,7 +53,7 @@ static fw_status program(const fw_store *store, const fw_upload *upload, const u
     fw_status status =
         whole > 0 ? store->ops->program(store->ctx, upload->bank, upload->offset, bytes, whole)
                   : FW_OK;
-    /* the end of a model: what fills the last word stays erased */
+    /* the end of a model: the rest of its last word stays erased */
     if (status == FW_OK && whole < size) {
         uint8_t last[4] = {0xFF, 0xFF, 0xFF, 0xFF};
         for (size_t k = whole; k < size; ++k)

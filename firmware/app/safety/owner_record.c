@@ -7,7 +7,7 @@
 _Static_assert(sizeof(fw_owner_record) == FW_OWNER_RECORD_BYTES, "a record is 32 bytes");
 
 typedef struct place {
-    uint32_t page, slot; /* the first slot behind the latest record that nothing was written to */
+    uint32_t page, slot; /* the first erased slot behind the latest record */
 } place;
 
 static const uint8_t *slot_at(const fw_store *store, uint32_t page, uint32_t slot)
@@ -24,7 +24,7 @@ static bool erased(const uint8_t *slot)
     return true;
 }
 
-/* A record that was cut while it was written is passed over, like one that has decayed. */
+/* A record that is not valid is skipped: power was cut while it was written, or it has decayed. */
 static fw_owner_record find(const fw_store *store, place *next)
 {
     fw_owner_record latest = {0}, one;

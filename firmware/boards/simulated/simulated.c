@@ -14,7 +14,7 @@ enum {
     FULL_SCALE_CODE = 65535,
     MCLK_HZ = 8000000,
     LEAD_US = 20,  /* from the start of a capture to its first slot */
-    IDLE_US = 1000 /* that pass where nothing is scanned */
+    IDLE_US = 1000 /* per turn while nothing is scanned */
 };
 #define RANGE_MARGIN 1.05f /* the converter's range over the largest voltage that is shown */
 #define MAX_RANGE_UV 4000000000u
@@ -65,7 +65,7 @@ static uint32_t frame_number(const sim_scene *scene, uint64_t at_us)
     return number < (double)scene->frames ? (uint32_t)number : scene->frames;
 }
 
-/* When the next scan begins, if none is under way: bursts before it are due are dropped. */
+/* When the next scan begins if none is under way. Earlier bursts are dropped. */
 static uint64_t next_scan_us(const sim_board *sim)
 {
     const fw_scan *scan = &sim->instrument.acquire.scan;
@@ -90,7 +90,8 @@ void sim_begin_scene(sim_board *sim)
     sim->scene.begins_with_scan = true;
 }
 
-/* A scan may begin at at_us: its voltages; false where they have not been put before the board. */
+/* Choose the voltages of a scan that may begin at at_us. Returns false if they were not given yet.
+ */
 static bool choose_frame(sim_board *sim, uint64_t at_us)
 {
     sim_scene *scene = &sim->scene;
@@ -120,7 +121,7 @@ static void scan_has_begun(sim_board *sim)
     ++sim->scene.untouched_shown;
 }
 
-/* Between V+ and V-, amplitude; 0 where the electrodes that are merged are no row of the table. */
+/* Amplitude between V+ and V-; 0 if the connected electrodes are not a row of the table. */
 static float volts_now(sim_board *sim)
 {
     const eits_model *model = &sim->instrument.solve.engine.model;
@@ -187,7 +188,7 @@ static void convert(sim_board *sim, float volts)
     }
 }
 
-/* Time passes only while the host reads: it is there, and would say so. */
+/* Time passes only while the host reads, so it is present. */
 static void listen(sim_board *sim)
 {
     drive_monitor_heard(&sim->monitor, now_ns(sim));
@@ -211,7 +212,8 @@ static void later(void *ctx, void (*work)(void *user), void *user)
         run_later(sim);
 }
 
-/* To the end of the next burst, which the application gets; false where its frame is missing. */
+/* Run to the end of the next burst, which the application gets. Returns false if its frame is
+ * missing. */
 static bool next_burst(sim_board *sim)
 {
     const fw_scan *scan = &sim->instrument.acquire.scan;
