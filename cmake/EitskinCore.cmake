@@ -11,7 +11,7 @@ set(EITSKIN_CORE_SOURCES
     frame/whitening_products.c frame/rows_out.c frame/follow.c
     diagnostics/electrodes.c diagnostics/outliers.c diagnostics/model_mismatch.c
     diagnostics/crowded.c diagnostics/reference_outliers.c
-    solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c solve/coordinate_descent.c
+    solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c
     solve/active_set.c solve/violations.c solve/active_columns.c
     touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c touch/seek.c
     touch/touch.c touch/tracker.c
