@@ -16,7 +16,6 @@ from eitskin.core.engine import load_core
 from eitskin.core.options_table import CHOICES, OF_MODEL, RANGES, OptionFields
 from eitskin.model.eitm import encode_model
 from eitskin.model.options import default_options
-from eitskin_studies.experiments.registry import EXPERIMENTS
 from small_models import prebuilt
 
 WIDTHS = ("float32", "float64")
@@ -46,17 +45,13 @@ def test_constants_have_one_name_and_a_check_that_exists():
     assert len(set(names)) == len(names) > 100
     tests = [f"{path.stem[5:]}_f32" for path in (ROOT / "tests" / "c").glob("test_*.c")]
     tests += [f"fw_{path.stem[5:]}" for path in (ROOT / "tests" / "firmware").glob("test_*.c")]
-    files = (ROOT / "studies/eitskin_studies/cli").glob("bench_*.py")
-    benches = "".join(path.read_text(encoding="utf-8") for path in files)
     for group in groups:
         words = shlex.split(group["check"])
         if words[0] == "ctest":
             assert words[1:4] == ["--preset", "host", "-R"]
             assert any(re.search(words[4], name) for name in tests), words
-        elif words[:2] == ["eitskin", "study"]:
-            assert words[2] in EXPERIMENTS
-        elif words[:2] == ["eitskin", "bench"]:
-            assert f"def run_{words[2]}(" in benches
+        elif words[0] == "eitskin":  # studies/tests/test_constants.py
+            assert words[1] in ("study", "bench"), words
         else:
             assert words[0] == "scripts/test", words
             assert (ROOT / words[1]).exists(), words
