@@ -13,7 +13,7 @@ from eitskin.model.eitm import decode_model, encode_model
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
+from other_worlds import WorldFactory, WorldScenes
 from small_models import prebuilt
 
 ENGINES = ("c", "c64")  # the oracle has no test of touches
