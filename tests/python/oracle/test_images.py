@@ -192,6 +192,21 @@ def test_noise_of_rows_left_out(data_kind):
     assert far.max() < 0.15 and np.quantile(far, 0.75) < 0.06, np.round(far, 3)
 
 
+@pytest.mark.parametrize("lost", [[], [3], [3, 8, 13]], ids=str)
+def test_a_touch_must_stand_out_of_the_noise_of_the_rows_in_use(lost):
+    """With a factor that puts the threshold a fifth below or above lambda_max, by the definition's
+    lambda_noise: within the 15 % by which C's may differ."""
+    made = AllEngines(small_model(), max_masked=208, lambda_noise_factor=0.0)
+    made.tare(narrow(small().quiet(1, 8)))
+    frame = without(lost, narrow(small().frames(4, 1)[0]))
+    made.with_options(detection_factor=0.0)
+    info = made["numpy"].reconstruct(frame, touches=False).info
+    for share in (0.8, 1.2):
+        made.with_options(detection_factor=share * info.lambda_max / info.lambda_noise)
+        stops = {one.info.stop for one in made.reconstruct(frame, touches=False).values()}
+        assert stops == {"iterations" if share < 1 else "below-threshold"}
+
+
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_what_is_said_of_a_frame(data_kind):
     made = AllEngines(small_model("f16", data_kind), solver="fista", detection_factor=1.2)
