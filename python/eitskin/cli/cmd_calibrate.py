@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.output)
     model, blob, name = load_or_prebuilt(options.model)
     reconstructor = Reconstructor(model, blob=blob)
-    reconstructor.with_options(sign=options.sign)
+    reconstructor.set_options(sign=options.sign)
     parts, unseen = [], []
     for recording, list_of_weights in zip(options.recordings, options.weights, strict=True):
         weights = load_weights(list_of_weights)
