@@ -4,9 +4,9 @@ import time
 from collections import deque
 from urllib.parse import unquote
 
-from eitskin.device.link import LinkEvent
 from eitskin.device.source import MAX_GAP_S, GivenFrame, Source, SourceTransport
 from eitskin.device.text_port import LinePort, open_port
+from eitskin.device.transport import LinkEvent
 from eitskin.errors import DeviceError, FrameError, UsageError
 from eitskin.frames.layout import BadLine, Layout, LineFrame, LineParser, load_layout
 from eitskin.frames.lines import LineReader, Row

@@ -84,7 +84,7 @@ class Reconstructor:
         """The options in force."""
         return self._options
 
-    def set_options(self, options: Options | None = None, **changes: Any) -> None:
+    def set_options(self, options: Options | None = None, /, **changes: Any) -> None:
         """Solve with ``options`` (None: those in use) and with ``changes`` to them by name, from
         now on.
 

@@ -11,8 +11,8 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.settings import SessionSettings
 from eitskin.page.server import PageServer, listen
+from eitskin.session.settings import SessionSettings
 from eitskin_studies.harness.live_page import FLAGS
 
 TOKEN = "a word for tests"
@@ -37,7 +37,7 @@ def serving(url: str, mode: Stream = ALL, **more: Any) -> Iterator[PageServer]:
     thread = threading.Thread(target=server.serve, daemon=True)
     thread.start()
     try:
-        until(lambda: server.follower.state != "starting")
+        until(lambda: server.reader.state != "starting")
         yield server
     finally:
         server.stop()
