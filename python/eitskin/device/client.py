@@ -21,22 +21,22 @@ TARE_FRAMES = 16
 
 def _asked_millihz(info: BoardInfo) -> int:
     """The excitation that the board was asked for: a whole number of its periods fills a burst.
-    INFO tells what the generator makes of it, which is not quite the same."""
+    INFO reports what the generator makes of it, which is not quite the same."""
     rate_millihz = 1000 * info.sample_rate_hz
     periods = round(info.excitation_millihz * info.samples / rate_millihz)
     return periods * rate_millihz // info.samples
 
 
 def check_tare_frames(frames: int) -> int:
-    """``frames`` if a board can take its reference from so many; UsageError else."""
+    """``frames`` if a board can take its reference from so many frames, else UsageError."""
     if frames != 1 and not 4 <= frames <= 1024:
         raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to 1024")
     return frames
 
 
 class Device(CommandExchange):
-    """All that a board can be told and asked; ``open_device`` makes one from a URL. Raises as
-    ``CommandExchange``."""
+    """All commands and questions that a board takes; ``open_device`` makes one from a URL. Raises
+    as ``CommandExchange``."""
 
     # ---- commands ----
 

@@ -40,11 +40,11 @@ AWAY_S = 120.0  # that a command waits for a port that is gone
 
 
 class CommandExchange:
-    """A board that was found, whose version fits and that answers. ``board`` is what INFO last
-    said.
+    """A board that was found, whose version fits and that answers. ``board`` is the last
+    INFO.
 
     Commands are sent again with the same request number where no answer comes, so that one lost
-    packet is not noticed; after ``TRIES`` the board is taken to be dead.
+    packet does no harm. A board that does not answer ``TRIES`` times has fallen silent.
 
     Raises:
         DeviceError: no answer, or another version.

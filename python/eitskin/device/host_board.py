@@ -31,7 +31,7 @@ def _load() -> Any:
 class HostBoard:
     """The firmware's application on this host, switched on, with what its two ``banks`` hold.
 
-    ``name`` and ``serial`` are what INFO says; ``period_us`` of its first frames; ``frames_given``:
+    ``name`` and ``serial`` are those in INFO; ``period_us`` of its first frames; ``frames_given``:
     by another instrument.
 
     Raises:
@@ -117,7 +117,7 @@ class HostBoard:
 
 
 class GivenBoard(HostBoard):
-    """A board that is given the frames of another instrument, of which INFO says no more than
+    """A board that is given the frames of another instrument, of which INFO has no more than
     ``name``, ``serial`` and how often they come."""
 
     def __init__(self, name: str, serial: str, banks: list[bytes], *, period_us: int) -> None:

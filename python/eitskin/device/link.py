@@ -346,7 +346,7 @@ class ThreadedLink(Link):
             self._sequence += 1
 
     def _keep_alive(self) -> None:
-        """Tell the board that we are there, where nothing else has told it."""
+        """Send a keepalive where nothing else was sent for a while."""
         if self._heard_s is None or time.monotonic() < self._heard_s + KEEPALIVE_S:
             return
         if not self._sending.locked():  # else a packet is on its way

@@ -53,10 +53,10 @@ def ports() -> list[Port]:
 
 def listing(found: list[Port]) -> str:
     """The ports in one line."""
-    told = (
+    shown = (
         f"{port.path} ({port.description})" if port.description else port.path for port in found
     )
-    return ", ".join(told) or "none"
+    return ", ".join(shown) or "none"
 
 
 def only_board() -> Port:

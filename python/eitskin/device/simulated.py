@@ -1,8 +1,8 @@
 """``sim:SCENE``: the firmware's own application, built for this host, before a scene's frames.
 
 The parts around it are simulated (firmware/boards/simulated): a converter of 16 bits whose range is
-that of the frames, no noise but the scene's, and no processor time, so that every time that would
-tell of one is 0. The clock runs only while the board scans for someone. Deterministic; no thread.
+that of the frames, no noise but the scene's, and no processor time, so that every time that depends
+on it is 0. The clock runs only while the board scans for someone. Deterministic; no thread.
 """
 
 import zlib
@@ -63,7 +63,7 @@ class SimBoard(HostBoard):
             self._rows = self.frames.rows(model.protocol)
             largest_v = self._rows.largest_v
         except BaseException:
-            self._model_crc = -1  # asked again, it says so again
+            self._model_crc = -1  # asked again, it fails again
             raise
         self._lib.sim_show(self._sim, largest_v, scene.quiet_frames, scene.frames, scene.rate_hz)
 
@@ -85,7 +85,7 @@ class SimBoard(HostBoard):
 
 class SimTransport(Transport):
     """The bytes of a ``SimBoard``. It scans a frame each time that it is read and has nothing else
-    to say. ``loop``: the scene begins again at its end."""
+    to send. ``loop``: the scene begins again at its end."""
 
     def __init__(self, name: str, board: SimBoard, *, loop: bool = False) -> None:
         self.url = self.name = f"sim:{name}"

@@ -1,6 +1,5 @@
-"""Frames of another instrument behind the board's own application: what a source is, and the
-transport that feeds its frames to the application, so that tare, stream, record and all else are
-the same as of a board.
+"""Frames of another instrument: what a source is, and the transport that feeds its frames to the
+board's own application, so that tare, stream, record and all else work as with a board.
 
 A source of your own is a class with ``read``; the entry point group ``eitskin.sources`` gives it a
 scheme (docs/guide/your-board.md).
@@ -32,7 +31,7 @@ PERIODS = 16  # frame periods that the reported rate is the mean of
 @dataclass(frozen=True, eq=False)
 class GivenFrame:
     """A frame: ``voltage_v`` (m,), real or complex, in the model's rows, NaN where a row cannot be
-    used; ``time_s`` by the instrument's clock, where it tells; ``came_s``: when it came, by
+    used; ``time_s`` by the instrument's clock, where it sends one; ``came_s``: when it came, by
     ``time.monotonic``, where that is not now."""
 
     voltage_v: AnyArray
@@ -41,12 +40,12 @@ class GivenFrame:
 
 
 class Source:
-    """Frames of an instrument; a source of your own is a subclass with ``read``.
+    """Frames of an instrument. A source of your own is a subclass with ``read``.
 
     Attributes:
         name: in messages and in INFO, where 15 characters of it are shown.
         synchronous: frames come whenever they are asked for, as from a file.
-        keeps: what nobody wants yet waits, as in a pipe; else it is gone.
+        keeps: frames that nobody wants yet wait, as in a pipe; else they are lost.
         ended: no frame will come again.
         period_s: from frame to frame, where it is known.
     """
@@ -74,7 +73,7 @@ class Source:
         raise NotImplementedError
 
     def take_events(self) -> list[LinkEvent]:
-        """What else is to be told."""
+        """What happened to the instrument since the last call."""
         return []
 
     def reopen(self) -> bool:
@@ -86,8 +85,8 @@ class Source:
 
 
 class SourceTransport(Transport):
-    """The bytes of the application that is given a source's frames. ``model`` goes into its first
-    bank (None: the prebuilt one)."""
+    """The application, built for this host, that gets a source's frames. ``model`` goes into its
+    first bank (None: the prebuilt one)."""
 
     def __init__(self, url: str, source: Source, model: bytes | None = None) -> None:
         self.url, self.source = url, source
@@ -141,7 +140,7 @@ class SourceTransport(Transport):
         return self._output()
 
     def begin(self) -> None:
-        """Give on what has come already, so that the board knows how often frames come."""
+        """Pass on the frames that have come already: the board then knows how often they come."""
         if not self.source.synchronous and not self.source.keeps:
             self._give(self.source.read(0.0))
 
@@ -202,7 +201,7 @@ class SourceTransport(Transport):
             self._rows = model.protocol.n_rows
 
     def _miss(self, now: float) -> None:
-        """The board's clock goes on where frames stay away for long, and it says so."""
+        """Where no frame comes for long, the board's clock goes on, and it reports the silence."""
         if self.source.synchronous:
             return
         limit = max(SILENT_S, SILENT_PERIODS * self._period_us() / 1e6)
@@ -239,7 +238,7 @@ def open_source(url: str, *, model: bytes | None = None) -> Transport:
 
     Raises:
         UsageError: it cannot be loaded, fails, or gives something else.
-        EitskinError: as it says itself.
+        EitskinError: whatever the source itself raises.
     """
     scheme, _, rest = url.partition(":")
     point = next(iter(entry_points(group=GROUP, name=scheme)))

@@ -44,8 +44,8 @@ class PacketStream(Protocol):
 
 
 def packet_stream(device: CommandExchange, what: Stream, every: int, frames: int) -> PacketStream:
-    """``what`` of every ``every``-th frame, ``frames`` of them (0: until it is stopped); the board
-    is told with the first ``next``."""
+    """``what`` of every ``every``-th frame, ``frames`` of them (0: until it is stopped). The first
+    ``next`` starts it."""
     if device.replays:
         return RecordedPackets(device, what, every, frames)
     return BoardPackets(device, what, every, frames)
@@ -56,7 +56,7 @@ class _Progress:
 
     def __init__(self, what: Stream, frames: int) -> None:
         self.what, self.wanted = what, frames
-        self.restarts = 0  # of the board, when it was last told to stream
+        self.restarts = 0  # of the board, when it last began to stream
         self._came = {kind: 0 for kind in Stream if kind & what & ~Stream.FOLLOWED}
 
     def take(self, item: Streamed) -> bool:

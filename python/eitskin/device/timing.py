@@ -19,8 +19,8 @@ class Timing:
 
 
 def split_timing(url: str) -> tuple[str, Timing]:
-    """A device's URL without what follows '?', and what that says. Of other schemes than sim, emu
-    and file the URL stays as it is."""
+    """A device's URL without what follows '?', and what that asks for. URLs of other schemes than
+    sim, emu and file stay as they are."""
     scheme, _, _ = url.partition(":")
     bare, mark, query = url.rpartition("?")
     if scheme not in TIMED or not mark:

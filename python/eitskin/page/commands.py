@@ -120,6 +120,7 @@ class PageCommands:
         if what != "fit":
             return teacher.go(what)
         answer: Future[str] = Future()
+        answer.set_running_or_notify_cancel()  # a page that goes does not stop it
 
         def run() -> None:
             try:

@@ -92,7 +92,7 @@ class SessionReader:
             try:
                 self._read()
                 self._set("ended", "the scene or the recording is over")
-            except Exception as error:  # the page says so, whatever it is
+            except Exception as error:  # whatever it is, the pages show it
                 self.error = error
                 self._set("failed", str(error) or type(error).__name__)
             finally:
@@ -138,8 +138,8 @@ class SessionReader:
             self._take_notice(message)
 
     def _take_report(self, report: DriveReport) -> None:
-        """No more of them than a page draws; none that says that nothing touches any more is left
-        out."""
+        """Pass on no more reports than a page draws, but each one without touches, so that a page
+        knows when the last finger has gone."""
         if report.touches and 0 <= report.time_s - self._reported_s < DRAWN_S:
             return
         self._reported_s = report.time_s

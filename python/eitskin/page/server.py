@@ -72,8 +72,8 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 class PageServer:
-    """Serves one device's page on ``listening`` until ``stop``. ``token`` is asked for by commands,
-    and where ``remote`` by everything. ``say`` gets lines for whoever started it.
+    """Serves one device's page on ``listening`` until ``stop``. Commands need the
+    ``token``; where ``remote``, everything does. ``say`` gets lines for whoever started it.
     """
 
     def __init__(
@@ -220,7 +220,7 @@ class PageServer:
         return self._remote or address.is_loopback
 
     def _from_here(self, headers: Any) -> bool:
-        """Whether Host is ours, and Origin, where a browser says one, the same."""
+        """Whether Host is ours, and Origin, where a browser sends one, the same."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if not self._host_is_ours(host):
             return False
@@ -320,17 +320,17 @@ class PageServer:
             )
 
     async def _receive(self, socket: WebSocket, page: PageClient) -> None:
-        """Read what the page says. No answer is waited for here, so that a command that the board
+        """Read the page's messages. No answer is waited for here, so that a command that the board
         does not answer keeps nobody from  Start again."""
         answers: set[asyncio.Task[None]] = set()
         try:
             while True:
                 try:
-                    said = json.loads(await socket.receive_text())
-                    if not isinstance(said, dict):
+                    message = json.loads(await socket.receive_text())
+                    if not isinstance(message, dict):
                         raise ValueError
-                    if said.get("type") == "drawn":
-                        page.drawn(int(said["number"]))
+                    if message.get("type") == "drawn":
+                        page.drawn(int(message["number"]))
                         continue
                 except (ValueError, KeyError, TypeError):
                     await socket.close(1003)
@@ -338,23 +338,23 @@ class PageServer:
                 if len(answers) >= MAX_WAITING:
                     page.tell(_refusal(f"the last {MAX_WAITING} commands are not answered yet"))
                     continue
-                task = asyncio.create_task(self._answer(said, page))
+                task = asyncio.create_task(self._answer(message, page))
                 answers.add(task)
                 task.add_done_callback(answers.discard)
         finally:
             for task in list(answers):
                 task.cancel()
 
-    async def _answer(self, said: dict[str, Any], page: PageClient) -> None:
+    async def _answer(self, message: dict[str, Any], page: PageClient) -> None:
         if not page.may_command:
             reason = "this needs the token: open the address that  eitskin view  printed"
             page.tell(_refusal(reason))
             return
         try:
-            done = self.commands.do(said.get("do"), said.get("value"))
+            done = self.commands.do(message.get("do"), message.get("value"))
             if isinstance(done, Future):
                 done = await asyncio.wrap_future(done)
-        except Exception as error:  # of whatever kind: the page waits for a word
+        except Exception as error:  # of whatever kind: the page waits for an answer
             page.tell(_refusal(str(error) or type(error).__name__))
             return
         page.tell(text_of("answer", ok=True, text=done))

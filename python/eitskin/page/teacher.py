@@ -20,9 +20,9 @@ from eitskin.teaching.teach import teach
 
 
 class Teacher:
-    """Guides through ``plan`` into the file ``presses``; ``skin`` with its description's
-    ``text``, None and "" for that of the board's model. ``on_event`` gets the facts for pages
-    whenever something is new."""
+    """Guides through the presses of ``plan`` and writes them into the file ``presses``; ``skin``
+    with its description's ``text``, None and "" for that of the board's model. ``on_event`` gets
+    the facts for pages whenever something is new."""
 
     def __init__(
         self, plan: PressPlan, presses: Path, skin: Skin | None = None, text: str = ""

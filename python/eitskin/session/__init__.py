@@ -1,2 +1,1 @@
-"""A skin as it is touched: a session with a board, its frames, and the messages that tell of
-them."""
+"""A session with a board: the one path of its frames from the transport to every consumer."""

@@ -106,14 +106,14 @@ class Frame:
             asked for.
         image: (n,) S/m on the model's pixels; None where it was not asked for.
         touches: strongest first; none where touches were not asked for (``has_touches``).
-        info: what the solver says; None where nothing was solved.
+        info: what the solver reports; None where nothing was solved.
         board_events: what the board itself made of its touches; None where it was not asked for.
         events: what its touches amounted to: fingers down, moved and up, gestures, zones pressed.
         known: the board's model, where the host has it.
         time_unix_s: when it was complete on this host, in seconds since 1970 (UTC); None for what
             was recorded.
         arrived_ns: the same by ``time.monotonic_ns``.
-        true: the touches that were there, where an observer of a scene tells.
+        true: the touches that were there, where an observer of a scene knows them.
         errors_mm: how far off the found touches (without them, the image's places) are, by their
             number; false ones are missing. None where the truth is not known.
         notices: what was noticed since the frame before.

@@ -49,7 +49,7 @@ def encoded(message: dict[str, Any]) -> str:
 
 
 def touch_table(touch: Touch) -> dict[str, Any]:
-    """A touch; a force that the model does not tell is null."""
+    """A touch; a force that the model does not give is null."""
     return asdict(touch) | {"force_n": touch.force_n or None}
 
 

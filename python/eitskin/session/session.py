@@ -22,7 +22,7 @@ from eitskin.device.link import Reconnect
 from eitskin.device.open import open_with_files
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.settings import ScanSettings, SolverSettings
-from eitskin.device.streaming import PacketStream, packet_stream
+from eitskin.device.streaming import packet_stream
 from eitskin.device.timing import split_timing
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
@@ -235,65 +235,85 @@ class Session:
             self._requests.close(reason)
 
     def _messages(self) -> Generator[Message, None, None]:
-        clock, count = Clock(), 0
-        replay = Replay(self.settings.every or 1) if self.replays else None
-        packets, assembler = self._stream(clock, count)
+        self._clock, self._count = Clock(), 0
+        self._replay = Replay(self.settings.every or 1) if self.replays else None
+        self._begin_stream()
         try:
             while not self._stopping.is_set():
-                item = packets.next(TICK_S)
-                if item is not None:
-                    came = assembler.take(item)
-                else:
-                    came = assembler.rest() if packets.over else []
-                for one in came:
-                    message = one if replay is None else replay.take(one)
-                    if message is None:
-                        continue
-                    if isinstance(message, Frame):
-                        if self._over(message):
-                            packets.over = True
-                            break
-                        count += 1
-                    if not isinstance(message, Notice) and self.timed:
-                        self.pacer.hold(message.time_us)
+                for message in self._due():
                     for seen in self._seen(message):
                         for consumer in self.consumers:
                             consumer(seen)
                         yield seen
-                    if self._stopping.is_set() or 0 < self.settings.frames <= count:
+                    if self._stopping.is_set() or 0 < self.settings.frames <= self._count:
                         return
-                if packets.over:
-                    replay = replay.again() if replay is not None and self._loops else None
-                    if replay is None:
+                if self._packets.over:
+                    if not self._begin_again():
                         return
-                    self.device.close()
-                    self.device = self._open()
-                    packets, assembler = self._stream(Clock(), count)
                 elif self._requests.waiting:
-                    if self.device.link.away:
-                        self._requests.refuse(
-                            f"{self.name}: the board is unplugged; plug it in, then ask again"
-                        )
-                    elif self.replays:
-                        self._requests.carry_out(self.device)
-                    else:
-                        if packets.stop():  # the board stops before anything is asked of it
-                            self._requests.carry_out(self.device)
-                        # a board that does not answer ends the session when the stream starts again
-                        packets, assembler = self._stream(clock, count)
+                    self._answer_requests()
         finally:
-            packets.stop()
+            self._packets.stop()
 
-    def _stream(self, clock: Clock, count: int) -> tuple[PacketStream, Assembler]:
-        """The packets from now on, after ``count`` frames, and what puts them together."""
-        how, what = self.settings, self._streamed
+    def _begin_stream(self) -> None:
+        """Ask for the packets from now on, and for what puts them together."""
+        how, what = self.settings, self.mode
+        if how.report == "drive":
+            what |= Stream.FOLLOWED
         if self.replays:
             if what & Stream.EVENTS:
                 what |= Stream.TOUCHES  # of which gestures are made where none were recorded
-            return packet_stream(self.device, what, 1, 0), Assembler(what, clock)
-        limited = how.frames and how.report == "frame"
-        frames = max(how.frames - count, 1) if limited else 0
-        return packet_stream(self.device, what, self._every, frames), Assembler(what, clock)
+            self._packets = packet_stream(self.device, what, 1, 0)
+        else:
+            limited = how.frames and how.report == "frame"
+            frames = max(how.frames - self._count, 1) if limited else 0
+            self._packets = packet_stream(self.device, what, self._every, frames)
+        self._assembler = Assembler(what, self._clock)
+
+    def _due(self) -> Iterator[Message]:
+        """The messages that the next packet completes, each when it is due; none where nothing
+        comes for a while."""
+        item = self._packets.next(TICK_S)
+        if item is not None:
+            came = self._assembler.take(item)
+        else:
+            came = self._assembler.rest() if self._packets.over else []
+        for one in came:
+            message = one if self._replay is None else self._replay.take(one)
+            if message is None:
+                continue
+            if isinstance(message, Frame):
+                if self._over(message):
+                    self._packets.over = True
+                    return
+                self._count += 1
+            if self.timed and not isinstance(message, Notice):
+                self.pacer.hold(message.time_us)
+            yield message
+
+    def _begin_again(self) -> bool:
+        """Open a looped recording once more; False where nothing comes any more."""
+        again = self._replay.again() if self._replay is not None and self._loops else None
+        if again is None:
+            return False
+        self.device.close()
+        self.device = self._open()
+        self._replay, self._clock = again, Clock()
+        self._begin_stream()
+        return True
+
+    def _answer_requests(self) -> None:
+        """Let others talk to the board; its stream stops meanwhile. A board that does not even stop
+        does not answer: the session ends when the stream starts again, and the requests with it."""
+        if self.device.link.away:
+            reason = f"{self.name}: the board is unplugged; plug it in, then ask again"
+            self._requests.refuse(reason)
+        elif self.replays:
+            self._requests.carry_out(self.device)
+        else:
+            if self._packets.stop():
+                self._requests.carry_out(self.device)
+            self._begin_stream()
 
     def _seen(self, message: Message) -> Iterator[Message]:
         """``message`` as consumers get it, after the notices that it gives rise to."""
@@ -424,8 +444,3 @@ class Session:
                 "  --every"
             )
         return carried
-
-    @property
-    def _streamed(self) -> Stream:
-        drives = self.settings.report == "drive"
-        return self.mode | (Stream.FOLLOWED if drives else Stream(0))

@@ -17,8 +17,8 @@ THIS_MACHINE = "127.0.0.1"
 
 
 class Dropped(Exception):
-    """A sink could not take this one for now, such as while its broker is away. It is counted, and
-    nothing is said."""
+    """A sink could not take this one for now, such as while its broker is away. It is counted
+    without a line for the user."""
 
 
 @dataclass(frozen=True, eq=False)

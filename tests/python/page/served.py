@@ -91,7 +91,7 @@ class Page:
 
     def answer(self) -> str:
         """What came of the last press."""
-        return str(until(lambda: self.text("answer").replace("…", "")))
+        return str(until(lambda: self.text("answer").replace("…", ""), 120))
 
     def touches(self) -> list[tuple[float, float]]:
         """Places in mm, as the page's table says them."""

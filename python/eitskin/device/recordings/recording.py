@@ -145,7 +145,7 @@ class FileTransport(Transport):
 
 
 def read_head(path: str | Path) -> dict[str, Any]:
-    """What the recording in ``path`` says of itself."""
+    """The head of the recording in ``path``."""
     try:
         with Path(path).open("rb") as stream:
             data = stream.read(MAX_HEAD)
@@ -179,9 +179,7 @@ def read_head(path: str | Path) -> dict[str, Any]:
         or head.get("format") != FORMAT
         or not isinstance(head.get("version"), int)
     ):
-        raise FileError(
-            f"{path}: no eitskin recording (.eits): its first packet says something else"
-        )
+        raise FileError(f"{path}: no eitskin recording (.eits): its first packet is something else")
     if head["version"] > VERSION:
         raise DeviceError(
             f"{path}: recording version {head['version']}, this eitskin reads up to {VERSION};"
@@ -199,7 +197,7 @@ def _noted_scene(url: str) -> SimulatedScene | None:
 
 
 def _noted_hashes(noted: Any) -> BoardHashes:
-    """What the head says, zero where it says nothing that can be."""
+    """The hashes that the head notes; zero where it notes none, or no hash."""
     values = []
     for name in ("model", "firmware"):
         text = str(noted.get(name)) if isinstance(noted, dict) else ""

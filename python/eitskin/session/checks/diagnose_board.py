@@ -74,8 +74,8 @@ def board_subject(
 
 
 def board_findings(report: DoctorReport, measured: MeasuredBoard) -> DoctorReport:
-    """``report`` with what the board itself says. Remedies of ``eitskin import`` are taken out: a
-    board is repaired by hand."""
+    """``report`` with what the board itself reports. Remedies of ``eitskin import`` are taken out,
+    because a board is repaired by hand."""
     raised = [fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised]
     reported = {
         (fault.code, fault.index if fault.code in ELECTRODE_FAULTS else 0): fault

@@ -236,8 +236,8 @@ def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
 
 
 def same_diagnostics(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
-    """Whether this host's core found in a frame what the board says of it. Rows that the converter
-    saturated are no numbers to the core: the quality of the raw frame tells them."""
+    """Whether this host's core found in a frame what the board reports. Rows that the converter
+    saturated are NaN to the core; the quality of the raw frame marks them."""
     only_saturated = raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED
     lost = int(np.count_nonzero(only_saturated))
     saturated = options.diagnostics & 1 << DIAGNOSTICS.index("saturated") if lost else 0
