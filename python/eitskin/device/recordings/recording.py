@@ -179,7 +179,9 @@ def read_head(path: str | Path) -> dict[str, Any]:
         or head.get("format") != FORMAT
         or not isinstance(head.get("version"), int)
     ):
-        raise FileError(f"{path}: no eitskin recording (.eits): its first packet is something else")
+        raise FileError(
+            f"{path}: no eitskin recording (.eits): its first packet says something else"
+        )
     if head["version"] > VERSION:
         raise DeviceError(
             f"{path}: recording version {head['version']}, this eitskin reads up to {VERSION};"
