@@ -11,7 +11,7 @@ static bool drives(void)
     return (b.board.monitor.lines & 0xF0000u) != 0 || fake_generator_hz(&b.board) > 0;
 }
 
-/* A host whose presence is known by its packets alone. */
+/* Start with a host that is heard only by its packets. */
 static void start_unheard(void)
 {
     b.host.quiet = true;
@@ -45,7 +45,7 @@ TEST(test_off_until_asked)
     CHECK_EQUAL(b.board.generator.control & AD9833_MODEL_RESET, AD9833_MODEL_RESET);
     host_run(&b.host, 5000);
     CHECK(!drives());
-    run_alive(1000); /* to be there asks for nothing; nor do questions */
+    run_alive(1000); /* keepalives and questions do not ask for current */
     CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_OFF);
     (void)host_stats(&b.host, 0);
     TAKEN(host_plain(&b.host, EITS_PACKET_SELF_TEST));
@@ -55,13 +55,13 @@ TEST(test_off_until_asked)
     TARE(4);
     CHECK(drives());
     CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_ON);
-    keep_alive(0); /* the host goes */
+    keep_alive(0); /* the host says that it leaves */
     CHECK(!drives());
     CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_OFF);
 }
 
-/* Silence ends the drive and the stream within a second, not the reference; who asks again gets
- * frames of the same tare. */
+/* Silence ends the current and the stream within a second, but not the reference: a host that asks
+ * again gets frames against the same tare. */
 TEST(test_silence)
 {
     start_unheard();
@@ -85,18 +85,18 @@ TEST(test_silence)
     CHECK_EQUAL(info.drive, EITS_DRIVE_SILENT);
     CHECK_EQUAL(info.streaming, 0);
     CHECK_EQUAL(info.tared, 1);
-    host_run(&b.host, 20); /* heard, but it did not ask again */
+    host_run(&b.host, 20); /* the host is heard, but did not ask again */
     CHECK(!drives());
     const uint32_t scanned = host_stats(&b.host, 0).frames_scanned;
     STREAM(EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0);
     host_run(&b.host, 200);
     raw = host_packet_of(&b.host, EITS_PACKET_RAW, 0);
     const eits_packet_raw *head = (const void *)raw->payload;
-    CHECK_EQUAL(head->frame, scanned + 2); /* two settled */
+    CHECK_EQUAL(head->frame, scanned + 2); /* two were dropped while capacitors settled */
     for (uint32_t i = 0; i < 208; ++i)
         CHECK_NEAR(raw_volts(raw, i), before[i], fake_lsb_v(&b.board));
     CHECK(host_count(&b.host, EITS_PACKET_IMAGE) > 0);
-    /* a tare that is cut by silence fails, and the old reference stays */
+    /* a tare fails if the host falls silent, and the old reference stays */
     eits_command_tare c = {77, 200};
     host_send(&b.host, EITS_PACKET_TARE, &c, sizeof c);
     host_run(&b.host, 1500);
@@ -110,7 +110,7 @@ TEST(test_owner_keeps_it)
     start_unheard();
     TAKEN(set(EITS_SETTING_KEEP_DRIVE, 0));
     CHECK(drives());
-    b.board.monitor.needs_host = false; /* it is what the owner wants */
+    b.board.monitor.needs_host = false; /* the owner allows it */
     b.host.kept_on = true;
     host_run(&b.host, 5000);
     keep_alive(0);
@@ -130,27 +130,37 @@ TEST(test_lock)
     bench_restart(&b);
     CHECK_EQUAL(host_info(&b.host).settings, EITS_SETTING_LOCKED);
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 400);
+    const struct {
+        const char *name;
+        bool button;
+        uint16_t status;
+        bool reported;
+        uint32_t settings; /* afterwards */
+    } cases[] = {
+        {"button not held", false, EITS_REPLY_LOCKED, true, EITS_SETTING_LOCKED},
+        {"button held", true, EITS_REPLY_OK, false, EITS_SETTING_SENSE},
+    };
     eits_command_model_begin begin = {0, 64, 0};
     eits_command_scan scan = host_default_scan();
-    for (int held = 0; held < 2; ++held) {
-        b.board.button = held != 0;
-        const uint16_t wanted = held ? EITS_REPLY_OK : EITS_REPLY_LOCKED;
+    scan.excitation_millihz = 25000000;
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
+        b.board.button = cases[k].button;
         host_forget(&b.host);
-        scan.excitation_millihz = 25000000;
-        CHECK_EQUAL(scan_with(scan).status, wanted);
+        CHECK_EQUAL(scan_with(scan).status, cases[k].status);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_LOCKED, true, 0);
-        CHECK((fault != NULL) == !held);
+        CHECK_EQUAL(fault != NULL, cases[k].reported);
         CHECK(fault == NULL || fault->index == EITS_PACKET_SCAN);
         CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MODEL_BEGIN, &begin, sizeof begin).status,
-                    wanted);
-        host_run(&b.host, 11000); /* the upload is given up */
-        CHECK_EQUAL(set(EITS_SETTING_SENSE, 0).status, wanted);
-        CHECK_EQUAL(host_info(&b.host).settings, held ? EITS_SETTING_SENSE : EITS_SETTING_LOCKED);
+                    cases[k].status);
+        host_run(&b.host, 11000); /* the upload times out */
+        CHECK_EQUAL(set(EITS_SETTING_SENSE, 0).status, cases[k].status);
+        CHECK_EQUAL(host_info(&b.host).settings, cases[k].settings);
     }
 }
 
-/* Power goes at any write of a change of settings, pages that are full and erased among them: the
- * old ones stay, or the new ones are there. */
+/* Power is cut at any write while settings change, also when a page is full and erased: afterwards
+ * the old settings or the new ones are valid. */
 TEST(test_cuts)
 {
     static fw_store store; /* not in registers that longjmp forgets */
@@ -160,38 +170,39 @@ TEST(test_cuts)
         store = b.board.board.store;
         uint32_t done = 0;
         for (; done < 7; ++done)
-            CHECK_EQUAL(fw_kept_save(&store, done, 100 + done), FW_OK);
+            CHECK_EQUAL(fw_owner_record_save(&store, done, 100 + done), FW_OK);
         b.board.cut_at = b.board.flash_steps + step;
         saved = done;
         if (setjmp(b.board.cut) == 0) {
             for (; saved < 14; ++saved)
-                (void)fw_kept_save(&store, saved, 100 + saved);
+                (void)fw_owner_record_save(&store, saved, 100 + saved);
         }
         b.board.cut_at = 0;
-        const fw_kept kept = fw_kept_load(&store);
-        CHECK(kept.magic == FW_KEPT_MAGIC && kept.current_limit_ua_rms == 100 + kept.settings);
+        const fw_owner_record kept = fw_owner_record_load(&store);
+        CHECK(kept.magic == FW_OWNER_RECORD_MAGIC &&
+              kept.current_limit_ua_rms == 100 + kept.settings);
         CHECK(kept.settings + 1 == saved || kept.settings == saved);
-        for (uint32_t more = 20; more < 40; ++more) { /* and it goes on */
-            CHECK_EQUAL(fw_kept_save(&store, more, 100 + more), FW_OK);
-            CHECK_EQUAL(fw_kept_load(&store).settings, more);
+        for (uint32_t more = 20; more < 40; ++more) { /* later changes work */
+            CHECK_EQUAL(fw_owner_record_save(&store, more, 100 + more), FW_OK);
+            CHECK_EQUAL(fw_owner_record_load(&store).settings, more);
         }
         CHECK_EQUAL(b.board.rewrites, 0);
     }
     store.page_bytes = 0;
-    CHECK_EQUAL(fw_kept_save(&store, 1, 1), FW_E_RANGE);
-    CHECK_EQUAL(fw_kept_load(&store).magic, 0);
+    CHECK_EQUAL(fw_owner_record_save(&store, 1, 1), FW_E_RANGE);
+    CHECK_EQUAL(fw_owner_record_load(&store).magic, 0);
 }
 
 TEST(test_limit)
 {
     start_unheard();
     TAKEN(set(0, EITS_LIMIT_KEPT));
-    CHECK_EQUAL(fw_kept_load(&b.board.board.store).current_limit_ua_rms, 0);
+    CHECK_EQUAL(fw_owner_record_load(&b.board.board.store).current_limit_ua_rms, 0);
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 437); /* 1.25 times 350 */
     b.board.current_ua = 500;
     STREAM(EITS_STREAM_RAW, 1, 0);
     run_alive(500);
-    CHECK(drives()); /* nobody said that there is a resistor */
+    CHECK(drives()); /* the owner has not said that the board can measure it */
     TAKEN(set(EITS_SETTING_SENSE, 400));
     CHECK(!drives());
     b.board.current_ua = 400;
@@ -216,13 +227,13 @@ TEST(test_limit)
     TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
     b.board.current_ua = 350;
     TARE(4);
-    TAKEN(set(EITS_SETTING_SENSE, 1)); /* the least limit */
+    TAKEN(set(EITS_SETTING_SENSE, 1)); /* the lowest limit */
     STREAM(EITS_STREAM_RAW, 1, 0);
     run_alive(500);
     CHECK_EQUAL(host_info(&b.host).drive, EITS_DRIVE_TRIPPED);
 }
 
-/* Multiplexers that do not open when the drive is asked for: nothing drives until they do. */
+/* If the multiplexers do not open when current is asked for, none flows until they do. */
 TEST(test_lines_that_do_not_open)
 {
     start_unheard();
@@ -237,7 +248,7 @@ TEST(test_lines_that_do_not_open)
     b.board.lines_fails = 0;
     run_alive(500);
     CHECK(drives());
-    TAKEN(host_reply(&b.host, c.request)); /* it has waited */
+    TAKEN(host_reply(&b.host, c.request)); /* the tare has waited */
     CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_BUS, 0);
 }
 
@@ -250,23 +261,31 @@ TEST(test_resets_are_reported)
     CHECK(host_fault(&b.host, EITS_FAULT_SUPPLY, true, 0) != NULL);
 }
 
-/* Examples of FIPS 180-2, appendix B, and lengths about a block. */
+/* Examples of FIPS 180-2, appendix B. */
 TEST(test_sha256)
 {
-    static const uint8_t EMPTY[4] = {0xe3, 0xb0, 0xc4, 0x42}, ABC[4] = {0xba, 0x78, 0x16, 0xbf},
-                         TWO[4] = {0x24, 0x8d, 0x6a, 0x61}, MANY[4] = {0xcd, 0xc7, 0x6e, 0x5c};
-    static const char text[] = "abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq";
-    static uint8_t a[1000000];
-    uint8_t digest[32];
-    fw_sha256(NULL, 0, digest);
-    CHECK(memcmp(digest, EMPTY, 4) == 0);
-    fw_sha256((const uint8_t *)"abc", 3, digest);
-    CHECK(memcmp(digest, ABC, 4) == 0);
-    fw_sha256((const uint8_t *)text, sizeof text - 1, digest);
-    CHECK(memcmp(digest, TWO, 4) == 0);
-    memset(a, 'a', sizeof a);
-    fw_sha256(a, sizeof a, digest);
-    CHECK(memcmp(digest, MANY, 4) == 0);
+    static uint8_t million[1000000];
+    memset(million, 'a', sizeof million);
+    const struct {
+        const char *name;
+        const void *bytes;
+        size_t size;
+        uint8_t digest[4]; /* its beginning */
+    } cases[] = {
+        {"no bytes", NULL, 0, {0xe3, 0xb0, 0xc4, 0x42}},
+        {"three bytes", "abc", 3, {0xba, 0x78, 0x16, 0xbf}},
+        {"two blocks",
+         "abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq",
+         56,
+         {0x24, 0x8d, 0x6a, 0x61}},
+        {"a million times a", million, sizeof million, {0xcd, 0xc7, 0x6e, 0x5c}},
+    };
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        uint8_t digest[32];
+        CASE(cases[k].name);
+        fw_sha256(cases[k].bytes, cases[k].size, digest);
+        CHECK(memcmp(digest, cases[k].digest, 4) == 0);
+    }
 }
 
 TEST(test_hashes)
