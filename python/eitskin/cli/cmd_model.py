@@ -287,7 +287,7 @@ def _differences_to_numpy(model: Model, blob: bytes) -> dict[str, float]:
     images = {}
     for engine in ENGINES:
         one = Reconstructor(model, engine=engine, blob=blob)
-        one.with_options(solver="fista")
+        one.set_options(solver="fista")
         one.tare(model.golden.reference_v)
         images[engine] = one.reconstruct(model.golden.frame_v, touches=False).image
     peak = float(np.abs(images["numpy"]).max()) or 1.0

@@ -70,7 +70,7 @@ def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
     results = {}
     for engine in ENGINES:
         reconstructor = Reconstructor(model, engine=engine, blob=blob)
-        reconstructor.with_options(solver="fista")  # on every column, so that images compare
+        reconstructor.set_options(solver="fista")  # on every column, so that images compare
         reconstructor.tare(frames.reference_voltage_v)
         results[engine] = reconstructor.reconstruct(frames.voltage_v[0])
     score = scorer_for(model).score(frames, 0, results["c"], "increase")

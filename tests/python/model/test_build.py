@@ -69,7 +69,7 @@ def test_golden_frame_of_every_storage_and_data_kind(storage, data_kind):
     model, images = small_model(storage, data_kind), []
     for name in ("c64", "numpy"):  # numpy looks at every column, and the default solver does not
         engine = Reconstructor(model, engine=name, blob=blob)
-        engine.with_options(solver="fista")
+        engine.set_options(solver="fista")
         engine.tare(model.golden.reference_v)
         images.append(engine.reconstruct(model.golden.frame_v, touches=False).image)
     assert np.abs(images[0] - images[1]).max() < 1e-9 * np.abs(images[1]).max()

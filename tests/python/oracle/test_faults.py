@@ -43,7 +43,7 @@ def said(engine: object, frame: FloatArray) -> tuple[object, ...]:
 @cache
 def tared(quiet: int = 64, **options: object) -> AllEngines:
     made = AllEngines(*prebuilt(), engines=("c", "c64", "numpy"))
-    made.with_options(**options)
+    made.set_options(**options)
     made.tare(session().quiet_v[:quiet].astype(np.float32).astype(float))
     return made
 
@@ -150,11 +150,11 @@ def test_drawn_faults(data):
     made = tared(draw(st.sampled_from((1, 64))))
     options = {"diagnostics": draw(st.sampled_from((511, 0, 511 - 8, 511 - 2, 511 - 32, 511 - 16)))}
     options["saturation_v"] = draw(st.sampled_from((0.0, 1.0)))
-    made.with_options(**options)
+    made.set_options(**options)
     try:
         alike(made, frame)
     finally:
-        made.with_options(diagnostics=511, saturation_v=0.0)
+        made.set_options(diagnostics=511, saturation_v=0.0)
 
 
 def test_half_scans_have_no_reciprocals_of_their_own():
@@ -215,9 +215,9 @@ def test_stale_references(sign, times_change):
     """A change the other way than touches go; never with both signs."""
     made = tared(64)
     mean = session().quiet_v.mean(axis=0)
-    made.with_options(sign=sign)
+    made.set_options(sign=sign)
     names = alike(made, mean + times_change * (session().frames_v[2] - mean))[3]
-    made.with_options(sign="increase")
+    made.set_options(sign="increase")
     opposite_way = sign != "both" and (times_change > 0) == (sign == "decrease")
     assert ("stale reference" in names) == opposite_way  # type: ignore[operator]
 

@@ -66,10 +66,10 @@ def agree(
     """S'y and images of ``frames`` are within ``bounds``; lambda is a twentieth of lambda_max."""
     worst = {name: [0.0, 0.0] for name in bounds}
     for frame in frames:
-        made.with_options(**{**DATA, "solver": "fista", "detection_factor": 0.0})
+        made.set_options(**{**DATA, "solver": "fista", "detection_factor": 0.0})
         data = made.reconstruct(frame, touches=False)
         top = data["numpy"].info.lambda_max
-        made.with_options(iterations=60, lambda_abs=0.05 * top, sign=sign)
+        made.set_options(iterations=60, lambda_abs=0.05 * top, sign=sign)
         images = made.reconstruct(frame, touches=False)
         for name, found in worst.items():
             assert data[name].info.masked == data["numpy"].info.masked
@@ -180,7 +180,7 @@ def test_noise_of_rows_left_out(data_kind):
     that keeps a lost direction regular for data. On electrodes left out, one to three of every
     kind, that is within 15 % of the definition, and within 6 % in three of four."""
     made, ratios = AllEngines(small_model("f32", data_kind), engines=("c64", "numpy")), []
-    made.with_options(max_masked=208)
+    made.set_options(max_masked=208)
     made.tare(small().quiet(1, 8))
     frame = small().frames(4, 1)[0]
     for count in (1, 2, 3):
@@ -199,10 +199,10 @@ def test_a_touch_must_stand_out_of_the_noise_of_the_rows_in_use(lost):
     made = AllEngines(small_model(), max_masked=208, lambda_noise_factor=0.0)
     made.tare(narrow(small().quiet(1, 8)))
     frame = without(lost, narrow(small().frames(4, 1)[0]))
-    made.with_options(detection_factor=0.0)
+    made.set_options(detection_factor=0.0)
     info = made["numpy"].reconstruct(frame, touches=False).info
     for share in (0.8, 1.2):
-        made.with_options(detection_factor=share * info.lambda_max / info.lambda_noise)
+        made.set_options(detection_factor=share * info.lambda_max / info.lambda_noise)
         stops = {one.info.stop for one in made.reconstruct(frame, touches=False).values()}
         assert stops == {"iterations" if share < 1 else "below-threshold"}
 
@@ -211,7 +211,7 @@ def test_a_touch_must_stand_out_of_the_noise_of_the_rows_in_use(lost):
 def test_what_is_said_of_a_frame(data_kind):
     made = AllEngines(small_model("f16", data_kind), solver="fista", detection_factor=1.2)
     made.tare(narrow(small().quiet(3, 21)))
-    made.with_options(lambda_rel=0.05)
+    made.set_options(lambda_rel=0.05)
     infos = {n: r.info for n, r in made.reconstruct(narrow(small().frames(4, 1)[0])).items()}
     expected = infos["numpy"]
     for name, bound in (("c64", 1e-5), ("c", 3e-3)):
@@ -236,9 +236,9 @@ def test_images_from_a_warm_start(data_kind):
     noisy = narrow(np.array(frames) + s.quiet(4, 16) - s.linear.v0_v)
     noisy[7, s.protocol.reciprocal_pairs().first[:40]] = np.nan
     made.tare(narrow(s.quiet(1, 8)))
-    made.with_options(iterations=60, lambda_abs=1e30)
+    made.set_options(iterations=60, lambda_abs=1e30)
     top = made["numpy"].reconstruct(noisy[0], touches=False).info.lambda_max
-    made.with_options(lambda_abs=0.05 * top)
+    made.set_options(lambda_abs=0.05 * top)
     for k, frame in enumerate(noisy):
         if k == 9:
             for one in made.values():
@@ -261,7 +261,7 @@ def test_recovery_from_a_step_too_long(factor, halvings, solver, engine):
     struct.pack_into("<f", blob, place, factor * struct.unpack_from("<f", blob, place)[0])
     wrong = decode_model(sealed(blob), "x")
     made = Reconstructor(wrong, engine=engine, blob=sealed(blob))
-    made.with_options(iterations=300, gap_every=5, detection_factor=0.0, solver=solver)
+    made.set_options(iterations=300, gap_every=5, detection_factor=0.0, solver=solver)
     made.tare(small().linear.v0_v)
     result, oracle = made.reconstruct(small().frames(9, 1)[0], touches=False), OracleEngine(wrong)
     oracle.set_reference(small().linear.v0_v[None])
@@ -314,7 +314,7 @@ def test_the_engine_numpy_has_no_memory_and_counts_no_work():
     multiply-accumulates is refused (test_reconstructor)."""
     frames = session().frames_v[:2]
     plain, tracked = (Reconstructor(prebuilt()[0], engine="numpy") for _ in range(2))
-    tracked.with_options(track_confirm=3, track_hold=2, track_smooth=0.7, reference_frames=2)
+    tracked.set_options(track_confirm=3, track_hold=2, track_smooth=0.7, reference_frames=2)
     for one in (plain, tracked):
         one.tare(session().quiet_v)
     for frame in frames:

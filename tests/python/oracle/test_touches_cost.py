@@ -69,7 +69,7 @@ def judged(count: int, snr_db: float) -> list[float]:
     quiet_v, frames_v = scenes(count, snr_db)
     core = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1])
     oracle = OracleEngine(prebuilt()[0])
-    core.with_options(**PLAIN)
+    core.set_options(**PLAIN)
     oracle.set_options(core.options)
     core.tare(quiet_v)
     oracle.set_reference(quiet_v)
