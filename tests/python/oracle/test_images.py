@@ -8,6 +8,7 @@ lambda of nothing its coefficients are S'y / L.
 import struct
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,14 +17,20 @@ from all_engines import AllEngines
 from eitm_bytes import sealed, sections_of
 from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError
-from eitskin.model.eitm import decode_model
+from eitskin.model.build import BuildSettings, linearise, make_model
+from eitskin.model.eitm import decode_model, encode_model
+from eitskin.model.model import Model
 from eitskin.oracle.engine import OracleEngine
 from eitskin.oracle.lasso import Lasso
+from eitskin.skin.protocol import adjacent, table
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 from small_models import (
     DATA_KINDS,
+    ELEMENTS,
+    PIXELS,
     SIGNS,
     STORAGES,
+    Small,
     prebuilt,
     session,
     small,
@@ -101,6 +108,33 @@ def test_one_row_of_a_pair_stands_for_both(storage, data_kind):
     made.mask_rows(mask)
     made.tare(narrow(small().quiet(1, 8)))
     agree(made, frames, EXACT, "increase")
+
+
+@cache
+def turned(data_kind: str) -> tuple[Small, Model]:
+    """A skin whose every third row measures the other way round than its reciprocal."""
+    rows = adjacent(16).drive_measure.astype(int)
+    rows[::3] = rows[::3][:, [0, 1, 3, 2]]
+    skin, protocol = small().skin, table(16, rows)
+    linear = linearise(skin, protocol, pixels_across=PIXELS, elements=ELEMENTS)
+    settings = BuildSettings(rank=37, data_kind=data_kind)
+    model = make_model(skin, protocol, linear, settings)
+    return Small(skin, protocol, linear), decode_model(encode_model(model), "turned")
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+def test_reciprocals_that_are_measured_the_other_way_round(data_kind):
+    """Differences turn with them, ratios do not: one row stands for both as before."""
+    s, model = turned(data_kind)
+    assert (model.fold.sign < 0).any() and (model.fold.sign > 0).any()
+    made = AllEngines(model, diagnostics=0)
+    made.tare(narrow(s.quiet(1, 8)))
+    frames = narrow(s.frames(5, 3))
+    frames[1, model.fold.first[::2]] = np.nan
+    frames[2, model.fold.second[1::2]] = np.nan
+    agree(made, frames, EXACT, "increase")
+    whole, first, second = (made["numpy"].reconstruct(f, touches=False).image for f in frames)
+    assert whole.any() and first.any() and second.any()
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
