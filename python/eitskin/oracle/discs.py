@@ -170,7 +170,7 @@ class DiscFit:
     def explained(self, discs: Sequence[Disc], whole: float) -> FloatArray:
         """What leaving each disc alone out would add to |residual|^2, the strengths of the others
         fitted again, as a fraction of ``whole``."""
-        answers = np.array([self.answer(disc) for disc in discs]).reshape(len(discs), -1)
+        answers = np.array([self.answer(disc) for disc in discs])
         out = []
         for k, own in enumerate(answers):
             others = np.delete(answers, k, axis=0).T
