@@ -4,20 +4,19 @@ same C code; named zones always here."""
 from collections.abc import Sequence
 
 from eitskin.core.gestures import GestureEvent, Gestures, Zone
-from eitskin.device.live_frames import LiveFrame
+from eitskin.session.frame import Frame
 
 
-class GestureTeller:
+class StreamGestures:
     """Takes the frames of a stream in their order."""
 
     def __init__(self, zones: Sequence[Zone] = ()) -> None:
         self._gestures = Gestures(zones)
 
-    def take(self, frame: LiveFrame) -> tuple[GestureEvent, ...]:
+    def take(self, frame: Frame) -> tuple[GestureEvent, ...]:
         """What happened in ``frame``; nothing where its touches are not known."""
-        if frame.events is not None:
-            events = frame.events.events
-            return events + tuple(self._gestures.press_zones(events))
-        if frame.touches is None or frame.refused is not None:
+        if frame.board_events is not None:
+            return frame.board_events + tuple(self._gestures.press_zones(frame.board_events))
+        if not frame.has_touches or frame.refused is not None:
             return ()
-        return tuple(self._gestures.update(frame.touches.touches, frame.board_us))
+        return tuple(self._gestures.update(frame.touches, frame.board_us))

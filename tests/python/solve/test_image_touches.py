@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from eitskin.fem.grid import grid_for
-from eitskin.scoring.image_touches import touches_in_image
 from eitskin.skin.outline import polygon
+from eitskin.solve.image_touches import touches_in_image
 
 GRID = grid_for(polygon([(0, 0), (80, 0), (80, 80), (0, 80)]), 8)
 XY = GRID.centres_mm()

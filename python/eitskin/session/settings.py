@@ -1,4 +1,4 @@
-"""What a session with a board is to be."""
+"""The settings of a session with a board."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -31,10 +31,11 @@ def kinds_of(text: str, name: str) -> Stream:
 
 @dataclass(frozen=True)
 class SessionSettings:
-    """What a session is to be; what is not named stays as the board has it.
+    """The settings of a session; those that are not given stay as they are on the board.
 
     Attributes:
-        mode: what is streamed.
+        mode: what is streamed; None: all that a simulated or recorded board can send, and image
+            and touches of a real one, whose line carries fewer frames with raw voltages.
         report: "frame", or also touches after each "drive", with their velocity.
         every: every n-th frame; 0: as many as the line carries.
         frames: stop after so many; 0: go on until the scene or the recording ends.
@@ -42,13 +43,13 @@ class SessionSettings:
         firmware: of an emulated board.
         model_for: what cannot do without the board's model, such as "a picture"; "": nothing.
         tare: take the reference from so many frames; None: from 16 where that is needed.
-        zones: named places that fingers press (``eitskin.live.zones``).
+        zones: named places that fingers press (``eitskin.session.zones``).
         target: a budget or an accuracy that chooses the solver's settings.
         record: a new recording of every packet; an existing file is written over.
-        quiet_frames: those of the reference are sent too, for taps of the link.
+        quiet_frames: the untouched frames of the reference are sent too, and their mean is kept.
     """
 
-    mode: Stream = Stream.TOUCHES
+    mode: Stream | None = Stream.TOUCHES
     report: str = "frame"
     every: int = 0
     frames: int = 0

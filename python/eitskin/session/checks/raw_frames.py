@@ -2,27 +2,30 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
 from eitskin import __version__
 from eitskin.device.client import Device
-from eitskin.device.known_model import KnownModel
-from eitskin.device.link import LinkEvent
-from eitskin.device.live_frames import Item, LiveFrame, follow
+from eitskin.device.known_model import KnownModel, find_model, scanned_protocol
+from eitskin.device.recordings.recording import FileTransport
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame
 from eitskin.errors import DeviceError, FrameError
 from eitskin.frames.frames import Frames
+from eitskin.session.assemble import read_frames
+from eitskin.session.frame import Frame, Message, Notice
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import skin_to_table
 
 
 @dataclass
 class RawRun:
-    """Raw frames in the order that they were scanned, ``quiet`` ones apart, with the faults told
-    meanwhile and the packets that were lost. ``left_out``: frames before the tare that ``quiet`` is
-    of."""
+    """Raw frames in the order in which they were scanned, ``quiet`` ones apart, with the faults
+    that were reported meanwhile and the packets that were lost. ``left_out``: frames before the
+    tare that ``quiet`` is of."""
 
     quiet: list[RawFrame] = field(default_factory=list)
     frames: list[RawFrame] = field(default_factory=list)
@@ -33,7 +36,7 @@ class RawRun:
 
 def collect(device: Device, frames: int) -> RawRun:
     """The next ``frames`` raw frames of a board."""
-    run = gather(follow(device, Stream.RAW, frames=frames))
+    run = gather(read_frames(device, Stream.RAW, frames=frames))
     if not run.frames:
         raise DeviceError(
             f"{device.transport.name}: no raw frame came; its scene or recording is over"
@@ -41,22 +44,23 @@ def collect(device: Device, frames: int) -> RawRun:
     return run
 
 
-def gather(items: Iterable[Item]) -> RawRun:
+def gather(messages: Iterable[Message]) -> RawRun:
     """The raw frames of a stream or recording. Of several tares the last counts, and the frames
     after it."""
     run = RawRun()
     taring = False
-    for item in items:
-        if isinstance(item, Fault):
-            run.faults.append(item)
-        elif isinstance(item, LinkEvent):
-            run.missing += item.missing
-        elif isinstance(item, LiveFrame) and item.raw is not None:
-            if item.raw.quiet and not taring:
+    for message in messages:
+        if isinstance(message, Notice):
+            if isinstance(message.cause, Fault):
+                run.faults.append(message.cause)
+            elif isinstance(message.cause, LinkEvent):
+                run.missing += message.cause.missing
+        elif isinstance(message, Frame) and message.raw is not None:
+            if message.untouched and not taring:
                 run.left_out += len(run.frames) + len(run.quiet)
                 run.quiet, run.frames = [], []
-            taring = item.raw.quiet
-            (run.quiet if taring else run.frames).append(item.raw)
+            taring = message.untouched
+            (run.quiet if taring else run.frames).append(message.raw)
     return run
 
 
@@ -116,3 +120,25 @@ def as_frames(
         allow_nonfinite=True,
     )
     return result if allow_nonfinite else replace(result, allow_nonfinite=False)
+
+
+def frames_of(path: str | Path, model: Path | None = None) -> Frames:
+    """The raw frames of a recording as frames, the quiet ones of its last tare as their reference;
+    rows that were masked or could not be measured are NaN. ``model``: the board's, where its
+    protocol is none of the usual.
+
+    Raises:
+        FileError, DeviceError: it cannot be read, or the model is another.
+        FrameError: no raw frames were recorded, or no quiet ones.
+    """
+    with Device(FileTransport(path)) as device:
+        name = str(path)
+        known = find_model(device.board, model, name)
+        protocol = scanned_protocol(device.board, known, name)
+        run = gather(read_frames(device, Stream.RAW))
+        if not run.frames:
+            raise FrameError(
+                f"{name}: holds no raw frames; record with raw streaming (eitskin record does by"
+                " default)"
+            )
+        return as_frames(run.quiet, run.frames, protocol, device.board, known, allow_nonfinite=True)

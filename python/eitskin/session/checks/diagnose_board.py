@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, scanned_protocol
-from eitskin.device.recordings.raw_frames import RawRun, as_frames, collect
-from eitskin.device.set_up import begin_scene
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.link_table import FaultCode
 from eitskin.device.wire.packets import ELECTRODE_FAULTS, BoardInfo, BoardStats, Fault
 from eitskin.frames.doctor.report import FAULT, NOTE, DoctorReport, Finding
 from eitskin.frames.doctor.subject import AS_GIVEN, Subject
+from eitskin.session.checks.raw_frames import RawRun, as_frames, collect
+from eitskin.session.set_up import begin_scene
 from eitskin.skin.skin import Skin
 
 NOT_FOR_THE_SKIN = frozenset(
@@ -42,8 +42,8 @@ def measure(
 ) -> MeasuredBoard:
     """``frames`` raw frames of the untouched skin, and where ``touched`` as many after
     ``before_touches`` was called. A recording gives its own quiet frames, where it has some."""
-    first = collect(device, 0 if device.transport.replays else frames)
-    if device.transport.replays:
+    first = collect(device, 0 if device.replays else frames)
+    if device.replays:
         quiet = replace(first, frames=first.quiet or first.frames[:frames])
         after = replace(first, frames=first.frames if first.quiet else first.frames[frames:])
         return MeasuredBoard(quiet, after if touched else RawRun(), device.board, None)
@@ -74,14 +74,14 @@ def board_subject(
 
 
 def board_findings(report: DoctorReport, measured: MeasuredBoard) -> DoctorReport:
-    """``report`` with what the board itself says. Remedies of ``eitskin import`` are taken out: a
-    board is repaired by hand."""
+    """``report`` with what the board itself reports. Remedies of ``eitskin import`` are taken out,
+    because a board is repaired by hand."""
     raised = [fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised]
-    told = {
+    reported = {
         (fault.code, fault.index if fault.code in ELECTRODE_FAULTS else 0): fault
         for fault in raised
     }
-    own = [_finding(fault) for fault in told.values()]
+    own = [_finding(fault) for fault in reported.values()]
     codes = {fault.code for fault in raised}
     own += [_standing(code) for code in measured.info.fault_codes if code not in codes]
     missing = measured.quiet.missing + measured.touched.missing

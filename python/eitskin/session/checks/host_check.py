@@ -15,13 +15,14 @@ from eitskin.core.gestures import Gestures, event_numbers
 from eitskin.core.results import Info, Options, Reconstruction
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, board_options, need_model
-from eitskin.device.link import LinkEvent
-from eitskin.device.live_frames import Item, LiveDrive, LiveFrame, follow
-from eitskin.device.recordings.drives_twin import DrivesTwin
 from eitskin.device.recordings.recording import FileTransport, recorded_kinds, recorded_options
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Quality
 from eitskin.device.wire.packets import BoardInfo, FollowedTouches, RawFrame, Solved
 from eitskin.errors import FrameError
+from eitskin.session.assemble import read_frames
+from eitskin.session.checks.drives_twin import DrivesTwin
+from eitskin.session.frame import DriveReport, Frame, Message
 from eitskin.solve.reconstructor import Reconstructor
 
 
@@ -31,9 +32,9 @@ class HostCheck:
 
     ``same``: every bit of the image, and of the touches but their ids, which count on from whatever
     the board did before, of the events that these touches make, and all that was found in the
-    frame. ``different``: numbers of frames that are not. ``untold``: frames whose solve, touches or
-    reference come from one that was lost on the way. ``alone``: solved on the board without its raw
-    frame here. ``drives``: after which the touches are the same.
+    frame. ``different``: numbers of frames that are not. ``inconclusive``: frames whose solve,
+    touches or reference come from one that was lost on the way. ``alone``: solved on the board
+    without its raw frame here. ``drives``: after which the touches are the same.
     """
 
     same: int = 0
@@ -41,7 +42,7 @@ class HostCheck:
     touches: int = 0
     events: int = 0
     different: list[int] = field(default_factory=list)
-    untold: int = 0
+    inconclusive: int = 0
     alone: int = 0
     drives: int = 0
     drives_different: int = 0
@@ -57,7 +58,7 @@ class HostCheck:
 
     def text(self) -> str:
         if not self.compared:
-            line = "same bits: not told; no frame could be compared"
+            line = "same bits: inconclusive; no frame could be compared"
         elif self.different:
             first = self.different[0]
             line = (
@@ -70,7 +71,11 @@ class HostCheck:
             line += f"; the touches after {self.drives} drives" if self.drives else ""
         if self.drives_different:
             line = f"same bits: NO, of touches after {self.drives_different} drives; {line}"
-        return line + (f"; {self.untold} frames after losses not told" if self.untold else "")
+        return line + (
+            f"; {self.inconclusive} frames after losses are inconclusive"
+            if self.inconclusive
+            else ""
+        )
 
 
 class HostTwin:
@@ -83,25 +88,25 @@ class HostTwin:
         self._from_before = options.warm_start or options.reference_frames > 0
         self._tracks = options.tracks
         self._quiet: list[RawFrame] = []
-        self._tared = self._sure = self._lost = self._told = False
+        self._tared = self._sure = self._lost = self._events_known = False
         self._gestures = Gestures()
         self.check = HostCheck()
 
-    def follow(self, items: Iterable[Item]) -> HostCheck:
+    def take_all(self, messages: Iterable[Message]) -> HostCheck:
         """Take everything of a stream or recording, tare included."""
-        for item in items:
-            if isinstance(item, LiveFrame):
-                self.take(item)
-            elif isinstance(item, LiveDrive):
-                self.hear(item.followed)
-            elif isinstance(item, LinkEvent):
+        for message in messages:
+            if isinstance(message, Frame):
+                self.take(message)
+            elif isinstance(message, DriveReport):
+                self.hear(message.packet)
+            elif isinstance(message.cause, LinkEvent):
                 self.lost()
         return self.check
 
     def lost(self) -> None:
         """Something is missing here: perhaps a frame from which the next solve began, perhaps a
         quiet one."""
-        self._sure, self._lost, self._told = False, True, False
+        self._sure, self._lost, self._events_known = False, True, False
         if self._drives is not None:
             self._drives.forget()
 
@@ -113,7 +118,7 @@ class HostTwin:
         if self._drives is not None:
             self._drives.hear(packet)
 
-    def take(self, frame: LiveFrame) -> Reconstruction | None:
+    def take(self, frame: Frame) -> Reconstruction | None:
         """The next frame; returns what this host makes of it, None where the board solved
         nothing."""
         if frame.raw is not None and frame.raw.quiet:
@@ -123,14 +128,14 @@ class HostTwin:
             self._tare()
         self._lost = False
         aligned = self._drive(frame.raw)
-        if frame.solved is None:
+        if frame.info is None:
             return None
         if frame.raw is None:
             self.check.alone += 1
             self._sure = False
             return None
         if not self._tared:
-            self.check.untold += 1
+            self.check.inconclusive += 1
             return None
         return self._compare(frame, frame.raw, aligned)
 
@@ -156,57 +161,57 @@ class HostTwin:
             return
         self._core.forget()
         self._gestures.reset()
-        self._tared = self._sure = self._told = True
+        self._tared = self._sure = self._events_known = True
 
     def _compare(
-        self, frame: LiveFrame, raw: RawFrame, aligned: npt.NDArray[np.float32] | None
+        self, frame: Frame, raw: RawFrame, aligned: npt.NDArray[np.float32] | None
     ) -> Reconstruction | None:
-        follows = self._drives is not None and aligned is not None
+        aligned_here = self._drives is not None and aligned is not None
         volts = raw.voltage_v if aligned is None else aligned
         try:
-            result = self._core.reconstruct(volts, touches=follows or frame.touches is not None)
+            result = self._core.reconstruct(volts, touches=aligned_here or frame.has_touches)
         except FrameError:
             self._count(frame, frame.refused is not None, 1.0, self._from_before)
             return None
         if self._drives is not None and aligned is not None:
             result = self._drives.found(result)
-        assert frame.solved is not None
+        assert frame.info is not None
         options, difference = self._core.options, 1.0
-        same = frame.refused is None and same_diagnostics(result.info, raw, frame.solved, options)
+        same = frame.refused is None and same_diagnostics(result.info, raw, frame.info, options)
         if same and frame.image is not None:
-            same = same_bits(result.image, frame.image.image)
-            difference = _difference(result.image, frame.image.image)
-        touched = frame.touches is None or same_touches(result.touches, frame.touches.touches)
+            same = same_bits(result.image, frame.image)
+            difference = _difference(result.image, frame.image)
+        touched = not frame.has_touches or same_touches(result.touches, frame.touches)
         touched = self._same_events(frame) and touched
         from_before = self._from_before or (same and not touched and self._tracks)
         self._count(frame, same and touched, difference, from_before)
         return result
 
-    def _same_events(self, frame: LiveFrame) -> bool:
-        """Whether the board's events are what its touches give here; only told where all touches
-        since the tare came."""
-        if frame.events is None or frame.touches is None or frame.refused is not None:
-            self._told = self._told and frame.refused is not None
+    def _same_events(self, frame: Frame) -> bool:
+        """Whether the board's events are what its touches give here; known only where all touches
+        since the tare came here."""
+        if frame.board_events is None or not frame.has_touches or frame.refused is not None:
+            self._events_known = self._events_known and frame.refused is not None
             return True
-        here = self._gestures.update(frame.touches.touches, frame.events.time_us)
-        if not self._told:
+        here = self._gestures.update(frame.touches, frame.board_us)
+        if not self._events_known:
             return True
         self.check.events += len(here)
-        return event_numbers(here).tobytes() == event_numbers(frame.events.events).tobytes()
+        return event_numbers(here).tobytes() == event_numbers(frame.board_events).tobytes()
 
-    def _count(self, frame: LiveFrame, same: bool, difference: float, from_before: bool) -> None:
+    def _count(self, frame: Frame, same: bool, difference: float, from_before: bool) -> None:
         """``from_before``: what differs may come from frames before, of which one may be missing
         here."""
         check = self.check
         if same:
             check.same += 1
             check.images += frame.image is not None
-            check.touches += frame.touches is not None
+            check.touches += frame.has_touches
         elif self._sure or not from_before:
             check.different.append(frame.number)
             check.worst = max(check.worst, difference)
         else:
-            check.untold += 1
+            check.inconclusive += 1
 
 
 def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
@@ -217,7 +222,7 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
         known = need_model(device.board, model, str(path), "the comparison")
         used = board_options(known.model, device.board) if options is None else options
         twin = HostTwin(known, used, device.board)
-        return twin.follow(follow(device, recorded_kinds(path))), options is not None
+        return twin.take_all(read_frames(device, recorded_kinds(path))), options is not None
 
 
 def same_bits(one: AnyArray, other: npt.NDArray[np.float32]) -> bool:
@@ -231,8 +236,8 @@ def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
 
 
 def same_diagnostics(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
-    """Whether this host's core found in a frame what the board says of it. Rows that the converter
-    saturated are no numbers to the core: the quality of the raw frame tells them."""
+    """Whether this host's core found in a frame what the board reports. Rows that the converter
+    saturated are NaN to the core; the quality of the raw frame marks them."""
     only_saturated = raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED
     lost = int(np.count_nonzero(only_saturated))
     saturated = options.diagnostics & 1 << DIAGNOSTICS.index("saturated") if lost else 0

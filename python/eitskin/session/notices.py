@@ -1,16 +1,16 @@
-"""What a stream tells beside its frames, in lines: faults, events of the link, what is found in
-frames once it rises and goes.
+"""What is worth a notice, in lines: faults, events of the link, and diagnostics of frames when they
+rise and when they go.
 
-A board tells most of what it finds as faults, and all of it in the head of each frame. What both
-tell is said once.
+A board reports most diagnostics as faults, and all of them in the head of each frame. What both
+report makes one notice.
 """
 
 from eitskin.core.diagnostics import names, words
-from eitskin.device.link import LinkEvent
-from eitskin.device.live_frames import Item, LiveDrive
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FAULT_RAISE_FRAMES, FaultCode
 from eitskin.device.wire.packets import DOUBTFUL_FAULTS, FOUND_FAULTS, Fault, Solved
+from eitskin.session.frame import DriveReport, Frame, Message, Notice
 
 Key = tuple[str, int]  # a name of core.diagnostics.DIAGNOSTICS, and which electrode; -1: none
 
@@ -31,28 +31,26 @@ _OF_ELECTRODES = {
 }
 
 
-class Events:
-    """Turns what a stream gives into lines, as it comes."""
+class Novelty:
+    """Which faults, events and diagnostics are new, as they come."""
 
     def __init__(self) -> None:
-        # what has been said to be there: frames in a row without it
+        # what was reported to be there: frames in a row without it
         self._clean: dict[Key, int] = {}
         self._shown: dict[Key, int] = {}  # what the last frame showed: how many in a row
 
-    def lines(self, item: Item) -> list[str]:
-        """What is new with ``item``; of a frame only what it shows and those before it did not, or
+    def lines(self, message: Message) -> list[str]:
+        """What is new with ``message``: of a frame, what it shows and those before it did not, and
         what has gone."""
-        if isinstance(item, LinkEvent):
-            return [link_text(item)]
-        if isinstance(item, Fault):
-            return self._fault(item)
-        if isinstance(item, LiveDrive):
+        if isinstance(message, Frame):
+            return [] if message.info is None else self._found(message.info)
+        if isinstance(message, DriveReport):
             return []
-        return [] if item.solved is None else self._found(item.solved)
+        fault = message.cause if isinstance(message.cause, Fault) else None
+        known = fault is not None and fault.code in FOUND_FAULTS and not self._is_new(fault)
+        return [] if known else [message.text]
 
-    def _fault(self, fault: Fault) -> list[str]:
-        if fault.code not in FOUND_FAULTS:
-            return [fault_text(fault)]
+    def _is_new(self, fault: Fault) -> bool:
         keys = _keys(fault)
         new = keys[0] not in self._clean if fault.raised else keys[0] in self._clean
         for key in keys:
@@ -60,23 +58,30 @@ class Events:
                 self._clean.setdefault(key, 0)
             elif key == keys[0]:
                 self._clean.pop(key, None)
-        return [fault_text(fault)] if new else []
+        return new
 
     def _found(self, solved: Solved) -> list[str]:
-        now, said = _found(solved), []
+        now, lines = _found(solved), list[str]()
         self._shown = {key: self._shown.get(key, 0) + 1 for key in now}
         for key, text in now.items():
             if key not in self._clean and self._shown[key] >= (
                 FAULT_RAISE_FRAMES if key[0] in _DOUBTFUL else 1
             ):
-                said.append(f"{text}, frame {solved.frame}")
+                lines.append(f"{text}, frame {solved.frame}")
                 self._clean[key] = 0
         for key in list(self._clean):
             self._clean[key] = 0 if key in now else self._clean[key] + 1
             if self._clean[key] >= FAULT_CLEAR_FRAMES:
                 del self._clean[key]
-                said.append(f"{_plain(key)}: over, frame {solved.frame}")
-        return said
+                lines.append(f"{_plain(key)}: over, frame {solved.frame}")
+        return lines
+
+
+def notice_of(cause: Fault | LinkEvent) -> Notice:
+    """A fault or an event of the link as a message."""
+    if isinstance(cause, LinkEvent):
+        return Notice("link", link_text(cause), None, cause=cause)
+    return Notice("fault", fault_text(cause), None, cause=cause)
 
 
 def link_text(event: LinkEvent) -> str:

@@ -3,13 +3,11 @@
 from eitskin.core.results import Options
 from eitskin.device.client import Device
 from eitskin.device.known_model import NAMES_IT, KnownModel
-from eitskin.device.link import LinkEvent
 from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Stream, StreamCommand
 from eitskin.device.wire.packets import Fault
 from eitskin.errors import DeviceError
-
-CLOCK_TIMER, TIMER_COUNT = 5, 0x24  # of the emulated board: its microsecond clock
 
 
 def set_up(
@@ -49,20 +47,17 @@ def take_reference(device: Device, frames: int, *, streamed: bool = False) -> No
 
 
 def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
-    """Let what is to be touched begin, on a simulated or emulated board, and an emulated one's scan
-    under way end, which still shows the untouched skin. Returns the emulated board's clock at the
-    scene's time 0 (None: it is when the next scan begins), and news that came meanwhile.
+    """Let what is to be touched begin, on a simulated board. Where the scene begins within a scan,
+    that scan, which still shows the untouched skin, is waited for. Returns the board's clock at the
+    scene's time 0 (None: it is when the next scan begins), and what was reported meanwhile.
     """
-    transport, events = device.transport, []
-    device.start_scene()
-    if not transport.url.startswith("emu:"):
+    events: list[Fault | LinkEvent] = []
+    began_us = device.start_scene()
+    if began_us is None:
         return None, []
-    board = getattr(transport, "board", None)
-    began = int(board.timers[CLOCK_TIMER].read(TIMER_COUNT, 4)) if board is not None else None
     info = device.board
-    while (
-        item := device.next_item(1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us))
-    ) is not None:
+    scan_s = 1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us)
+    while (item := device.next_item(scan_s)) is not None:
         if isinstance(item, Fault | LinkEvent):
             events.append(item)
-    return began, events
+    return began_us, events

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from eitskin.device.client import Device
-from eitskin.device.link import LinkEvent
-from eitskin.device.live_frames import Item, put_together
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import (
@@ -18,6 +17,8 @@ from eitskin.device.wire.packets import (
     SolvedTouches,
 )
 from eitskin.device.wire.payloads import MalformedPacket, parse
+from eitskin.session.assemble import assembled
+from eitskin.session.frame import Message
 
 _Content = RawFrame | SolvedImage | SolvedTouches | FollowedTouches | FrameEvents | Fault
 
@@ -34,9 +35,9 @@ class PacketLog:
     def stop(self) -> None:
         self._device.link.end_tap(self._tap)
 
-    def frames(self, what: Stream) -> Iterator[Item]:
+    def frames(self, what: Stream) -> Iterator[Message]:
         """The frames so far, faults and gaps between them; ``what`` was streamed."""
-        return put_together(self._contents(), what)
+        return assembled(self._contents(), what)
 
     def _contents(self) -> Iterator[_Content | LinkEvent]:
         for packet in self.packets:

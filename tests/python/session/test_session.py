@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from eitskin.cli.main import main
-from eitskin.device.live_frames import LiveFrame, LiveSummary
-from eitskin.device.sample import SIZE, Sample
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import DeviceError
 from eitskin.frames.frames import save_frames
-from eitskin.live.frame import Frame, Notice
-from eitskin.live.message import schema
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.frame import Frame, Notice
+from eitskin.session.message import schema
+from eitskin.session.sample import SIZE, Sample
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
+from eitskin.session.summary import Summary
 from small_models import session as small_session
 
 VALID = jsonschema.Draft202012Validator(schema())
@@ -69,8 +69,8 @@ def test_a_sample_stays_bounded_and_fair():
 def test_a_summary_of_a_day_is_as_large_as_one_of_a_minute():
     settings = SessionSettings(mode=Stream.TOUCHES, frames=1)
     with Session("sim:swipe", settings) as session:
-        (frame,) = [item for item in session.items() if isinstance(item, LiveFrame)]
-    summary = LiveSummary()
+        (frame,) = [item for item in session.messages() if isinstance(item, Frame)]
+    summary = Summary()
     for _ in range(3 * SIZE):
         summary.add(frame)
     assert summary.frames == 3 * SIZE and len(summary.solve_us.values) == SIZE
@@ -81,7 +81,7 @@ def test_a_board_is_asked_between_frames():
     settings = SessionSettings(mode=Stream.TOUCHES)
     with Session("sim:swipe", settings) as session:
         asked, times, numbers = None, [], []
-        for item in session.frames():
+        for item in session.messages():
             if not isinstance(item, Frame):  # of touches that move during a scan
                 continue
             times.append(item.time_s)
@@ -101,10 +101,10 @@ def test_a_recording_is_asked_too_and_says_no(tmp_path):
     run = tmp_path / "run.eits"
     settings = SessionSettings(mode=Stream.TOUCHES, record=run, frames=6)
     with Session("sim:swipe", settings) as session:
-        assert sum(isinstance(item, Frame) for item in session.frames()) == 6
+        assert sum(isinstance(item, Frame) for item in session.messages()) == 6
     with Session(f"file:{run}") as session:
         answers, count = [], 0
-        for _ in session.frames():
+        for _ in session.messages():
             count += 1
             answers.append(session.tare())
         with pytest.raises(DeviceError, match="is a recording"):

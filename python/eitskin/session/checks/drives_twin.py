@@ -28,7 +28,7 @@ class DrivesTwin:
     def __init__(self, engine: CoreEngine, protocol: Protocol, board: BoardInfo) -> None:
         self._fast, self._board = FastCore(engine), board
         self._drives = _in_order(self._fast, protocol)
-        self._told: dict[int, dict[int, Numbers]] = defaultdict(dict)
+        self._reported: dict[int, dict[int, Numbers]] = defaultdict(dict)
         self._begun: dict[int, int] = {}
         self._next: int | None = None
         self._found: Sequence[Touch] | None = None
@@ -37,16 +37,16 @@ class DrivesTwin:
     def hear(self, packet: FollowedTouches) -> None:
         """Of a drive; its frame comes later."""
         head = packet.head
-        self._told[head.frame][head.drive] = _numbers(packet.touches)
+        self._reported[head.frame][head.drive] = _numbers(packet.touches)
         self._begun[head.frame] = head.begun
 
     def forget(self) -> None:
-        """A frame is missing here: what follows is not told until the board begins again."""
+        """A frame is missing here: what follows is inconclusive until the board begins again."""
         self._next = None
 
     def take(self, raw: RawFrame) -> npt.NDArray[np.float32] | None:
         """The next frame's drives; returns what its solver got, None where it was not solved."""
-        told = self._told.pop(raw.frame, {})
+        reported = self._reported.pop(raw.frame, {})
         if self._begun.pop(raw.frame, None) == raw.frame:
             self._next, self._found = raw.frame, None
             try:
@@ -60,7 +60,7 @@ class DrivesTwin:
         for number, middle_us in self._drives_at(raw.time_us):
             rows = self._fast.rows[number]
             here = self._fast.drive(number, raw.voltage_v[rows], middle_us / 1e6)
-            same = told.get(number, ()) == _numbers(here)
+            same = reported.get(number, ()) == _numbers(here)
             self.same, self.different = self.same + same, self.different + (not same)
         if not raw.flags & RawFlags.ALIGNED:
             return None

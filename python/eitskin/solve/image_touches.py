@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import missing_extra
-from eitskin.scoring.metrics import touch_mask
 
 
 def touches_in_image(
@@ -27,7 +26,8 @@ def touches_in_image(
     except ImportError:
         raise missing_extra("model", "scipy") from None
     wanted = sign * np.asarray(values, dtype=np.float64)
-    mask = touch_mask(wanted, threshold)
+    top = wanted.max()
+    mask = (wanted > threshold * top) & (top > 0)
     square = np.zeros(index.max(axis=0) + 1, dtype=np.bool_)
     square[tuple(index.T)] = mask
     labels, count = label(square, structure=np.ones((3, 3)))

@@ -1,4 +1,4 @@
-"""The one message that tells programs of a frame, a notice, a summary or a reconstructed file;
+"""The JSON message of a frame, a report, a notice, a summary or a reconstructed file;
 ``message.schema.json`` beside this file describes it (docs/reference/message.md).
 
 A field that is asked for and not known is null. Fields of images, raw voltages and truth are there
@@ -10,18 +10,30 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.resources import files
-from typing import Any
+from typing import Any, Protocol
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.device.wire.link_table import FollowedTouch
-from eitskin.scene.random_touches import TrueTouch
 
 VERSION = 1
 
 
+class TrueTouch(Protocol):
+    """A touch that was there, as far as a message reports it."""
+
+    @property
+    def x_mm(self) -> float: ...
+    @property
+    def y_mm(self) -> float: ...
+    @property
+    def radius_mm(self) -> float: ...
+    @property
+    def contrast(self) -> float: ...
+
+
 def schema() -> dict[str, Any]:
     """The JSON Schema of every message."""
-    text = files("eitskin.live").joinpath("message.schema.json").read_text("utf-8")
+    text = files("eitskin.session").joinpath("message.schema.json").read_text("utf-8")
     parsed: dict[str, Any] = json.loads(text)
     return parsed
 
@@ -37,7 +49,7 @@ def encoded(message: dict[str, Any]) -> str:
 
 
 def touch_table(touch: Touch) -> dict[str, Any]:
-    """A touch; a force that the model does not tell is null."""
+    """A touch; a force that the model does not give is null."""
     return asdict(touch) | {"force_n": touch.force_n or None}
 
 
