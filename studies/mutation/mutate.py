@@ -1,6 +1,6 @@
 """Put small mistakes into the sources, one at a time, and see whether the tests notice.
 
-    python tests/tools/mutate.py [--sample COUNT] [--python COUNT] [--only WORD] [--seed WORD]
+    studies/mutate [--sample COUNT] [--python COUNT] [--only WORD] [--seed WORD]
         [--workers COUNT]
 
 Mistakes are made from the syntax (mutants.py): of all of them a sample, the same in every run, over
