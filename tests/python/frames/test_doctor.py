@@ -353,6 +353,43 @@ def test_one_quiet_frame_leaves_noise_untold():
     assert any(text.startswith("noise, SNR and drift: 1 quiet frame(s)") for text in report.untold)
 
 
+def stuck(frames: Frames, channels: list[int]) -> Frames:
+    """Channels that give one value in every untouched frame and in the others."""
+    reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
+    reference[:, channels] = voltage[:, channels] = 1e-4
+    return changed(frames, reference, voltage)
+
+
+def not_finite(frames: Frames, channels: list[int]) -> Frames:
+    """NaN in the first untouched frame."""
+    reference = frames.reference_voltage_v.copy()
+    reference[0, channels] = np.nan
+    return changed(frames, reference, frames.voltage_v)
+
+
+SEVERAL = {
+    "two pairs of exchanged wires": (
+        lambda: wired(8, (3, 9), (1, 14)), "swapped-electrodes", "--swap 3,9 --swap 1,14",
+    ),
+    "two channels of the wrong sign": (
+        lambda: channels_off(healthy_frames(12), [17, 90], -1.0),
+        "flipped-channels", "--flip-channels 17,90",
+    ),
+    "two stuck channels": (
+        lambda: stuck(healthy_frames(22), [4, 60]), "stuck", "--impute-channels 4,60",
+    ),
+    "three channels with numbers that are not finite": (
+        lambda: not_finite(healthy_frames(20), [3, 4, 8]),
+        "not-finite", "--impute-channels 3,4,8",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("made", "name", "repair"), SEVERAL.values(), ids=SEVERAL)
+def test_several_faults_of_a_kind_are_one_finding(made, name, repair):
+    assert only(made(), name).repair == repair
+
+
 def test_several_remedies_become_one():
     frames = healthy_frames(23)
     gains = np.ones(208)
