@@ -171,10 +171,6 @@ typedef struct eits_touch_memory {
     eits_real *y_separate; /* stride: y less the touches' interaction */
 } eits_touch_memory;
 
-/* Columns that the test of touches has room for: eight parameters each of eight touches, four each
- * of sixteen. */
-enum { EITS_EVIDENCE_COLUMNS = 64 };
-
 /* Memory of the test of touches. Written by evidence. */
 typedef struct eits_evidence {
     eits_real *factor; /* rank x stride: R in the rows of a triangle, Sigma = R'R */
