@@ -102,6 +102,23 @@ TEST(starts_that_cancel)
     free(y);
 }
 
+/* Without a penalty the first round already fails on these data: FISTA would go on, but no
+ * iteration is left. */
+TEST(a_round_that_fails_at_the_last_iteration)
+{
+    eits_context *ctx = set_up(&b, 3e-3);
+    CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.sign = EITS_SIGN_BOTH,
+                   o.lambda_rel = o.lambda_noise_factor = 0, o.iterations = 1);
+    small_new_data(ctx, 83);
+    ctx->frame.y[1] += R(0.4);
+    double *y = dense_copy(ctx->frame.y, RANK);
+    CHECK_OK(eits_solve(ctx, NULL));
+    CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
+    CHECK_EQUAL(ctx->info.iterations, 1);
+    check_result(&b, 0.5 * dense_dot(y, y, RANK));
+    free(y);
+}
+
 /* The optimum to rounding, in few rounds. */
 TEST(the_active_set_ends_soon)
 {

@@ -290,6 +290,8 @@ TEST(defaults)
     };
     CHECK_EQUAL(with_word(TINY, "DEFS", 0, 0), EITS_E_MODEL_VALUE); /* no iteration */
     CHECK_OK(with_word(TINY, "DEFS", 0, 1));
+    CHECK_OK(with_word(TINY, "DEFS", 0, EITS_MAX_MODEL_ITERATIONS));
+    CHECK_EQUAL(with_word(TINY, "DEFS", 0, EITS_MAX_MODEL_ITERATIONS + 1), EITS_E_MODEL_VALUE);
     for (size_t i = 0; IN_TABLE(i, ranges); ++i) {
         CHECK_EQUAL(with_number(TINY, "DEFS", ranges[i].at, ranges[i].low), EITS_E_MODEL_VALUE);
         CHECK_EQUAL(with_number(TINY, "DEFS", ranges[i].at, ranges[i].high), EITS_E_MODEL_VALUE);
