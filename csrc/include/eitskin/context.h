@@ -55,9 +55,9 @@ typedef struct eits_reference_info {
  * reached by functions alone. */
 typedef struct eits_context eits_context;
 
-/* Bytes of workspace for an open model, as EITS_WORKSPACE_SIZE (sizes.h) counts them. `prepared` is 1
- * to keep S and the working set's columns in panels as well, which is faster on hosts, else 0. Returns
- * 0 for a null model. */
+/* Bytes of workspace for an open model, as EITS_WORKSPACE_SIZE (sizes.h) counts them. `prepared` is
+ * 1 to keep S and the working set's columns in panels as well, which is faster on hosts, else 0.
+ * Returns 0 for a null model. */
 size_t eits_workspace_size(const eits_model *model, int prepared);
 
 /* Lay out a context in `workspace` (16-byte aligned, the caller's as long as the context is used;
