@@ -70,7 +70,14 @@ def rms(frames: Frames) -> float:
     return float(np.sqrt(np.mean(frames.reference_voltage_v**2)))
 
 
-@by_protocol
+@pytest.mark.parametrize(
+    "protocol",
+    [
+        p if name == "adjacent" else pytest.param(p, marks=pytest.mark.long("adjacent"))
+        for name, p in PROTOCOLS.items()
+    ],
+    ids=PROTOCOLS,
+)
 def test_fifty_healthy_frames_raise_no_alarm(protocol):
     skin = skin_for(protocol)
     for seed in range(50):
@@ -189,7 +196,11 @@ def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame():
         assert only(turned, "numbering", skin=skin).repair == option
 
 
-@pytest.mark.parametrize("firsts", [(0, 5), range(16)], ids=["two", "all"])
+@pytest.mark.parametrize(
+    "firsts",
+    [(0, 5), pytest.param(range(16), marks=pytest.mark.long("two of the wires"))],
+    ids=["two", "all"],
+)
 def test_every_pair_of_exchanged_wires_is_named(firsts):
     for i, j in combinations(range(16), 2):
         if i not in firsts:
@@ -198,7 +209,14 @@ def test_every_pair_of_exchanged_wires_is_named(firsts):
         assert only(exchanged, "swapped-electrodes").repair == f"--swap {i},{j}"
 
 
-@pytest.mark.parametrize(("width_mm", "known"), [(4.0, True), (20.0, True), (1.5, False)])
+@pytest.mark.parametrize(
+    ("width_mm", "known"),
+    [
+        (4.0, True),
+        pytest.param(20.0, True, marks=pytest.mark.long("4 mm")),
+        pytest.param(1.5, False, marks=pytest.mark.long("4 mm")),
+    ],
+)
 def test_joined_electrodes_are_named_whatever_their_width(width_mm, known):
     skin = replace(PAPER, electrodes=replace(PAPER.electrodes, width_mm=width_mm))
     transfer = homogeneous(skin, 16).transfer_ohm
@@ -210,7 +228,14 @@ def test_joined_electrodes_are_named_whatever_their_width(width_mm, known):
         assert finding.evidence["electrodes"] == [i, j] and finding.repair == ""
 
 
-@pytest.mark.parametrize(("driving", "measuring"), [(True, True), (True, False), (False, True)])
+@pytest.mark.parametrize(
+    ("driving", "measuring"),
+    [
+        (True, True),
+        pytest.param(True, False, marks=pytest.mark.long("both sides")),
+        pytest.param(False, True, marks=pytest.mark.long("both sides")),
+    ],
+)
 def test_every_dead_electrode_is_named_with_its_side(driving, measuring):
     for electrode in range(16):
         rng = np.random.default_rng(electrode)
