@@ -146,7 +146,7 @@ def test_for_people(done, frames_file):
     lines = text.splitlines()
     found = " ".join(lines[0].split())
     assert found == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
-    assert text.count("60 iterations (iterations), gap ") == 20
+    assert text.count("60 iterations (limit), gap ") == 20
     assert "20 frames, 0 refused; median " in text and " of " in lines[-1]
     assert lines[-1].startswith("against the truth of 20")
     assert sum(line.startswith("test-s3-") for line in lines) == 20

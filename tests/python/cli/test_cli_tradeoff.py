@@ -153,7 +153,7 @@ def test_boards_are_told_the_settings(scene, ran):
     for info in (json.loads(line)["info"] for line in out.splitlines()[:2]):
         assert info["stop"] == "macs" and info["macs"] <= 1_200_000 and info["gap_rel"] > 0
     line = ran(0, f"stream --device sim:{scene} --budget 8.7ms -v")[0].splitlines()[0]
-    assert "30 iterations (iterations), gap" in line and "MMAC" in line
+    assert "30 iterations (limit), gap" in line and "MMAC" in line
 
 
 def test_a_preset_sets_the_boards_scan_too(scene, tmp_path, ran):
