@@ -146,7 +146,9 @@ def test_weights_that_do_not_show_are_named(folder, tmp_path, ran):
 
 def test_refusals(folder, refused, tmp_path):
     frames, listed, own = folder / "weights.npz", folder / "weights.csv", tmp_path / "w.csv"
-    outside = "frames 50 to 50 of the list of weights do not exist; the recording has frames 0 to 49"
+    outside = (
+        "frames 50 to 50 of the list of weights do not exist; the recording has frames 0 to 49"
+    )
     for code, arguments, rows, said in (
         (2, f"{frames} --weights {listed} --weights {listed}", "",
          "1 recordings and 2 lists of weights"),

@@ -70,7 +70,7 @@ def test_column_choices():
             chosen(bad, 4, names, "--columns")
     with pytest.raises(
         UsageError,
-        match="'d' is no number, range a:b or a:b:step, or header name; names are time, a, b, c",
+        match="'d' is not a number, range a:b or a:b:step, or header name; names are time, a, b, c",
     ):
         chosen("d", 4, names, "--columns")
 
