@@ -1,4 +1,4 @@
-# Sourced by scripts/demo and scripts/test: Debian packages and a virtual environment, each only if missing.
+# Sourced by the scripts here and by studies/test: Debian packages and a virtual environment, each only if missing.
 
 root=$(CDPATH= cd -- "$(dirname -- "$0")/.." && pwd)
 venv=${EITSKIN_VENV:-$root/.venv}
@@ -42,20 +42,27 @@ find_python() {
     "$python" -c 'import ensurepip, venv' 2>/dev/null || debian "no-ensurepip" python3-venv
 }
 
-# changed_since STAMP: whether something that the package is built from changed; what an installation leaves behind does not count.
+# changed_since STAMP FOLDER...: whether a source in one of the folders is newer; what an installation leaves behind does not count.
 changed_since() {
-    [ -e "$1" ] || return 0
-    [ -n "$(find "$root/python" "$root/csrc" "$root/cmake" "$root/CMakeLists.txt" "$root/pyproject.toml" \
-        -type d \( -name __pycache__ -o -name build -o -name '*.egg-info' \) -prune -o -newer "$1" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
+    stamp=$1
+    shift
+    [ -e "$stamp" ] || return 0
+    [ -n "$(find "$@" -type d \( -name __pycache__ -o -name build -o -name '*.egg-info' \) -prune \
+        -o -newer "$stamp" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
 }
 
 # packages ARGUMENTS...: what pip's install takes, into the environment. By uv, which fetches and unpacks several at once and
-# says what; by pip where there is no uv, or where uv fails: only pip reads pip's settings. What is built here is built again.
+# says what; by pip where there is no uv, or where uv fails: only pip reads pip's settings. Packages that are named in $again are
+# built again although their version is installed; pip always does that.
+again=
 packages() {
+    fresh=
+    for name in $again; do
+        fresh="$fresh --reinstall-package $name"
+    done
     [ -x "$venv/bin/uv" ] || "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary uv uv 2>/dev/null || true
     {
-        "$venv/bin/uv" pip install --no-progress --python "$venv/bin/python" \
-            --reinstall-package eitskin --reinstall-package eitskin-studies "$@" && touch "$venv/packages-done"
+        "$venv/bin/uv" pip install --no-progress --python "$venv/bin/python" $fresh "$@" && touch "$venv/packages-done"
     } 2>&1 | sed '/^ *[-+~] /d; /^ *Downloaded /d; s/^ */   /'
     rm "$venv/packages-done" 2>/dev/null && return 0
     say "uv could not install this; trying pip"
@@ -71,18 +78,32 @@ make_environment() {
     "$python" -m venv "$venv"
 }
 
-# install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since.
+# install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since; with it what only
+# a checkout has: the emulated board and the numpy reference.
 install_package() {
     stamp=$venv/installed-$(printf '%s' "$1" | tr ',' '-')
     make_environment
-    if changed_since "$stamp"; then
+    if changed_since "$stamp" "$root/python" "$root/firmware" "$root/csrc" "$root/cmake" "$root/CMakeLists.txt" "$root/pyproject.toml"; then
         find_python
         say "installing eitskin[$1]: packages, and compiling the C core; about half a minute"
         touch "$stamp.next"
+        again="eitskin eitskin-emulator eitskin-reference"
         case $1 in
         build) packages "$root[$1]" ;;
-        *) packages "$root[$1]" "$root/python" ;; # emulated board and studies, which only a checkout has
+        *) packages "$root[$1]" "$root/firmware/emulator" "$root/python" ;;
         esac
         mv "$stamp.next" "$stamp"
+    fi
+}
+
+# install_studies: the studies and what they compare with, beside the project with the extra test.
+install_studies() {
+    install_package test
+    if changed_since "$venv/installed-studies" "$root/studies"; then
+        say "installing the studies, and the packages that they compare with"
+        touch "$venv/installed-studies.next"
+        again=eitskin-studies
+        packages "$root/studies[test]"
+        mv "$venv/installed-studies.next" "$venv/installed-studies"
     fi
 }

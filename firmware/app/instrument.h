@@ -2,17 +2,17 @@
 #ifndef FW_INSTRUMENT_H
 #define FW_INSTRUMENT_H
 
-#include "app/demodulate.h"
-#include "app/diagnostics.h"
-#include "app/engine.h"
-#include "app/faults.h"
-#include "app/kept.h"
-#include "app/quality.h"
-#include "app/scan.h"
-#include "app/stats.h"
-#include "app/store.h"
-#include "app/tare.h"
-#include "app/tx_queue.h"
+#include "app/acquire/demodulate.h"
+#include "app/acquire/scan.h"
+#include "app/link/stats.h"
+#include "app/link/tx_queue.h"
+#include "app/safety/faults.h"
+#include "app/safety/owner_record.h"
+#include "app/solve/diagnostics.h"
+#include "app/solve/engine.h"
+#include "app/solve/quality.h"
+#include "app/solve/store.h"
+#include "app/solve/tare.h"
 #include "drivers/ad9833.h"
 
 #define FW_VERSION_MAJOR     0u

@@ -1,13 +1,13 @@
 #include "app/main_loop.h"
 
-#include "app/commands.h"
-#include "app/drive.h"
-#include "app/follow.h"
-#include "app/models.h"
-#include "app/report.h"
-#include "app/scan_control.h"
-#include "app/stream.h"
-#include "app/upload.h"
+#include "app/link/commands.h"
+#include "app/link/report.h"
+#include "app/link/scanning.h"
+#include "app/link/stream.h"
+#include "app/link/tracks.h"
+#include "app/link/upload.h"
+#include "app/safety/current_enable.h"
+#include "app/solve/models.h"
 
 #include <string.h>
 

@@ -95,10 +95,10 @@ class SinkError(EitskinError):
     exit_code = 13
 
 
-def missing_checkout(what: str) -> MissingExtraError:
-    """The error for ``what`` is not in the wheel."""
+def missing_checkout(what: str, folder: str) -> MissingExtraError:
+    """The error for ``what`` is in ``folder`` of a checkout and not in the wheel."""
     return MissingExtraError(
-        f"{what} comes with eitskin's sources alone: run there  pip install ./python"
+        f"{what} comes with eitskin's sources alone: run there  pip install ./{folder}"
     )
 
 

@@ -1,7 +1,7 @@
 #include "host.h"
 
-#include "app/drive.h"
 #include "app/main_loop.h"
+#include "app/safety/current_enable.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Demodulation: amplitudes and phases against the formula, the generator's own phase followed
  * across wraps, ends of range. */
-#include "app/phase.h"
-#include "app/sincos.h"
+#include "app/acquire/sincos.h"
+#include "app/solve/phase.h"
 #include "check.h"
 #include "fake_board.h"
 

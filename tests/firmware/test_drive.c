@@ -2,9 +2,9 @@
  * the limit on current; hashes. */
 #include "steps.h"
 
-#include "app/drive.h"
-#include "app/kept.h"
-#include "app/sha256.h"
+#include "app/link/sha256.h"
+#include "app/safety/current_enable.h"
+#include "app/safety/owner_record.h"
 
 static bool drives(void)
 {

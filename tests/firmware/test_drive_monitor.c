@@ -2,8 +2,8 @@
  * with a fault planted in it. */
 #include "steps.h"
 
-#include "app/drive.h"
 #include "app/main_loop.h"
+#include "app/safety/current_enable.h"
 
 enum { MS = 1000000, ALL = 0xF0000, ROW = 0x3210, NEXT = 0x4321, FULL = 0x2000, RESET = 0x2100 };
 enum { END, HOST, WORD, ADDRESSES, ENABLES, WAIT, LOOK };

@@ -2,7 +2,7 @@
  * told twice, whole frames are brought to one instant, and all begins anew where it must. */
 #include "steps.h"
 
-#include "app/follow.h"
+#include "app/link/tracks.h"
 
 enum { DRIVES = 16, DRIVE_US = 1300, SCAN_MS = 21, ALL = 31 & ~EITS_STREAM_IMAGE };
 

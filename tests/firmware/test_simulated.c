@@ -1,6 +1,6 @@
 /* The simulated board by itself: what it measures are the frames that it is shown, in their order,
  * on a clock that runs only for whoever wants frames. */
-#include "app/scan_control.h"
+#include "app/link/scanning.h"
 #include "bench.h"
 #include "check.h"
 #include "simulated.h"

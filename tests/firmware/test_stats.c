@@ -1,5 +1,5 @@
 /* Times by bins: edges, the 99th percentile against sorting, the worst. */
-#include "app/stats.h"
+#include "app/link/stats.h"
 #include "check.h"
 #include "small_model.h"
 

@@ -10,7 +10,7 @@
  * self-test, and it answers. */
 #include "fuzz.h"
 
-#include "app/follow.h"
+#include "app/link/tracks.h"
 #include "app/main_loop.h"
 #include "fake_board.h"
 #include "skin_model.h"

@@ -72,7 +72,7 @@ def cortex_m7() -> Path:
 @pytest.fixture(scope="session")
 def same_everywhere(cortex_m7, tmp_path_factory):
     """Runs steps on host kernels, plain C and the emulated Cortex-M7, and asserts the same bits."""
-    from eitskin_studies.harness.emulated import PROGRAM
+    from eitskin_emulator.core_on_qemu import PROGRAM
     from everywhere import SameEverywhere
 
     return SameEverywhere(cortex_m7 / PROGRAM, lambda: tmp_path_factory.mktemp("board"))

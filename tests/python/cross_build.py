@@ -3,7 +3,7 @@
 import fcntl
 from pathlib import Path
 
-from eitskin_studies.harness.emulated import build_cortex_m7
+from eitskin_emulator.core_on_qemu import build_cortex_m7
 
 __all__ = ["ROOT", "build_cortex_m7", "shared_build"]
 

@@ -14,8 +14,8 @@ from eitskin.core.results import Info, Options, known_touch
 from eitskin.errors import EitskinError
 from eitskin.model.eitm import decode_model
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated import EmulatedFrame, EmulatedRun, run_steps
-from eitskin_studies.harness.emulated_steps import (
+from eitskin_emulator.core_on_qemu import EmulatedFrame, EmulatedRun, run_steps
+from eitskin_emulator.core_steps import (
     Choose,
     Forget,
     Load,

@@ -129,7 +129,7 @@ def run_test(library: Library, test: str, folder: Path, most_cpu_seconds: float)
     program = [str(BUILD / TESTS[library.name] / test)]
     if test.startswith("replay_"):
         name = test.removeprefix("replay_")
-        corpus = FUZZ / "corpus" / name.split("_")[0]
+        corpus = FUZZ / "corpus" / f"{name.split('_')[0]}.zip"
         program = [str(BUILD / "tests" / "fuzz" / test), str(corpus), str(FUZZ / "sums.txt"), name]
     paths = [folder, BUILD, BUILD / "firmware"]
     limited = f'ulimit -t {max(1, round(most_cpu_seconds))}; exec "$0" "$@"'

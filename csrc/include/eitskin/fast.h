@@ -16,7 +16,7 @@
  *         eits_fast_name(fast, &info);                         // a copy of the context's
  *     }
  *
- * What its numbers are and how far they are off: docs/results/fast-path.md.
+ * What its numbers are and how far they are off: studies/results/fast-path.md.
  */
 #ifndef EITSKIN_FAST_H
 #define EITSKIN_FAST_H

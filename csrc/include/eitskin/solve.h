@@ -16,7 +16,7 @@
  * steps on a few columns that come and go; an iteration is a look at every column, and few are
  * needed. The support never exceeds the directions that the data have; where the factor is of no
  * use coordinate descent goes on, and the gap tells how far that came. The optimum is not the best
- * image: it is sparser than a touch (docs/results/benchmarks.md).
+ * image: it is sparser than a touch (studies/results/benchmarks.md).
  *
  * With mac_limit > 0 each solver stops with the best so far (FISTA: the last so far) where the next
  * step, and the gap after it, would take info.macs beyond the limit. The frame stage's MACs count

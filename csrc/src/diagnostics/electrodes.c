@@ -2,7 +2,7 @@
  *
  * A detached electrode or a bridge spoils every row that uses it, by far more than a touch does; in
  * the image that is a touch that nobody made. docs/reference/diagnostics.md has the rules, and
- * docs/results/diagnostics.md what they cost and how often they fail.
+ * studies/results/diagnostics.md what they cost and how often they fail.
  *
  * Method: each row that has a clear reference is alive, dead (about nothing where there should be a
  * voltage) or turned (of the other sign, which no change of conductivity can do). An electrode

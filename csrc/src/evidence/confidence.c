@@ -2,7 +2,7 @@
  *
  * The test tells how much more likely the data are with a disc than without, under the errors that
  * the model admits to. It does not say how often that has been right, nor how far places were off:
- * both were counted on scenes of other worlds (docs/results/belief.md).
+ * both were counted on scenes of other worlds (studies/results/belief.md).
  *
  * A disc is a touch with probability rise / (rise + HALF), a logistic function of the logarithm of
  * its rise. A place is off by what the data leave open (the covariance, as far as it was found

@@ -8,9 +8,9 @@
  *
  *     (s - 1) / (s + 1) = MOST d / (d + HALF)
  *
- * fitted on scenes of ellipses and fingers (docs/results/other-worlds.md): the dipole of an ellipse
- * with a finite contrast, less what the prior holds back. An insulating touch is weaker along its
- * long axis.
+ * fitted on scenes of ellipses and fingers (studies/results/other-worlds.md): the dipole of an
+ * ellipse with a finite contrast, less what the prior holds back. An insulating touch is weaker
+ * along its long axis.
  *
  * An ellipse is reported where the test has it, which knows its shape, and not where a disc fits
  * best. The radius of that disc is wrong, too: it makes up for a shape that a disc has not. What

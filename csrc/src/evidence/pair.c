@@ -8,7 +8,7 @@
  *
  *     log odds = OFFSET + BULGE a + DIPOLE b + BOTH |bulge| |dipole| + GROWTH g + GROWTH_2 g^2
  *
- * fitted on scenes of one and of two (docs/results/belief.md). What is likelier two than one is
+ * fitted on scenes of one and of two (studies/results/belief.md). What is likelier two than one is
  * tried as two, side by side on the line along which the edge bulges (touch_test.c). */
 #include "evidence/evidence.h"
 

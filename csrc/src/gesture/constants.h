@@ -8,7 +8,7 @@
 /* clang-format off */
 
 /* ---- Chosen: on random sessions of role tuning, seeds 101 and 102, at 60 and 40 dB; judged on
- * others (docs/results/gestures.md). Check: eitskin bench gestures */
+ * others (studies/results/gestures.md). Check: eitskin bench gestures */
 
 /* a finger that is not found for so long has lifted [us]. larger: lifts, taps and swipes are
  * reported a frame later; smaller: a lost frame at 96 frames a second ends a touch */

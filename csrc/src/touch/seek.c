@@ -8,7 +8,7 @@
  * last one added stays if each disc explains touch_min_fraction of |y|^2.
  *
  * On sums of two presses of a hydrogel skin this finds as many as the best of all pairs of pixels
- * (docs/results/teaching.md). A candidate costs S'v, an exchange one a disc.
+ * (studies/results/teaching.md). A candidate costs S'v, an exchange one a disc.
  *
  * An instrument that is far from the model errs by as much as a touch gives. A disc then fits the
  * errors, near the rim where a small one can be of any strength. One regularised step from the

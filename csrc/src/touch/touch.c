@@ -17,7 +17,7 @@
  * differences, whose noise the whitening is made for.
  *
  * Each stage can be switched off (options.touch_fit, .touch_sweeps), for what it costs a board;
- * info.touch_macs counts. docs/results/levers.md has what each is worth. */
+ * info.touch_macs counts. studies/results/levers.md has what each is worth. */
 #include "touch/constants.h"
 #include "touch/disc_fit.h"
 

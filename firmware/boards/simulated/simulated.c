@@ -1,9 +1,9 @@
 #include "simulated.h"
 
-#include "app/drive.h"
+#include "app/acquire/sincos.h"
+#include "app/link/scanning.h"
 #include "app/main_loop.h"
-#include "app/scan_control.h"
-#include "app/sincos.h"
+#include "app/safety/current_enable.h"
 #include "boards/parts/nor_model.h"
 
 #include <math.h>

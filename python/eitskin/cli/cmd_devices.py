@@ -13,7 +13,7 @@ URLS = {
     "serial:PORT": "a serial port; serial:PORT?baud=N where it is not at 1000000 baud",
     "text:PORT": "an instrument that sends lines: text:PORT?layout=FILE (docs/guide/your-board.md)",
     "sim:SCENE": "a simulated board that sees a scene: a file, or a name of  eitskin scene list",
-    "emu:SCENE": "the firmware on an emulated board (a checkout: pip install ./python)",
+    "emu:SCENE": "the firmware on an emulated board (a checkout: pip install ./firmware/emulator)",
     "file:RUN.eits": "a recording, made by  eitskin record",
 }
 

@@ -133,7 +133,7 @@ def _emulated(scene: str, model: bytes | None, image: Path | None, loop: bool) -
     try:
         from eitskin_emulator.transport import open_emulated
     except ImportError:
-        raise missing_checkout(f"emu:{scene}: the emulated board") from None
+        raise missing_checkout(f"emu:{scene}: the emulated board", "firmware/emulator") from None
     transport: Transport = open_emulated(scene, model=model, image=image, loop=loop)
     return transport
 

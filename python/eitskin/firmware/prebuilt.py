@@ -13,6 +13,7 @@ from eitskin.fileio import read_bytes, write_bytes
 BOARD = "nucleo_f767zi"
 IMAGE, MANIFEST = f"{BOARD}.bin", f"{BOARD}.json"
 SOURCES = ("csrc", "firmware", "cmake", "CMakeLists.txt", "CMakePresets.json")
+EMULATOR = Path("firmware", "emulator")  # Python, and no part of the image
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,10 @@ def hash_of_sources(root: Path) -> str:
     for name in SOURCES:
         top = root / name
         for path in sorted(top.rglob("*")) if top.is_dir() else [top]:
-            if path.is_file():
+            file = path.relative_to(root)
+            if path.is_file() and EMULATOR not in file.parents:
                 content = hashlib.sha256(path.read_bytes()).hexdigest()
-                total.update(f"{path.relative_to(root).as_posix()} {content}\n".encode())
+                total.update(f"{file.as_posix()} {content}\n".encode())
     return total.hexdigest()
 
 

@@ -172,7 +172,7 @@ def _reference_engine(model: Model) -> "ReferenceEngine":
     try:
         from eitskin_reference.engine import ReferenceEngine
     except ImportError:
-        raise missing_checkout("the engine numpy") from None
+        raise missing_checkout("the engine numpy", "python") from None
     return ReferenceEngine(model)
 
 

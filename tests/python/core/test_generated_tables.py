@@ -46,7 +46,7 @@ def test_constants_have_one_name_and_a_check_that_exists():
     assert len(set(names)) == len(names) > 100
     tests = [f"{path.stem[5:]}_f32" for path in (ROOT / "tests" / "c").glob("test_*.c")]
     tests += [f"fw_{path.stem[5:]}" for path in (ROOT / "tests" / "firmware").glob("test_*.c")]
-    files = (ROOT / "python/eitskin_studies/cli").glob("bench_*.py")
+    files = (ROOT / "studies/eitskin_studies/cli").glob("bench_*.py")
     benches = "".join(path.read_text(encoding="utf-8") for path in files)
     for group in groups:
         words = shlex.split(group["check"])

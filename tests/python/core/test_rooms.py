@@ -86,7 +86,7 @@ def test_a_file_keeps_to_its_room(path):
     ("folder", "read"),
     [
         (CSRC / "src", ("frame/fold", "context/context")),
-        (ROOT / "firmware", ("app/main_loop", "app/commands")),
+        (ROOT / "firmware", ("app/main_loop", "app/link/commands")),
     ],
     ids=["core", "firmware"],
 )

@@ -25,7 +25,7 @@ PAGES = (
     "docs/guide/your-board.md",
     "docs/reference/python-api.md",
     "docs/reference/frames-format.md",
-    "docs/results/tradeoff.md",
+    "studies/results/tradeoff.md",
 )
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SET_UP = {"scripts/demo", "scripts/test"}
@@ -58,7 +58,7 @@ def test_blocks_run(page, tmp_path):
 
 
 def test_pages_link_to_files_that_exist():
-    for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]:
+    for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("studies/**/*.md")]:
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
             there = "://" in target or (page.parent / target).exists()
             assert there, f"{page.relative_to(ROOT)} links to {target}, which is not there"
@@ -66,8 +66,10 @@ def test_pages_link_to_files_that_exist():
 
 def test_paths_that_pages_name_exist():
     """Files and folders of the tree, but for those with a placeholder in capitals."""
-    named = re.compile(r"`((?:csrc|python|firmware|tests|scripts|examples|tables)/[\w./-]+)`")
-    for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/**/*.md")]:
+    named = re.compile(
+        r"`((?:csrc|python|firmware|studies|tests|scripts|examples|tables)/[\w./-]+)`"
+    )
+    for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("studies/**/*.md")]:
         for path in named.findall(page.read_text(encoding="utf-8")):
             if not re.search(r"[A-Z]{4}", path):
                 name = page.relative_to(ROOT)

@@ -13,8 +13,8 @@ from cross_build import ROOT
 from eitskin.core.engine import CoreEngine
 from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin_studies.harness.emulated import run_steps
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
+from eitskin_emulator.core_on_qemu import run_steps
+from eitskin_emulator.core_steps import Choose, Load, Play, Step, TareStep
 from printed_touches import printed_touches
 from small_models import session
 

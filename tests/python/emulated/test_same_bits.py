@@ -25,8 +25,8 @@ from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.teaching.teach import teach
-from eitskin_studies.harness.emulated import PROGRAM, EmulatedFrame, run_frames
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
+from eitskin_emulator.core_on_qemu import PROGRAM, EmulatedFrame, run_frames
+from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from simulated_presses import SKIN, presses
 from small_models import session as simulated_session
 from small_models import small, small_blob, small_model

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Mask, Play, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Mask, Play, Step, TareStep
 from everywhere import Outcome
 from small_models import small, small_blob, small_model
 

@@ -1,4 +1,4 @@
-"""docs/results/hard-cases.md: what the catalogue is, and its pictures. ``scripts/hard-cases`` runs
+"""studies/results/hard-cases.md: what the catalogue is, and its pictures. ``scripts/hard-cases`` runs
 it and makes the page."""
 
 import sys
@@ -9,8 +9,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import pictures
 from catalogue import CASES, GROUPS, ROOT
 
-PAGE = ROOT / "docs" / "results" / "hard-cases.md"
-PICTURES = ROOT / "docs" / "results" / "pictures"
+PAGE = ROOT / "studies" / "results" / "hard-cases.md"
+PICTURES = ROOT / "studies" / "results" / "pictures"
 
 HEAD = """# Hard cases
 

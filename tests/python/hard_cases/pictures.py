@@ -15,7 +15,7 @@ from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TouchScene
 from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from eitskin_studies.pictures.comparison_pictures import truth_marks
 from everywhere import on_host
 from small_models import prebuilt

@@ -9,7 +9,7 @@ from soundness import U, judged
 
 from eitskin.model.eitm import encode_model
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Solve, Step, TareStep
 from everywhere import Host, Outcome, as_float32, on_host
 from small_models import prebuilt
 

@@ -11,7 +11,7 @@ from touch_scenes import entangled, frames_of
 from eitskin.core.options_table import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPLIT_MERGE
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Forget, Load, Play, Step, TareStep
 from small_models import prebuilt
 
 CASE = "physics/entangled"

@@ -26,7 +26,7 @@ from eitskin.core.diagnostics_table import Touch as Found
 from eitskin.model.options import default_options
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.matching import match
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from everywhere import Outcome, SameEverywhere
 from margins import Margins
 from small_models import prebuilt

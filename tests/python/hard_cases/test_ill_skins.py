@@ -10,7 +10,7 @@ from soundness import U, check_sound, judged
 from eitskin.core.options_table import SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, Step, TareStep
 from everywhere import Host, as_float32, on_host
 
 CASE = "problem/ill-conditioned-skins"

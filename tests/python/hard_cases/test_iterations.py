@@ -10,7 +10,7 @@ from random_problems import RandomProblem, asked, gaussian, optimum_of, smooth, 
 from soundness import Judged, U, check_sound
 
 from eitskin.core.options_table import SIGNS, SOLVERS
-from eitskin_studies.harness.emulated_steps import Step
+from eitskin_emulator.core_steps import Step
 from everywhere import on_host
 from margins import Margins
 

@@ -11,7 +11,7 @@ from soundness import check_sound
 
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, Solve, Step, TareStep
 from everywhere import on_host
 from small_models import small, small_blob, small_model
 

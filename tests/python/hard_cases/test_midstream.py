@@ -9,7 +9,7 @@ import numpy as np
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Forget, Load, Play, Step, TareStep
 from everywhere import Outcome, as_printed
 from small_models import small, small_blob, small_model
 

@@ -6,7 +6,7 @@ import numpy as np
 from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_steps
 
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from small_models import prebuilt
 
 

@@ -13,7 +13,7 @@ from soundness import check_sound, judged
 from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.model.eitm import encode_model
 from eitskin.model.storage import STORAGES
-from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
+from eitskin_emulator.core_steps import Choose, Load, Solve, Step
 from everywhere import on_host
 
 CASE = "problem/any"

@@ -9,7 +9,7 @@ from fault_scenes import COUNT, half, miou, played, quiet_frames, rms_v, simulat
 
 from eitskin.core.results import Options
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, Step, TareStep
 from everywhere import Outcome, SameEverywhere
 from margins import Margins
 from small_models import prebuilt

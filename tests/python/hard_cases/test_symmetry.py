@@ -20,7 +20,7 @@ from eitskin.model.options import default_options
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import Skin
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, Solve, Step, TareStep
 from everywhere import Host, SameEverywhere, as_float32
 from margins import Margins
 from small_models import DATA_KINDS, ELEMENTS, PIXELS, small, small_blob, small_model

@@ -7,7 +7,7 @@ import numpy as np
 
 from eitskin.core.results import Options
 from eitskin.model.options import default_options, tracking
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, Step, TareStep
 from small_models import small, small_blob, small_model
 
 NOISE = 1e-3

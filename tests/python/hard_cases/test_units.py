@@ -16,7 +16,7 @@ from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
+from eitskin_emulator.core_steps import Choose, Load, Play, Solve, Step, TareStep
 from everywhere import as_float32
 from margins import Margins
 from small_models import DATA_KINDS, small, small_blob, small_model

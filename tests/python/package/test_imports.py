@@ -7,8 +7,13 @@ from pathlib import Path
 
 import pytest
 
-PYTHON = Path(__file__).resolve().parents[3] / "python"
-
+ROOT = Path(__file__).resolve().parents[3]
+FOLDERS = {  # where each package stands
+    "eitskin": ROOT / "python",
+    "eitskin_reference": ROOT / "python",
+    "eitskin_emulator": ROOT / "firmware" / "emulator",
+    "eitskin_studies": ROOT / "studies",
+}
 CHECKOUT = ("eitskin_emulator", "eitskin_reference", "eitskin_studies")  # not in the wheel
 
 # Each imports from its own line and those above it alone.
@@ -39,8 +44,9 @@ ORDER = (
 
 def modules(package: str) -> dict[str, Path]:
     found = {}
-    for path in (PYTHON / package).rglob("*.py"):
-        parts = path.relative_to(PYTHON).with_suffix("").parts
+    folder = FOLDERS[package]
+    for path in (folder / package).rglob("*.py"):
+        parts = path.relative_to(folder).with_suffix("").parts
         found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
 

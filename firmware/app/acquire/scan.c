@@ -1,0 +1,269 @@
+#include "app/acquire/scan.h"
+
+#include "eitskin/link.h"
+
+static uint32_t now_us(const fw_scan *scan)
+{
+    return scan->board->system->time_us(scan->board->system_ctx);
+}
+
+void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *demodulator)
+{
+    *scan = (fw_scan){.board = board, .demodulator = demodulator, .mux = {board->multiplexers}};
+}
+
+uint32_t fw_burst_us(const fw_scan_settings *s)
+{
+    return (uint32_t)(((uint64_t)s->samples * 1000000u + s->sample_rate_hz - 1) /
+                      s->sample_rate_hz);
+}
+
+uint32_t fw_slot_us(const fw_scan_settings *s)
+{
+    const uint32_t min = fw_burst_us(s) + s->settle_us + FW_SWITCH_US;
+    for (uint32_t us = min; us <= min + min / 4; ++us) {
+        if ((uint64_t)us * s->excitation_millihz % 1000000000u == 0)
+            return us;
+    }
+    return min;
+}
+
+uint32_t fw_scan_rows(const fw_scan_settings *settings, const fw_scan_table *table)
+{
+    return settings->check_every == 0 ? table->n_unique : table->n_rows;
+}
+
+uint32_t fw_scan_next_rows(const fw_scan *scan)
+{
+    return scan->next_full ? scan->table.n_rows : scan->table.n_unique;
+}
+
+uint32_t fw_scan_row_at(const fw_scan *scan, uint32_t position)
+{
+    const uint16_t *order = scan->next_full ? scan->table.order : scan->table.unique;
+    return order == NULL ? position : order[position];
+}
+
+/* Select the row at `position`. A switch that failed is known by `switched`. */
+static void switch_to(fw_scan *scan, uint32_t position)
+{
+    const uint8_t *electrodes = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, position);
+    scan->position = position;
+    scan->switched = fw_adg1206_select(&scan->mux, electrodes) == FW_OK;
+    scan->switched_us = now_us(scan);
+}
+
+static bool same_drive(const fw_scan *scan, uint32_t position, uint32_t other)
+{
+    const uint8_t *a = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, position);
+    const uint8_t *b = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, other);
+    return a[0] == b[0] && a[1] == b[1];
+}
+
+/* The drive that ends with the row at `position` can be looked at. */
+static void tell_drive(fw_scan *scan, uint32_t position, uint32_t start_us, bool last)
+{
+    const uint32_t first = scan->drive_from, count = position + 1 - first;
+    const uint32_t told = atomic_load_explicit(&scan->drives, memory_order_relaxed);
+    scan->drive_from = last ? 0 : position + 1;
+    if (scan->drive_done == NULL)
+        return;
+    if (told - atomic_load_explicit(&scan->drives_taken, memory_order_acquire) < FW_SCAN_DRIVES) {
+        const fw_frame *frame = scan->frame;
+        scan->drive[told % FW_SCAN_DRIVES] =
+            (fw_scan_drive){.frame = frame->number,
+                            .first = first,
+                            .count = count,
+                            .time_us = frame->time_us + first * scan->slot_us +
+                                       ((count - 1) * scan->slot_us + scan->burst_us) / 2,
+                            .end_us = start_us + scan->burst_us,
+                            .z = frame->z,
+                            .quality = frame->quality,
+                            .last = last};
+        atomic_store_explicit(&scan->drives, told + 1, memory_order_release);
+    }
+    scan->drive_done(scan->user);
+}
+
+/* Whether the next frame measures all rows. */
+static void plan_frame(fw_scan *scan)
+{
+    const uint32_t every = scan->settings.check_every;
+    scan->next_full = every != 0 && scan->next_number % every == 0;
+}
+
+/* The free frame begins with the burst that began at start_us; false: none is free, or it is not
+ * due yet. */
+static bool begin_frame(fw_scan *scan, uint32_t start_us)
+{
+    uint32_t filled = atomic_load_explicit(&scan->filled, memory_order_relaxed);
+    if (filled - atomic_load_explicit(&scan->taken, memory_order_acquire) >= 2) {
+        if (!scan->newest)
+            return false;
+        /* the main loop has the other one, and has not looked at this one */
+        atomic_store_explicit(&scan->filled, --filled, memory_order_release);
+    }
+    const uint32_t period = scan->settings.frame_period_us;
+    if (period != 0) {
+        const int32_t late = (int32_t)(start_us - scan->next_due_us);
+        if (scan->due_known && late < 0)
+            return false;
+        const bool on_time = scan->due_known && (uint32_t)late < period;
+        scan->next_due_us = (on_time ? scan->next_due_us : start_us) + period;
+        scan->due_known = true;
+    }
+    fw_frame *frame = &scan->frames[filled % 2u];
+    frame->number = scan->next_number;
+    frame->time_us = start_us;
+    frame->busy_us = 0;
+    frame->bus_errors = 0;
+    frame->flags = scan->settings.check_every == 1
+                       ? 0
+                       : (scan->next_full ? EITS_RAW_CHECK : EITS_RAW_RECIPROCAL);
+    scan->frame = frame;
+    return true;
+}
+
+static void end_frame(fw_scan *scan, uint32_t start_us)
+{
+    fw_frame *frame = scan->frame;
+    frame->scan_us = start_us + scan->burst_us - frame->time_us;
+    frame->end_us = start_us + scan->burst_us;
+    scan->frame = NULL;
+    atomic_fetch_add_explicit(&scan->frames_scanned, 1, memory_order_relaxed);
+    atomic_fetch_add_explicit(&scan->filled, 1, memory_order_release);
+}
+
+/* The burst of a slot is complete: called from the capture's interrupt. */
+static void on_burst(void *user, const fw_burst *burst)
+{
+    fw_scan *scan = user;
+    const uint32_t entered_us = now_us(scan);
+    atomic_fetch_add_explicit(&scan->bursts, 1, memory_order_relaxed);
+    /* the clock was read after the switch and rounded down: one more microsecond makes it sure */
+    const bool settled = scan->switched && (int32_t)(burst->start_us - scan->switched_us) >
+                                               (int32_t)scan->settings.settle_us;
+    const bool good = settled && !burst->lost;
+    if (!good && scan->tries < FW_MAX_TRIES) {
+        ++scan->tries;
+        atomic_fetch_add_explicit(&scan->slots_repeated, 1, memory_order_relaxed);
+        if (!scan->switched) {
+            if (scan->frame != NULL)
+                ++scan->frame->bus_errors;
+            switch_to(scan, scan->position);
+        }
+        return;
+    }
+    if (scan->frame == NULL && !begin_frame(scan, burst->start_us))
+        return;
+    fw_frame *frame = scan->frame;
+    const uint32_t position = scan->position, row = fw_scan_row_at(scan, position);
+    const bool last = position + 1 == fw_scan_next_rows(scan);
+    const bool drive_ends = last || !same_drive(scan, position, position + 1);
+    const bool bus_error = !scan->switched;
+    if (last) {
+        ++scan->next_number;
+        plan_frame(scan);
+    }
+    switch_to(scan, last ? 0 : position + 1);
+    scan->tries = 0;
+    frame->bus_errors += bus_error;
+    if (good) {
+        const bool saturated =
+            fw_demodulate(scan->demodulator, burst->samples, burst->start_us, &frame->z[row]);
+        frame->quality[row] = saturated ? EITS_QUALITY_SATURATED : 0;
+    } else {
+        frame->z[row] = (fw_iq){0, 0};
+        frame->quality[row] = EITS_QUALITY_UNSETTLED;
+    }
+    frame->busy_us += now_us(scan) - entered_us;
+    if (drive_ends)
+        tell_drive(scan, position, burst->start_us, last);
+    if (last)
+        end_frame(scan, burst->start_us);
+}
+
+fw_status fw_scan_configure(fw_scan *scan, const fw_scan_settings *settings)
+{
+    const fw_capture *capture = &scan->board->capture;
+    const fw_capture_setup setup = {settings->sample_rate_hz, settings->samples,
+                                    fw_slot_us(settings)};
+    return capture->ops->configure(capture->ctx, &setup, on_burst, scan);
+}
+
+fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const fw_scan_table *table,
+                        fw_frame *frames)
+{
+    const fw_capture *capture = &scan->board->capture;
+    (void)fw_scan_stop(scan);
+    scan->settings = *settings;
+    scan->table = *table;
+    scan->frames = frames;
+    scan->burst_us = fw_burst_us(settings);
+    scan->slot_us = fw_slot_us(settings);
+    scan->frame = NULL;
+    scan->tries = 0;
+    scan->drive_from = 0;
+    scan->due_known = false;
+    atomic_store(&scan->filled, 0);
+    atomic_store(&scan->taken, 0);
+    fw_status status = fw_scan_configure(scan, settings);
+    if (status != FW_OK)
+        return status;
+    plan_frame(scan);
+    switch_to(scan, 0);
+    scan->watched_us = now_us(scan);
+    scan->watched_bursts = atomic_load(&scan->bursts);
+    status = scan->switched ? capture->ops->start(capture->ctx) : FW_E_BUS;
+    scan->running = status == FW_OK;
+    if (!scan->running)
+        (void)fw_adg1206_all_off(&scan->mux);
+    return status;
+}
+
+fw_status fw_scan_stop(fw_scan *scan)
+{
+    if (scan->running)
+        scan->board->capture.ops->stop(scan->board->capture.ctx);
+    scan->running = false;
+    atomic_store(&scan->filled, 0);
+    atomic_store(&scan->taken, 0);
+    return fw_adg1206_all_off(&scan->mux);
+}
+
+fw_frame *fw_scan_take(fw_scan *scan)
+{
+    const uint32_t taken = atomic_load_explicit(&scan->taken, memory_order_relaxed);
+    if (atomic_load_explicit(&scan->filled, memory_order_acquire) == taken)
+        return NULL;
+    return &scan->frames[taken % 2u];
+}
+
+void fw_scan_release(fw_scan *scan)
+{
+    atomic_fetch_add_explicit(&scan->taken, 1, memory_order_release);
+}
+
+const fw_scan_drive *fw_scan_next_drive(const fw_scan *scan)
+{
+    const uint32_t taken = atomic_load_explicit(&scan->drives_taken, memory_order_relaxed);
+    if (atomic_load_explicit(&scan->drives, memory_order_acquire) == taken)
+        return NULL;
+    return &scan->drive[taken % FW_SCAN_DRIVES];
+}
+
+void fw_scan_take_drive(fw_scan *scan)
+{
+    atomic_fetch_add_explicit(&scan->drives_taken, 1, memory_order_release);
+}
+
+bool fw_scan_stalled(fw_scan *scan, uint32_t now)
+{
+    const uint32_t bursts = atomic_load_explicit(&scan->bursts, memory_order_relaxed);
+    if (!scan->running || bursts != scan->watched_bursts) {
+        scan->watched_bursts = bursts;
+        scan->watched_us = now;
+        return false;
+    }
+    return now - scan->watched_us > 4 * scan->slot_us + 20000u;
+}

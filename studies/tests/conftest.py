@@ -1,0 +1,67 @@
+"""What every test of the studies may use: of the product's tests, their helpers."""
+
+import re
+import sys
+from collections.abc import Iterator
+from fnmatch import translate
+from importlib.util import find_spec
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "python"))
+
+from cross_build import shared_build  # noqa: E402
+from kept_meshes import mesher_that_keeps  # noqa: E402
+
+NEEDED = ("dask", "pyeit", "sklearn", "celer", "daqp", "unicorn", "netgen", "matplotlib")
+LONG = HERE / "long_tests.txt"
+hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
+
+
+def pytest_sessionstart() -> None:
+    """Nothing is left out for want of a package."""
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise pytest.UsageError(f"no {', '.join(missing)} here: run  studies/test")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what ``long_tests.txt`` lists."""
+    lines = LONG.read_text(encoding="utf-8").splitlines()
+    patterns = [translate(line) for line in lines if line and not line.startswith("#")]
+    is_long = re.compile("|".join(patterns)).match
+    for item in items:
+        name = item.nodeid.rpartition("tests/")[2].replace("[", "(").replace("]", ")")
+        if is_long(name):
+            item.add_marker(pytest.mark.long)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def meshes_are_kept() -> Iterator[None]:
+    """Netgen is a process of its own, about half a second a mesh."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("eitskin.fem.mesh.run_mesher", mesher_that_keeps())
+        yield
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of measured frames, ``../shared/data`` beside the project's root; without it the
+    test is skipped."""
+    folder = ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip(
+            "the measured frames are not part of the project: no ../shared/data beside its root"
+        )
+    return folder
+
+
+@pytest.fixture(scope="session")
+def cortex_m7() -> Path:
+    """A build of everything for the Cortex-M7: ``firmware/eitskin_BOARD.elf``, ``.bin`` and
+    ``.map``, ``tests/emulated``."""
+    return shared_build()
