@@ -1,9 +1,10 @@
-"""``mcap:FILE``: a recording of ROS 2 messages (CDR), for ROS, Foxglove and the like.
+"""``mcap:FILE``: record ROS 2 messages (CDR) for ROS, Foxglove and similar programs.
 
-/touches eitskin_msgs/msg/TouchArray, /reports eitskin_msgs/msg/Report with ``--report drive``,
-/image sensor_msgs/msg/Image where images are streamed, /diagnostics
-diagnostic_msgs/msg/DiagnosticArray when they change. The file is written in chunks of about a
-second: a killed program loses the last. The list of chunks stays in memory until the end.
+The topics are /touches with eitskin_msgs/msg/TouchArray, /reports with eitskin_msgs/msg/Report if
+``--report drive`` is set, /image with sensor_msgs/msg/Image if images are streamed, and
+/diagnostics with diagnostic_msgs/msg/DiagnosticArray when the diagnostics change. The file is
+written in chunks of about a second, and a killed program loses the last chunk. The list of chunks
+stays in memory until the end.
 """
 
 from typing import Any
@@ -11,14 +12,14 @@ from typing import Any
 from eitskin.errors import missing_extra
 from eitskin.sinks import ros2
 from eitskin.sinks.csv_file import new_file
-from eitskin.sinks.sink import Sink, Told, TouchSource
+from eitskin.sinks.sink import Outgoing, Sink, TouchSource
 
-CHUNK_BYTES, REPORTS_BYTES, IMAGES_BYTES = 1 << 14, 1 << 16, 1 << 18  # touches alone, with these
+CHUNK_BYTES, REPORTS_BYTES, IMAGES_BYTES = 1 << 14, 1 << 16, 1 << 18  # about a second of each
 FRAME_ID = "skin"
 
 
 class McapSink:
-    """One open file."""
+    """An open MCAP file."""
 
     def __init__(self, stream: Any, source: TouchSource) -> None:
         self._stream, self._source = stream, source
@@ -26,26 +27,28 @@ class McapSink:
         self._types: dict[str, Any] = {}
         self._status: Any = None
 
-    def write(self, told: Told) -> None:
-        message = told.message
+    def write(self, outgoing: Outgoing) -> None:
+        message = outgoing.message
         if message["type"] == "summary":
             return
         if self._writer is None:
-            images = told.frame is not None and told.frame.image is not None
-            self._begin(IMAGES_BYTES if images else REPORTS_BYTES if told.report else CHUNK_BYTES)
-        now = told.time_ns
-        if told.report is not None:
+            images = outgoing.frame is not None and outgoing.frame.image is not None
+            self._begin(
+                IMAGES_BYTES if images else REPORTS_BYTES if outgoing.report else CHUNK_BYTES
+            )
+        now = outgoing.time_ns
+        if outgoing.report is not None:
             table = ros2.report(message, now, FRAME_ID)
             self._put("/reports", "eitskin_msgs/msg/Report", table, now)
             return
-        if told.frame is not None:
+        if outgoing.frame is not None:
             table = ros2.touch_array(message, now, FRAME_ID)
             self._put("/touches", "eitskin_msgs/msg/TouchArray", table, now)
-            if told.frame.image is not None and self._source.model is not None:
-                table = ros2.image(self._source.model.grid, told.frame.image, now, FRAME_ID)
+            if outgoing.frame.image is not None and self._source.model is not None:
+                table = ros2.image(self._source.model.grid, outgoing.frame.image, now, FRAME_ID)
                 self._put("/image", "sensor_msgs/msg/Image", table, now)
         table = ros2.diagnostics(message, now, FRAME_ID, self._source.board)
-        if table["status"] != self._status or told.notice is not None:
+        if table["status"] != self._status or outgoing.notice is not None:
             self._put("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", table, now)
             self._status = table["status"]
         self._stream.sync_now_and_then()
