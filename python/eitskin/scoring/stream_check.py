@@ -1,5 +1,5 @@
-"""What a board's frames show, compared with the truth where there is one: touches, places in
-images, raw rows in brief."""
+"""Summarise the frames of a board and compare them with the truth if it is known: touches, places
+in images, and raw rows."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -22,9 +22,11 @@ from eitskin.scoring.scene_truth import SceneTruth, TruthScore
 
 @dataclass(frozen=True, eq=False)
 class ImageView:
-    """An image in brief: its ``peak`` in S/m and where, and ``places_mm`` (k, 2), the centroids of
-    what stands out of it, strongest first (``image_touches``, at the model's threshold for
-    touches); None where scipy is not installed.
+    """The summary of an image: its ``peak`` in S/m at ``peak_mm``, and ``places_mm`` (k, 2), the
+    centroids of its components, strongest first.
+
+    They are found by ``image_touches`` with the model's threshold for touches, or are None if scipy
+    is not installed.
     """
 
     peak: float
@@ -34,9 +36,12 @@ class ImageView:
 
 @dataclass(frozen=True, eq=False)
 class ComparedFrame:
-    """A frame and what it shows. ``true``: the touches that were there, None where no truth is
-    known; ``errors_mm``: position error by number of the found touch (of the touches, or without
-    them of the image's places)."""
+    """A frame compared with the truth.
+
+    ``true`` are the touches that were there, or None if no truth is known. ``errors_mm`` are the
+    position errors by the number of the found touch, or of the image's place in a frame without
+    touches.
+    """
 
     frame: LiveFrame
     view: ImageView | None = None
@@ -45,7 +50,7 @@ class ComparedFrame:
 
     @property
     def found_mm(self) -> FloatArray | None:
-        """Places (k, 2) of what was found; None where the frame does not tell."""
+        """The found places (k, 2), or None if the frame has none."""
         if self.frame.touches is not None:
             return np.array(
                 [(t.x_mm, t.y_mm) for t in self.frame.touches.touches], dtype=np.float64
@@ -54,14 +59,14 @@ class ComparedFrame:
 
 
 class Watcher:
-    """Turns frames into what they show; ``score`` adds up how far off it is."""
+    """Compares frames with the truth, and sums the errors in ``score``."""
 
     def __init__(self, known: KnownModel | None, truth: SceneTruth | None) -> None:
         self.known, self._truth = known, truth
         self.score = TruthScore()
 
     def see(self, frame: LiveFrame) -> ComparedFrame:
-        """What ``frame`` shows."""
+        """Return ``frame`` compared with the truth."""
         view = None
         if frame.image is not None and self.known is not None and not frame.refused:
             view = image_view(self.known, frame.image.image)
@@ -79,7 +84,7 @@ class Watcher:
 
 
 def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
-    """The image (n,) in brief."""
+    """Return the summary of an image (n,)."""
     grid, model = known.model.grid, known.model
     values, centres = np.asarray(image, dtype=np.float64), grid.centres_mm()
     top = int(np.argmax(np.abs(values)))
@@ -96,7 +101,7 @@ def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
 
 
 def line(seen: ComparedFrame, *, solver: bool = True) -> str:
-    """A frame in a line, with or without what the solver says of it."""
+    """Return a line of text for a frame, with the solver's information if ``solver`` is set."""
     frame = seen.frame
     parts = [_touches_text(seen), _image_text(seen), _raw_text(frame)]
     if solver:
@@ -161,12 +166,12 @@ def _raw_text(frame: LiveFrame) -> str:
     text = f"raw: {len(volts)} rows in {frame.raw.scan_us / 1e3:.2f} ms, rms {rms:.3f} mV"
     if len(usable) < len(volts):
         text += f", {len(volts) - len(usable)} not usable"
-    said = Counter(quality_text(int(quality)) for quality in frame.raw.quality if quality)
-    return text + "".join(f", {count} {what}" for what, count in said.items())
+    reasons = Counter(quality_text(int(quality)) for quality in frame.raw.quality if quality)
+    return text + "".join(f", {count} {what}" for what, count in reasons.items())
 
 
 def spread(frames: Sequence[ComparedFrame], most: int) -> list[ComparedFrame]:
-    """At most ``most`` of ``frames``, evenly, the first and the last among them."""
+    """Return at most ``most`` of ``frames``, evenly spaced, including the first and the last."""
     if len(frames) <= most:
         return list(frames)
     return [frames[round(k * (len(frames) - 1) / (most - 1))] for k in range(most)]
