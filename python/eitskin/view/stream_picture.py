@@ -1,4 +1,4 @@
-"""A board's frames as a picture: one frame at large, or a panel a frame."""
+"""Draw a board's frames: one frame at large, or a panel per frame."""
 
 from pathlib import Path
 
@@ -16,12 +16,12 @@ MAX_KEPT = 20 * MAX_PANELS
 
 
 class Album:
-    """Keeps frames for a picture: all of them, or of a long stream evenly spaced ones and the
+    """Keeps frames for a picture: all of them, or for a long stream evenly spaced ones and the
     last."""
 
     def __init__(self) -> None:
         self._kept: list[ComparedFrame] = []
-        self._step, self.count = 1, 0  # how many were added
+        self._step, self.count = 1, 0  # every how many frames one is kept; how many were added
         self._last: ComparedFrame | None = None
 
     def add(self, seen: ComparedFrame) -> None:
@@ -33,15 +33,21 @@ class Album:
         self._last = seen
 
     def spread(self, most: int = MAX_PANELS) -> list[ComparedFrame]:
-        """At most ``most`` (up to 360), evenly spaced, the first and the last among them."""
+        """Return at most ``most`` (up to 360) frames, evenly spaced, including the first and the
+        last."""
         if self._last is None or self._kept[-1] is self._last:
             return spread(self._kept, most)
         return spread([*self._kept, self._last], most)
 
 
 def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> None:
-    """The album as a PNG: circles are true touches, crosses what was found, dashed circles the
-    found touches' sizes."""
+    """Write the album as a picture: circles are true touches, crosses found ones, and dashed
+    circles the sizes of found touches.
+
+    Raises:
+        UsageError: the suffix is not that of a picture.
+        MissingExtraError: matplotlib is not installed.
+    """
     frames = album.spread()
     panels = [_panel(model, seen) for seen in frames]
     if len(panels) == 1:
@@ -62,7 +68,12 @@ def film_stream(
     *,
     progress: Progress = silent,
 ) -> None:
-    """The album as a film. Raises as ``draw_stream``."""
+    """Write the album as a film.
+
+    Raises:
+        UsageError: the suffix is not that of a film.
+        MissingExtraError: matplotlib or pillow is not installed.
+    """
     frames = album.spread(MAX_FRAMES)
     times_s = [seen.frame.time_us / 1e6 for seen in frames]
     draw_film(path, model, [_panel(model, seen) for seen in frames], times_s, progress=progress)
