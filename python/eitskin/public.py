@@ -16,9 +16,8 @@ from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import TouchSource
-from eitskin.tuning.for_model import chosen_point
-from eitskin.tuning.front import Target
-from eitskin.tuning.front import preset as named_preset
+from eitskin.tuning.for_model import operating_point_for
+from eitskin.tuning.front import Preset, named_preset
 
 PRESET_CHOOSES = {"solver", "iterations", "gap_rel", "mac_limit"}
 
@@ -41,7 +40,7 @@ def preset(name: str, model: Model | None = None) -> dict[str, Any]:
         UsageError: there is none of that name, or no measured point of such a model.
     """
     used = load_model() if model is None else model
-    point = chosen_point(named_preset(name, "host"), used, default_options(used))
+    point = operating_point_for(named_preset(name, "host"), used, default_options(used))
     return point.configuration.solver_settings
 
 
@@ -119,7 +118,7 @@ def _frames(session: Session, outputs: Outputs) -> Iterator[Frame]:
         items.close()
 
 
-def _preset(name: str, solver: dict[str, Any]) -> Target:
+def _preset(name: str, solver: dict[str, Any]) -> Preset:
     for other in PRESET_CHOOSES & solver.keys():
         raise UsageError(
             f"stream(preset={name!r}, {other}=...): the preset chooses {other}; leave one out"

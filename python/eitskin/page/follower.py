@@ -29,7 +29,7 @@ from eitskin.live.settings import KINDS, SessionSettings
 from eitskin.model.eitm import decode_model
 from eitskin.page.teacher import Teacher
 from eitskin.sinks.outputs import Outputs
-from eitskin.tuning.front import preset
+from eitskin.tuning.front import named_preset
 
 DRAWN_S = 0.015
 FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
@@ -246,7 +246,7 @@ class Follower:
 
     def preset(self, name: str) -> Future[str]:
         """Scan and solver by name, and the reference for them."""
-        session, target = self._board("a preset"), preset(name, "f767")
+        session, target = self._board("a preset"), named_preset(name, "f767")
 
         def action(device: Device) -> str:
             before = session.settings
