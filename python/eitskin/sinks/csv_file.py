@@ -10,7 +10,7 @@ from typing import Any
 from eitskin.device.recordings.new_file import RecordingFile
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
-from eitskin.sinks.sink import Outgoing, Sink, TouchSource
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource
 
 TOUCH = (
     "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence",
@@ -32,7 +32,7 @@ class CsvSink:
     def __init__(self, file: RecordingFile) -> None:
         self._file = file
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         message = outgoing.message
         if message["type"] not in ("frame", "report"):
             return

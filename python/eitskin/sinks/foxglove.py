@@ -13,7 +13,7 @@ import numpy as np
 from eitskin.errors import SinkError, missing_extra
 from eitskin.live.message import schema
 from eitskin.sinks.mcap_file import FRAME_ID
-from eitskin.sinks.sink import Outgoing, Sink, TouchSource, address, nothing_more
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "foxglove: or foxglove://HOST:PORT"
 PORT = 8765
@@ -63,7 +63,7 @@ class FoxgloveSink:
     def port(self) -> int:
         return int(self._server.port)
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         channel = self._channels.get(outgoing.message["type"])
         if channel is None:
             return

@@ -14,7 +14,7 @@ from typing import Any
 from urllib.parse import quote
 
 from eitskin.errors import SinkError, UsageError, missing_extra
-from eitskin.sinks.sink import Outgoing, Sink, TouchSource, or_nan, setting
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, or_nan, setting
 
 QUIET = "[log]\nlevel = -2\n"  # liblsl prints errors only
 FIELDS = ("id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n")
@@ -39,7 +39,7 @@ class LslSink:
         self._frames = self._outlet(name, ["touches"], FIELDS, "float32")
         self._drives: Any = None
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         if outgoing.frame is not None:
             self._push(self._frames, [], outgoing.message["touches"] or [], FIELDS)
         elif outgoing.report is not None:

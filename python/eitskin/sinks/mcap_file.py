@@ -12,7 +12,7 @@ from typing import Any
 from eitskin.errors import missing_extra
 from eitskin.sinks import ros2
 from eitskin.sinks.csv_file import new_file
-from eitskin.sinks.sink import Outgoing, Sink, TouchSource
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource
 
 CHUNK_BYTES, REPORTS_BYTES, IMAGES_BYTES = 1 << 14, 1 << 16, 1 << 18  # about a second of each
 FRAME_ID = "skin"
@@ -27,7 +27,7 @@ class McapSink:
         self._types: dict[str, Any] = {}
         self._status: Any = None
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         message = outgoing.message
         if message["type"] == "summary":
             return

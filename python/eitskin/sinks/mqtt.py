@@ -8,7 +8,7 @@ from urllib.parse import unquote
 from eitskin.errors import SinkError, missing_extra
 from eitskin.sinks.sink import (
     Dropped,
-    Outgoing,
+    OutgoingMessage,
     Sink,
     TouchSource,
     address,
@@ -30,7 +30,7 @@ class MqttSink:
         self._client, self._topic = client, topic
         self._last: Any = None
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         if not self._client.is_connected() or not self._sent():
             raise Dropped
         self._last = self._client.publish(

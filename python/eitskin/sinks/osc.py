@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from eitskin.errors import missing_extra
-from eitskin.sinks.sink import Outgoing, Sink, TouchSource, address, nothing_more
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 from eitskin.sinks.udp import connected, send
 
 USAGE = "osc://HOST:PORT or osc://HOST:PORT/prefix"
@@ -43,7 +43,7 @@ class OscSink:
     def __init__(self, target: Any, prefix: str) -> None:
         self._socket, self._prefix = target, prefix
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         messages = [
             (self._prefix + path, values) for path, values in osc_messages(outgoing.message)
         ]

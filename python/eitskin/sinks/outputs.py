@@ -12,7 +12,7 @@ from eitskin.config import nearest
 from eitskin.errors import UsageError
 from eitskin.live.frame import Frame, Notice, Report
 from eitskin.live.message import summary_message
-from eitskin.sinks.sink import Dropped, Outgoing, Sink, TouchSource, without_password
+from eitskin.sinks.sink import Dropped, OutgoingMessage, Sink, TouchSource, without_password
 
 ENTRY_POINT_GROUP = "eitskin.sinks"
 ROOM = 64  # frames: more than a second at 48 frames per second
@@ -83,14 +83,14 @@ class Outputs:
         self.close()
 
     def put(self, item: Frame | Report | Notice) -> None:
-        outgoing = Outgoing(item)
+        outgoing = OutgoingMessage(item)
         for one in self._queues:
             one.put(outgoing, self._patience_s)
 
     def end(self, facts: dict[str, Any]) -> list[dict[str, Any]]:
         """Give ``facts``, the summary, to every sink, close them all, and return their counts."""
         if self._queues:
-            outgoing = Outgoing(summary_message(facts))
+            outgoing = OutgoingMessage(summary_message(facts))
             for one in self._queues:
                 one.put(outgoing, self._patience_s)
         self.close()
@@ -126,7 +126,7 @@ class Queue:
     def __init__(self, url: str, sink: Sink, say: Callable[[str], None], room: int) -> None:
         self._url, self._sink = without_password(url), sink
         self._say, self._room = say, room
-        self._waiting: deque[Outgoing] = deque()
+        self._waiting: deque[OutgoingMessage] = deque()
         self._reports = 0  # how many of the waiting items are reports
         self._changed = threading.Condition()
         self._ending = self._slow = False
@@ -135,7 +135,7 @@ class Queue:
         self._thread = threading.Thread(target=self._run, name=f"eitskin {self._url}", daemon=True)
         self._thread.start()
 
-    def put(self, outgoing: Outgoing, patience_s: float) -> None:
+    def put(self, outgoing: OutgoingMessage, patience_s: float) -> None:
         """Queue an item, or drop and count it if there is no room within ``patience_s``. A sink
         that made no room in that time is not waited for again until it takes an item."""
         is_report = outgoing.report is not None

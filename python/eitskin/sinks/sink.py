@@ -37,7 +37,7 @@ class TouchSource:
         return None if self.model is None else self.model.skin.outline.bounding_box_mm
 
 
-class Outgoing:
+class OutgoingMessage:
     """An item on its way to sinks: a frame, touches after a drive, a notice, or the final
     ``summary`` message. The message and its text are made once, when a sink first asks for them."""
 
@@ -71,7 +71,7 @@ class Sink(Protocol):
     raises an EitskinError of one line if the sink cannot be opened.
     """
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         """Send an item; this may take time. Raises Dropped, or any other error, which is
         counted."""
 

@@ -3,7 +3,7 @@
 import socket
 
 from eitskin.errors import SinkError
-from eitskin.sinks.sink import Outgoing, Sink, TouchSource, address, nothing_more
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "udp://HOST:PORT"
 
@@ -15,7 +15,7 @@ class UdpSink:
     def __init__(self, target: socket.socket) -> None:
         self._socket = target
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         send(self._socket, outgoing.text.encode())
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ from eitskin.errors import EitskinError
 from eitskin.sinks import outputs as module
 from eitskin.sinks.mqtt import open_sink as open_mqtt
 from eitskin.sinks.outputs import DRIVES, Outputs
-from eitskin.sinks.sink import Dropped, Outgoing, TouchSource
+from eitskin.sinks.sink import Dropped, OutgoingMessage, TouchSource
 
 ROOM = 8
 
@@ -23,10 +23,10 @@ class Heard:
     """A sink that keeps what it is outgoing."""
 
     def __init__(self) -> None:
-        self.outgoing: list[Outgoing] = []
+        self.outgoing: list[OutgoingMessage] = []
         self.closed = threading.Event()
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         self.outgoing.append(outgoing)
 
     def close(self) -> None:
@@ -40,21 +40,21 @@ class Stuck(Heard):
         super().__init__()
         self.free = threading.Event()
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         self.free.wait()
 
 
 class Dying(Heard):
     """Fails from the third on."""
 
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         super().write(outgoing)
         if len(self.outgoing) > 2:
             raise OSError("the cable\nis out")
 
 
 class Away(Heard):
-    def write(self, outgoing: Outgoing) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         raise Dropped
 
 
@@ -108,7 +108,7 @@ def test_an_impatient_session_never_waits(swipe, drives, made):
 
 
 def test_a_message_is_made_once_for_all(swipe):
-    outgoing = Outgoing(swipe.frames[20])
+    outgoing = OutgoingMessage(swipe.frames[20])
     assert outgoing.message is outgoing.message and outgoing.text is outgoing.text
 
 
