@@ -1,6 +1,7 @@
 """The options that commands for boards share, and their conversion to settings."""
 
 import argparse
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +11,17 @@ from eitskin.cli.printing import say
 from eitskin.config import nearest
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.core.gestures import Zone
+from eitskin.core.options_table import SOLVERS
 from eitskin.device.client import TARE_FRAMES, Device, check_tare_frames
 from eitskin.device.open import open_with_files
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings, kinds_of
-from eitskin.live.zones import load_zones
-from eitskin.sinks.outputs import Outputs
-from eitskin.sinks.sink import TouchSource
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings, kinds_of
+from eitskin.session.zones import load_zones
+from eitskin.sinks.outputs import Outputs, attached_outputs
 
 DEVICE_HELP = (
     "auto (the only board that is plugged in), serial:/dev/ttyACM0, text:PORT?layout=FILE (lines of"
@@ -103,11 +104,12 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
 
 def add_solver(parser: Any) -> None:
     """Add the options that choose the solver and limit its work."""
-    known = ("fista", "working-set", "coordinate", "active-set")
     option(
-        parser, "--solver", "default: the model's; all minimise the same objective", choices=known
+        parser, "--solver", "default: the model's; all minimise the same objective", choices=SOLVERS
     )
-    most = "greatest number of iterations, sweeps or rounds (default: the model's)"
+    most = (
+        "greatest number of iterations of FISTA, or rounds of the active set (default: the model's)"
+    )
     option(parser, "--iterations N", most, within=(1, 1_000_000))
     gap = "stop once the duality gap is below this fraction of |y|^2 / 2"
     option(parser, "--gap REL", gap, float, within=(above(0), 1))
@@ -178,12 +180,10 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
-    """Open the sinks of ``--to`` for ``session``."""
-    transport, board = session.device.transport, session.device.board
-    model = None if session.known is None else session.known.model
-    source = TouchSource(transport.url, board.board, model, getattr(options, "overwrite", False))
-    return Outputs(options.to or (), source, patient=session.patient, say=say)
+def named_outputs(options: argparse.Namespace, session: Session) -> AbstractContextManager[Outputs]:
+    """Return a context with the open sinks of ``--to``, attached to ``session``."""
+    overwrite = getattr(options, "overwrite", False)
+    return attached_outputs(session, options.to or (), overwrite=overwrite, say=say)
 
 
 def add_zones(parser: argparse.ArgumentParser) -> None:
@@ -265,7 +265,11 @@ def open_named(options: argparse.Namespace) -> Device:
 
 
 def session_settings(
-    options: argparse.Namespace, mode: Stream, *, record: Path | None = None, model_for: str = ""
+    options: argparse.Namespace,
+    mode: Stream | None,
+    *,
+    record: Path | None = None,
+    model_for: str = "",
 ) -> SessionSettings:
     """Return the settings in the options of ``add_device``, ``add_stream`` and ``add_scan``,
     checked before a device is opened.

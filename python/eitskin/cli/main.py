@@ -15,7 +15,7 @@ from typing import NoReturn
 from eitskin import __version__
 from eitskin.cli.arguments import option, refuse_named_twice
 from eitskin.config import nearest
-from eitskin.errors import EitskinError, FileError, UsageError
+from eitskin.errors import EitskinError, FileError, UsageError, missing_checkout
 
 COMMANDS = {  # the description of each command
     "demo": "reconstruct three simulated touches in C, and compare them with the truth",
@@ -44,7 +44,8 @@ INVALID_CHOICE = re.compile(  # argparse's text, with quotes before Python 3.12
     r"argument (?P<what>.*?): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)"
 )
 REPLACED = re.compile(r"unrecognized arguments: .*--(budget|accuracy)\b")
-ENTRY_POINT_GROUP = "eitskin.commands"  # commands of other packages, such as eitskin-studies
+ENTRY_POINT_GROUP = "eitskin.commands"  # commands of other packages
+STUDIES = ("bench", "compare", "dataset", "draw", "study", "tradeoff")  # in eitskin-studies
 
 
 class Parser(argparse.ArgumentParser):
@@ -80,6 +81,8 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
     if only not in COMMANDS:
         for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: one.name):
             entry.load().add_parser(subparsers)
+    if only in STUDIES and only not in subparsers.choices:
+        raise missing_checkout(f"eitskin {only}", "firmware/emulator", "studies")
     return parser
 
 

@@ -30,7 +30,7 @@ class Patterns:
 
     @property
     def mixes(self) -> bool:
-        """Whether any pair is not simply one of the solved patterns."""
+        """True if any pair is not simply one of the solved patterns."""
         return len(self.mix) != len(self.solved) or not np.array_equal(
             self.mix, np.eye(len(self.mix))
         )

@@ -8,7 +8,7 @@ from eitskin.frames.truth import TruthOptions
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """How to repair a source; the defaults change nothing.
+    """The options for repairing a source; the defaults change nothing.
 
     ``order`` is one of ORDERS, or "table" with ``table_file`` (text with four columns) or ``table``
     (rows from 0). ``keep_table`` keeps the source's own table. ``sign`` is "signed"; "reversed",

@@ -44,7 +44,7 @@ TOO_LARGE = 1e12
 
 @dataclass(frozen=True)
 class Layout:
-    """How lines form frames.
+    """The format in which lines form frames.
 
     ``options`` are those that ``import`` needs. ``protocol`` is that of the frames if it is not the
     model's. ``baud``, ``send`` (a text sent once, when the port is opened) and ``rate_hz`` (frames
@@ -59,7 +59,7 @@ class Layout:
 
     @property
     def form(self) -> LineFormat:
-        """How a line is divided into cells."""
+        """The format by which a line is divided into cells."""
         source = self.options.source
         return LineFormat(source.delimiter or "comma", source.label, source.comment)
 

@@ -25,7 +25,7 @@ class Row:
 
 @dataclass(frozen=True)
 class LineFormat:
-    """How a line is divided into cells.
+    """The format by which a line is divided into cells.
 
     ``delimiter`` is a name in DELIMITERS, a character, or "decimals:N" for numbers without anything
     between them, each with N digits after its point. If ``label`` is given, only lines that begin

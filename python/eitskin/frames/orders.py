@@ -23,8 +23,8 @@ PREFERENCE = tuple(
 
 @dataclass(frozen=True, eq=False)
 class RowMatch:
-    """Where each wanted row is in a source: it equals row ``index[r]`` times ``sign[r]`` (both (m,)
-    int64)."""
+    """The places of the wanted rows in a source: wanted row r equals row ``index[r]`` times
+    ``sign[r]`` (both (m,) int64)."""
 
     index: IntArray
     sign: IntArray

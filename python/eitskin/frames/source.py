@@ -23,7 +23,7 @@ COMPLEX_PARTS = ("real", "imag", "abs", "in-phase")
 
 @dataclass(frozen=True)
 class SourceOptions:
-    """Where a source holds its frames.
+    """The places of frames in a source.
 
     For NPZ and MAT, ``voltage``, ``reference``, ``names``, ``time`` and ``protocol_table`` name
     arrays. For text, ``columns`` and ``reference_columns`` choose columns ("2", "0,2", "1:209",
@@ -62,9 +62,9 @@ class SourceOptions:
 
 @dataclass(frozen=True, eq=False)
 class ReadText:
-    """How a text with frames in rows was read: the form of its lines, the number of cells in each,
-    the columns of the channels (in pairs the first and the second by turns), and the column of the
-    time."""
+    """The way in which a text with frames in rows was read: the form of its lines, the number of
+    cells in each, the columns of the channels (in pairs the first and the second by turns), and the
+    column of the time."""
 
     form: LineFormat
     header_rows: int

@@ -1,5 +1,5 @@
-"""How far the data of a real skin may differ from the model's: the sections UNCE, GEOM and MOVE of
-a .eitm file."""
+"""Bounds for the differences between the data of a real skin and the model: the sections UNCE, GEOM
+and MOVE of a .eitm file."""
 
 import struct
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ NEGATIVE = 1e-5  # a negative eigenvalue up to this part of the greatest counts 
 
 @dataclass(frozen=True, eq=False)
 class TarePlaces:
-    """What a tare reveals about errors of places, from y = log(v0 / v_ref) over the k folded rows
-    (``tare_places`` has the theory).
+    """The information of a tare about errors of places, from y = log(v0 / v_ref) over the k folded
+    rows (``tare_places`` has the theory).
 
     ``left`` is N (p, k) in mm: |N y|^2 is added to the variance of a place. ``seen`` is M (q, k)
     and ``moves`` is U (2, t, q) in mm: a touch is found displaced along x and y by the polynomial

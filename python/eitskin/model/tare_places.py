@@ -1,4 +1,4 @@
-"""What the tare reveals about errors of places: the sections GEOM and MOVE of a .eitm file.
+"""Compute what the tare reveals about errors of places: the sections GEOM and MOVE of a .eitm file.
 
 If electrodes are displaced or the outline is another, the voltages of the untouched skin differ
 from the model's in one way; if the conductivity is uneven, in another way. Both displace the

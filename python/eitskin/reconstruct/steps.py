@@ -38,7 +38,7 @@ Results = dict[int, Reconstruction]
 
 @dataclass(frozen=True)
 class ReconstructSettings:
-    """How frames are reconstructed.
+    """The settings for reconstructing frames.
 
     Attributes:
         model: an .eitm file; None is the prebuilt model of the paper's skin.
@@ -195,7 +195,7 @@ def know_converter(reconstructor: Reconstructor, frames: Frames) -> None:
     """Set the least noise of a row from the converter's step, if the frames state it."""
     step_v = frames.meta.get("lsb_v")
     if isinstance(step_v, (int, float)) and 0 < step_v < math.inf:
-        reconstructor.with_options(noise_floor_v=step_v / math.sqrt(12))
+        reconstructor.set_options(noise_floor_v=step_v / math.sqrt(12))
 
 
 def apply_options(
@@ -203,14 +203,14 @@ def apply_options(
 ) -> OperatingPoint | None:
     """Set the solver's options; with a preset, set and return the operating point that fulfils
     it."""
-    reconstructor.with_options(**how.changes)
+    reconstructor.set_options(**how.changes)
     if how.track:
         reconstructor.set_options(tracking(reconstructor.options))
     if how.preset is None:
         return None
 
     point = operating_point_for(how.preset, reconstructor.model, reconstructor.options)
-    reconstructor.with_options(**point.configuration.solver_settings)
+    reconstructor.set_options(**point.configuration.solver_settings)
     notes.append(settings_text(point, how.preset.board))
     return point
 

@@ -1,4 +1,4 @@
-"""Which elements of a mesh a touch covers, and which part of each."""
+"""Compute which elements of a mesh a touch covers, and which part of each."""
 
 from collections.abc import Iterable
 

@@ -54,8 +54,8 @@ class Stage(IntEnum):
     MATERIAL = 1  # conductivity of each element over time
     BOUNDARY = 2  # contacts: impedance of each electrode, detached and bridged electrodes
     EXCITATION = 3  # the current: phase (complex solve), source output impedance, amplitude drift
-    FRONT_END = 4  # from the true boundary voltages to the output of the amplifier
-    DIGITISE = 5  # from there to codes: noise, saturation, ADC bits, jitter; only real numbers
+    FRONT_END = 4  # changes the true boundary voltages to the output of the amplifier
+    DIGITISE = 5  # changes that to codes: noise, saturation, ADC bits, jitter; only real numbers
 
 
 @dataclass(frozen=True)
@@ -291,7 +291,7 @@ Step: TypeAlias = (
 
 @runtime_checkable
 class EffectModule(Protocol):
-    """What a module with an effect defines; ``CONFLICTS`` and ``SHARED`` are optional."""
+    """The names that a module with an effect defines; ``CONFLICTS`` and ``SHARED`` are optional."""
 
     NAME: str
     STAGE: Stage

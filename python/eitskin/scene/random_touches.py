@@ -87,7 +87,8 @@ class TouchScene:
 
 @dataclass(frozen=True)
 class TouchRules:
-    """How touches are drawn: uniformly within each range, and uniformly over the skin.
+    """The rules by which touches are drawn: uniformly within each range, and uniformly over the
+    skin.
 
     Attributes:
         count: least and greatest number of touches in a scene.

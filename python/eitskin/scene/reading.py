@@ -1,4 +1,4 @@
-"""From the potentials of the electrodes to the voltages of the protocol, including bridges,
+"""Compute the voltages of the protocol from the potentials of the electrodes, including bridges,
 detached electrodes and the load of each row.
 
 Seen from its electrodes, a skin is a linear network, so resistors between electrodes need no new

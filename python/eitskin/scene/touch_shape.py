@@ -27,7 +27,7 @@ RIM_POINTS = 64
 
 @dataclass(frozen=True)
 class TouchShape:
-    """How a touch differs from an even disc.
+    """The differences of a touch from an even disc.
 
     Attributes:
         profile: how the change of conductivity falls with rho, which is 1 on the ellipse of the

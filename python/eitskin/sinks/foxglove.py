@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import SinkError, missing_extra
-from eitskin.live.message import schema
+from eitskin.session.message import schema
 from eitskin.sinks.mcap_file import FRAME_ID
 from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 

@@ -4,21 +4,23 @@ drops and counts messages, and delays nothing else."""
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from eitskin.config import nearest
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame, Notice, Report
-from eitskin.live.message import summary_message
+from eitskin.session.frame import Message
+from eitskin.session.message import summary_message
+from eitskin.session.session import Session
 from eitskin.sinks.sink import Dropped, OutgoingMessage, Sink, TouchSource, without_password
 
 ENTRY_POINT_GROUP = "eitskin.sinks"
 ROOM = 64  # frames: more than a second at 48 frames per second
 DRIVES = 16  # reports that may wait per frame of ROOM
 PATIENCE_S = 2.0
-ENDING_S = 3.0  # of all sinks together
+ENDING_S = 3.0  # total for all sinks
 
 
 def sinks() -> dict[str, EntryPoint]:
@@ -82,7 +84,7 @@ class Outputs:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def put(self, item: Frame | Report | Notice) -> None:
+    def put(self, item: Message) -> None:
         outgoing = OutgoingMessage(item)
         for one in self._queues:
             one.put(outgoing, self._patience_s)
@@ -118,6 +120,24 @@ class Outputs:
             + (f", {one['failed']} failed ({one['error']})" if one["failed"] else "")
             for one in self.counts
         ]
+
+
+@contextmanager
+def attached_outputs(
+    session: Session,
+    urls: Sequence[str],
+    *,
+    overwrite: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+) -> Iterator[Outputs]:
+    """Open the sinks of ``urls``, and attach them to the open ``session``, so that they get every
+    message. Raises the errors of ``Outputs``."""
+    model = None if session.known is None else session.known.model
+    board = session.device.board.board
+    source = TouchSource(session.device.transport.url, board, model, overwrite)
+    with Outputs(urls, source, patient=session.patient, say=say) as outputs:
+        session.consumers.append(outputs.put)
+        yield outputs
 
 
 class Queue:

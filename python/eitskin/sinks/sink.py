@@ -8,9 +8,9 @@ from typing import Any, Protocol
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame, Notice, Report
-from eitskin.live.message import encoded
 from eitskin.model.model import Model
+from eitskin.session.frame import DriveReport, Frame, Message, Notice
+from eitskin.session.message import encoded
 
 Box = tuple[float, float, float, float]
 THIS_MACHINE = "127.0.0.1"
@@ -41,9 +41,9 @@ class OutgoingMessage:
     """An item on its way to sinks: a frame, touches after a drive, a notice, or the final
     ``summary`` message. The message and its text are made once, when a sink first asks for them."""
 
-    def __init__(self, item: Frame | Report | Notice | dict[str, Any]) -> None:
+    def __init__(self, item: Message | dict[str, Any]) -> None:
         self.frame = item if isinstance(item, Frame) else None
-        self.report = item if isinstance(item, Report) else None
+        self.report = item if isinstance(item, DriveReport) else None
         self.notice = item if isinstance(item, Notice) else None
         self._item = item
 

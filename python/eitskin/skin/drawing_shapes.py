@@ -12,9 +12,9 @@ from eitskin.errors import ConfigError
 
 TOLERANCE_MM = 0.1
 MAX_SHAPES = 20_000
-MAX_DEPTH = 100  # of nested groups or blocks
+MAX_DEPTH = 100  # limit of nested groups or blocks
 MAX_PIECES = 2_000
-MAX_POINTS = 30_000  # of all shapes together, after curves are flattened
+MAX_POINTS = 30_000  # limit for all shapes together, after curves are flattened
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,10 +28,10 @@ def rim_mirror(outline: Outline, points_mm: npt.ArrayLike) -> tuple[ComplexArray
     along = np.roll(start, -1) - start
     offset = place[:, None] - start[None, :]
     share = np.clip((offset * np.conj(along)).real / np.abs(along) ** 2, 0.0, 1.0)
-    away = share * along - offset  # from the place to the nearest point of each edge
+    away = share * along - offset  # vector from the place to the nearest point of each edge
     nearest = np.argmin(np.abs(away), axis=1)
     to_rim = away[np.arange(len(place)), nearest]
-    outward = -1j * along[nearest] / np.abs(along[nearest])  # of a counterclockwise rim
+    outward = -1j * along[nearest] / np.abs(along[nearest])  # the rim runs counterclockwise
     distance = np.abs(to_rim)
     inside = outline.contains(points)
     normal = np.where((distance > 1e-9) & inside, to_rim / np.maximum(distance, 1e-9), outward)

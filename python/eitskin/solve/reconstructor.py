@@ -91,18 +91,8 @@ class Reconstructor:
         """The current options."""
         return self._options
 
-    def set_options(self, options: Options) -> None:
-        """Replace all options.
-
-        Raises:
-            UsageError: an option is out of range; the old options stay.
-        """
-        check_options(options)
-        self._engine.set_options(options)
-        self._options = options
-
-    def with_options(self, **changes: Any) -> None:
-        """Change some options by name.
+    def set_options(self, options: Options | None = None, /, **changes: Any) -> None:
+        """Use ``options`` (None: the current ones) with ``changes`` to them by name from now on.
 
         Raises:
             UsageError: an option is unknown or out of range; the old options stay.
@@ -111,7 +101,10 @@ class Reconstructor:
         for name in changes:
             if name not in known:
                 raise UsageError(f"options: {name!r} is unknown; {nearest(name, known)}")
-        self.set_options(replace(self._options, **changes))
+        wanted = replace(self._options if options is None else options, **changes)
+        check_options(wanted)
+        self._engine.set_options(wanted)
+        self._options = wanted
 
     def check_protocol(self, protocol: Protocol) -> None:
         """Check that ``protocol`` is the model's.

@@ -9,7 +9,7 @@ from eitskin.skin.skin import Skin
 from eitskin.teaching.presses import Presses
 
 MIN_PRESSES = 5
-FAINT = 0.1  # of the median change; a smaller change does not count as a press
+FAINT = 0.1  # relative to the median change; a smaller change does not count as a press
 UNITS = {"cm": 10.0, "m": 1000.0, "inches": 25.4, "µm": 0.001}
 LEAST_COVER, FAIR_COVER = 0.02, 0.4
 

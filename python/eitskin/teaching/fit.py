@@ -16,7 +16,7 @@ from eitskin.teaching.process import Process, condition
 START_ANGLES = 32
 MAX_FOR_LIKELIHOOD = 150
 KNOWN_ROUNDS, UNKNOWN_ROUNDS = 3, 8
-NEAR = 0.18  # of the skin's width: first amplitudes compare presses within this distance
+NEAR = 0.18  # relative to the skin's width: first amplitudes compare presses within this distance
 SCALE_SD = 0.05  # standard deviation of the log scale: descriptions give about the right size
 LOG_BOUND = 12.0
 LEAST_SHRINKAGE = 0.5  # the formula shrinks too little, because residuals are not normal
@@ -213,8 +213,8 @@ def by_given(amplitude: FloatArray, given: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What was learned from presses: ``process`` and ``noise`` for rows over ``unit`` (m,) in V,
-    and the likelihood. The process holds the kernel, and the places as refined."""
+    """The result of learning from presses: ``process`` and ``noise`` for rows over ``unit`` (m,) in
+    V, and the likelihood. The process holds the kernel, and the places as refined."""
 
     process: Process
     noise: Noise

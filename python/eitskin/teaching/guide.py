@@ -40,7 +40,7 @@ TURN = 0.02  # greatest 1 - cosine between the changes of both halves, in additi
 
 
 class Step(Enum):
-    """What the person is asked to do."""
+    """The steps that the person is asked to do."""
 
     REST = "leave the skin untouched"
     PRESS = "press"
@@ -51,9 +51,9 @@ class Step(Enum):
 
 @dataclass(frozen=True, eq=False)
 class GuideEvent:
-    """What changed with a frame: ``step`` is what to do now, at place ``number`` (from 0), and
-    ``text`` tells the person. ``accepted`` and ``rejected`` state the result of a press;
-    ``withdrawn`` states that an accepted press no longer counts."""
+    """A change in the guidance after a frame: ``step`` is the step to do now, at place ``number``
+    (from 0), and ``text`` tells it to the person. ``accepted`` and ``rejected`` state the result of
+    a press; ``withdrawn`` states that an accepted press no longer counts."""
 
     step: Step
     number: int

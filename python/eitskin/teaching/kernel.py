@@ -31,8 +31,9 @@ FIELD_PIXELS, FIELD_ELEMENTS = 64, 6000
 
 @dataclass(frozen=True)
 class Placement:
-    """How the places lie relative to the skin as described: first mirrored in y if ``mirrored``,
-    then turned counterclockwise by ``turn_deg`` about the outline's centre, and scaled."""
+    """The position of the places relative to the skin as described: first mirrored in y if
+    ``mirrored``, then turned counterclockwise by ``turn_deg`` about the outline's centre, and
+    scaled."""
 
     turn_deg: float = 0.0
     scale: float = 1.0

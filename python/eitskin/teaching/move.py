@@ -1,5 +1,5 @@
-"""How a skin moved when it was remounted, and what moves with it: outline, electrodes, grid, and
-the law of force."""
+"""Find how a skin moved when it was remounted, and move its outline, electrodes, grid, and force
+law accordingly."""
 
 from dataclasses import dataclass, replace
 

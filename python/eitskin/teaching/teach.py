@@ -146,7 +146,7 @@ def solve_presses(
     error (n,) in mm of the strongest touch (the skin's width if there is none), the number of
     touches, its strength, and the squared error in the touch's own covariance (inf if unknown)."""
     core = Reconstructor(model)
-    core.with_options(**options)
+    core.set_options(**options)
     width = width_of(model)
     out = np.zeros((4, len(presses)))
     for i in range(len(presses)):

@@ -53,12 +53,12 @@ from eitskin.teaching.teach import Tried, chosen_share, solve_presses
 
 KEPT, MOVED, FULL = "kept", "moved", "full"
 START_TURNS, REFINED_STARTS = 36, 3
-SHIFT_SD = 0.03  # of the skin's width
+SHIFT_SD = 0.03  # relative to the skin's width
 ROUNDS = 3
 MAX_FOLDS = 10
 STRANGE = 6.0  # in medians; a press with a greater misfit is unlike the others
 BETTER_BY = 1.0  # standard errors of the mean logarithm of the ratio of errors
-ERROR_FLOOR = 0.01  # of the skin's width; smaller errors count as equal
+ERROR_FLOOR = 0.01  # relative to the skin's width; smaller errors count as equal
 SHARE_FROM = 20  # presses; fewer cannot determine the least share that a touch must explain
 # Places may be shifted if more than ODD of the energy is unexplained; they are if a shift reduces
 # that below SHIFTED times.
@@ -89,8 +89,8 @@ class Deviation(Kernel):
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What new presses are compared with: the ``old`` knowledge, its ``kernel``, the skin's
-    ``width_mm``, and ``unit`` (m,) in V, the rms of each row's old response."""
+    """The knowledge that new presses are compared with: the ``old`` knowledge, its ``kernel``, the
+    skin's ``width_mm``, and ``unit`` (m,) in V, the rms of each row's old response."""
 
     old: Known
     kernel: Deviation

@@ -104,7 +104,7 @@ class Configuration:
 
     @property
     def held(self) -> int:
-        """How many frames touches are held before they are scored."""
+        """The number of frames that touches are held before they are scored."""
         return HELD_FRAMES if self.warm_start else 1
 
 

@@ -162,7 +162,8 @@ def board_takes() -> set[str]:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What an accuracy refers to: the scenes, the SNR, and whether images or discs are scored."""
+    """The conditions of an accuracy: the scenes, the SNR, and whether images or discs are
+    scored."""
 
     scenes: str = "random"
     snr_db: float = 60.0
@@ -268,9 +269,9 @@ class Preset:
 
     @property
     def acquisition_us(self) -> float:
-        """How long measuring a frame may take: the period if it is given, otherwise the longer of
-        the limit and the default scan. If reports are compared, any time is allowed, as it is part
-        of them."""
+        """The longest time that measuring a frame may take: the period if it is given, otherwise
+        the longer of the limit and the default scan. If reports are compared, any time is allowed,
+        as it is part of them."""
         if self.period_us is not None or self.unit == REPORT_US:
             return self.period_us or math.inf
         longest = self.limit.value if self.limit is not None and self.limit.unit == "us" else 0.0

@@ -18,7 +18,7 @@ from eitskin.device.bandwidth import (
 )
 from eitskin.device.ports import BAUD
 
-ROWS = 208  # in a RAW packet of 16 electrodes, even if a scan measures fewer
+ROWS = 208  # rows in a RAW packet of 16 electrodes, even if a scan measures fewer
 TWO_TOUCHES = TOUCHES_BYTES // 4
 
 

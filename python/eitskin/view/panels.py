@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 DPI = 150
 FORMATS = (".png", ".svg", ".pdf")
 ASPECT = 1.5  # aimed at if the number of columns is free
-EMPTY_COST = 1.5  # of the share of empty places, relative to a deviation from ASPECT
+EMPTY_COST = 1.5  # weight of empty places, relative to a deviation from ASPECT
 MIN_WIDTH = 4.2  # inches, as all below
 EDGE, GAP = 0.12, 0.14
 BAR, TICKS, LINE = 0.12, 0.24, 0.165

@@ -7,10 +7,10 @@ from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.build import BuildSettings, make_model
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.families import Family, Setup
-from eitskin_studies.harness.discs import pixel_cover
 
 
 class CoreMethod:
@@ -100,7 +100,7 @@ def core_methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     def family(iterations: int, painted: bool) -> Family:
         def make(_: float) -> CoreMethod:
             solver = Reconstructor(model)
-            solver.with_options(iterations=iterations)
+            solver.set_options(iterations=iterations)
             return CoreMethod(solver, painted, threads)
 
         return Family("", (0.0,), make)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from two_readers import accepts, agreed
 
 from eitm_bytes import ENTRY_SIZE, entry_place, patched, sealed, sections_of
-from eitskin.core.options_table import SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.reconstructor import Reconstructor
@@ -245,7 +244,7 @@ def runs(blob: bytes) -> None:
     for engine in ("c", "c64"):
         try:
             reconstructor = Reconstructor(model, engine=engine, blob=blob)
-            reconstructor.with_options(iterations=20)
+            reconstructor.set_options(iterations=20)
             reconstructor.tare(model.golden.reference_v)
             result = reconstructor.reconstruct(model.golden.frame_v)
             assert np.isfinite(result.image).all()
@@ -273,9 +272,13 @@ def test_both_take_a_file_of_format_1_0_as_fista():
     macs = {}
     for solver in (None, "fista", "working-set"):
         reconstructor = Reconstructor(model, blob=old)
-        reconstructor.with_options(**({} if solver is None else {"solver": solver}))
+        reconstructor.set_options(**({} if solver is None else {"solver": solver}))
         reconstructor.tare(model.golden.reference_v)
         macs[solver] = reconstructor.reconstruct(model.golden.frame_v).info.macs
     assert macs[None] == macs["fista"] > macs["working-set"]
-    blob[place] = len(SOLVERS)
-    assert not agreed(sealed(blob), "solver 4")
+    for number in (2, 4):
+        blob[place] = number
+        assert not agreed(sealed(blob), f"solver {number}")
+    blob[place] = 2
+    with pytest.raises(ModelError, match="coordinate descent, which eitskin no longer has"):
+        decode_model(sealed(blob), "x")

@@ -20,14 +20,14 @@ ROOM = 8
 
 
 class Heard:
-    """A sink that keeps what it is outgoing."""
+    """A sink that keeps what it is told."""
 
     def __init__(self) -> None:
-        self.outgoing: list[OutgoingMessage] = []
+        self.told: list[OutgoingMessage] = []
         self.closed = threading.Event()
 
-    def write(self, outgoing: OutgoingMessage) -> None:
-        self.outgoing.append(outgoing)
+    def write(self, told: OutgoingMessage) -> None:
+        self.told.append(told)
 
     def close(self) -> None:
         self.closed.set()
@@ -40,21 +40,21 @@ class Stuck(Heard):
         super().__init__()
         self.free = threading.Event()
 
-    def write(self, outgoing: OutgoingMessage) -> None:
+    def write(self, told: OutgoingMessage) -> None:
         self.free.wait()
 
 
 class Dying(Heard):
     """Fails from the third on."""
 
-    def write(self, outgoing: OutgoingMessage) -> None:
-        super().write(outgoing)
-        if len(self.outgoing) > 2:
+    def write(self, told: OutgoingMessage) -> None:
+        super().write(told)
+        if len(self.told) > 2:
             raise OSError("the cable\nis out")
 
 
 class Away(Heard):
-    def write(self, outgoing: OutgoingMessage) -> None:
+    def write(self, told: OutgoingMessage) -> None:
         raise Dropped
 
 
@@ -86,7 +86,7 @@ def test_a_stuck_and_a_dying_sink_disturb_no_other(swipe, made, patient, monkeyp
             outputs.put(frame)
         stuck, good, dying, away = outputs.end({})
     whole = len(swipe.frames) + 1
-    assert [outgoing.frame for outgoing in made["good"].outgoing[:-1]] == swipe.frames
+    assert [told.frame for told in made["good"].told[:-1]] == swipe.frames
     assert (good["sent"], good["dropped"], good["failed"]) == (whole, 0, 0)
     assert (dying["sent"], dying["failed"], dying["error"]) == (2, whole - 2, "the cable is out")
     assert (away["sent"], away["dropped"], away["failed"]) == (0, whole, 0)
@@ -108,8 +108,8 @@ def test_an_impatient_session_never_waits(swipe, drives, made):
 
 
 def test_a_message_is_made_once_for_all(swipe):
-    outgoing = OutgoingMessage(swipe.frames[20])
-    assert outgoing.message is outgoing.message and outgoing.text is outgoing.text
+    told = OutgoingMessage(swipe.frames[20])
+    assert told.message is told.message and told.text is told.text
 
 
 REFUSED = [

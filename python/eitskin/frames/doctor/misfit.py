@@ -1,4 +1,5 @@
-"""How well a predicted frame explains the reference, and which short circuit explains it best."""
+"""Measure how well a predicted frame explains the reference, and find the short circuit that
+explains it best."""
 
 from dataclasses import dataclass
 from itertools import combinations

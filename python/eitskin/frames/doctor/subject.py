@@ -21,8 +21,8 @@ AS_GIVEN = "as given"
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What the doctor examines. ``readings`` are pairs (order, frames): the rows in the protocol's
-    order, if the source has this order.
+    """The frames that the doctor examines. ``readings`` are pairs (order, frames): the rows in the
+    protocol's order, if the source has this order.
 
     ``stand_in`` describes what was measured in place of the skin, such as a ring of resistors.
     ``given`` is the stated order. ``remarks`` are the assumptions that were needed to read the

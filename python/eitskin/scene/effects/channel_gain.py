@@ -23,7 +23,7 @@ SUMMARY = "Each measuring pair has its own gain."
 
 @dataclass(frozen=True)
 class Parameters:
-    """How much gains differ, and what part of them is negative."""
+    """The spread of the gains, and the fraction of them that is negative."""
 
     spread: float = parameter(
         0.01, "1", "each channel's gain differs from 1 by up to this", low=0, high=1

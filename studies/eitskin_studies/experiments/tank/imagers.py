@@ -13,12 +13,12 @@ from eitskin.fem.grid import Grid
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.model import Model
 from eitskin.model.reduction import fold_rows
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.families import Family, Method
 from eitskin_studies.compare.methods import baseline_methods
-from eitskin_studies.harness.discs import pixel_cover
 
 DISCS = "eitskin, touches as discs"
 TUNED_DISCS = "eitskin, touches as discs, change from simulation"
@@ -167,13 +167,13 @@ class CoreImager:
         blur = tank.kernel(levers.blur)
         self._paint = (blur / blur.sum(axis=1, keepdims=True)) @ tank.kernel(levers.atom)
         self._solver = Reconstructor(tank.model(levers.kind, levers.regularisation, levers.atom))
-        self._solver.with_options(
+        self._solver.set_options(
             iterations=levers.iterations, lambda_rel=levers.lambda_rel, **(options or {})
         )
 
     def show(self, quiet_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
         """As :class:`Imager`."""
-        self._solver.with_options(sign="both" if signed else "increase")
+        self._solver.set_options(sign="both" if signed else "increase")
         self._solver.tare(quiet_v)
         results = []
         for frame in frames_v:
