@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
         raise FileError(f"--folder {options.folder}: no such folder; make it, or name another")
     options.frames = None
     named = options.mode or ("raw,touches" if options.teach is not None else None)
-    mode = None if named is None else read_mode(named)  # None: all that the device can send
+    mode = None if named is None else read_mode(named)  # None: chosen by the kind of device
     settings = replace(session_settings(options, mode), quiet_frames=True)
     token = options.token or secrets.token_urlsafe(16)
     server = PageServer(

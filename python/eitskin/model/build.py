@@ -108,9 +108,8 @@ def make_model(
     v_ref, jacobian = fold_rows(linear.v0_v, fold), fold_rows(linear.jacobian, fold)
     silent = np.zeros(len(v_ref), dtype=np.bool_)
     if settings.data_kind == "normalised":
-        # a ratio to a reference of almost zero carries no information; the solver ignores this row
-        # as
-        # well
+        # A ratio to a reference of almost zero carries no information; the solver ignores this row,
+        # too.
         silent = np.abs(v_ref) < MIN_RATIO_REFERENCE * np.sqrt(np.mean(v_ref**2))
         jacobian = np.where(silent[:, None], 0.0, jacobian / np.where(silent, 1.0, v_ref)[:, None])
     rank = settings.rank or min(64, *jacobian.shape)
