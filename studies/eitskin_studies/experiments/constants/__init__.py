@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from eitskin_emulator.core_on_qemu import checkout_root
 from eitskin_studies.experiments.constants.in_time import fast_scenes, gesture_scenes
 from eitskin_studies.experiments.constants.judged import Scene
 from eitskin_studies.experiments.constants.models import of_other_models, of_presses
@@ -14,7 +15,6 @@ from eitskin_studies.experiments.constants.sweep import Effect, baselines, effec
 from eitskin_studies.experiments.constants.tables import tables_of, words_of
 from eitskin_studies.experiments.constants.variant import build_variant
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
-from eitskin_emulator.core_on_qemu import checkout_root
 
 TITLE = "Constants halved and doubled, one at a time"
 
@@ -42,9 +42,10 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         )
         seconds += kept["seconds"]
         effects[constant.name] = [Effect(**one) for one in kept["effects"]]
-    facts = {"commit": _commit(), "seconds": round(seconds), "scenes": len(scenes)}
+    commit = _commit()
+    facts = {"commit": commit, "seconds": round(seconds), "scenes": len(scenes)}
     return ExperimentOutcome(
-        tables_of(variant.constants, effects),
+        tables_of(variant.constants, effects, commit),
         {
             **facts,
             "constants": {

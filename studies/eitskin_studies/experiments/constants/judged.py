@@ -1,4 +1,5 @@
-"""What the core makes of a judging scene: a digest of every bit, and the numbers it is judged by."""
+"""What the core makes of a judging scene: a digest of every bit, and the numbers by which it is
+judged."""
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence

@@ -94,9 +94,7 @@ def _press(presses: Presses, k: int) -> TouchScene:
     return TouchScene(f"press {k}", (TrueTouch(float(x), float(y), PRESS_MM, 0.5),))
 
 
-def _one_tare(
-    presses: Presses, blob: bytes, options: dict[str, int], name: str
-) -> FrameScene:
+def _one_tare(presses: Presses, blob: bytes, options: dict[str, int], name: str) -> FrameScene:
     """Untouched and pressed frames by turns, after one tare before all of them."""
     several = range(TAUGHT, TAUGHT + STREAM)
     frames = [row for k in several for row in (presses.untouched[k], presses.pressed[k])]
@@ -112,7 +110,9 @@ def _untaught(maker: SceneMaker, presses: Presses) -> Iterator[FrameScene]:
     """By a model from physics, which the instrument is far from."""
     turned = replace(SKIN, electrodes=replace(SKIN.electrodes, start_angle_deg=START_ANGLE_DEG))
     blob = _kept(
-        maker, "untaught", lambda: build_model(turned, presses.protocol, BuildSettings(samples=SAMPLES))
+        maker,
+        "untaught",
+        lambda: build_model(turned, presses.protocol, BuildSettings(samples=SAMPLES)),
     )
     sign = np.sign(decode_model(blob, "constants").golden.reference_v)
     for k in range(0, len(presses), len(presses) // UNTAUGHT):

@@ -113,9 +113,9 @@ class SceneMaker:
         maker = CaseMaker(self.seed)
         for touches in CROWDS:
             for spacing in (2.5, 4.0):
-                scene = spaced_touches(
-                    paper_skin().outline, self.seed, 1, touches, spacing
-                ).scenes[0]
+                scene = spaced_touches(paper_skin().outline, self.seed, 1, touches, spacing).scenes[
+                    0
+                ]
                 case = self._case(maker, f"crowd {touches} {spacing}", 100 + touches, scene)
                 for snr_db in (40.0, 60.0):
                     yield self._of_case("crowds", case, snr_db, [(FAULTS[0], case.scene)])

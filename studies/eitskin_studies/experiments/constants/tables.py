@@ -24,10 +24,10 @@ DELTAS = {
 Effects = Mapping[str, Sequence[Effect]]
 
 
-def tables_of(constants: Sequence[Constant], effects: Effects) -> tuple[Table, ...]:
+def tables_of(constants: Sequence[Constant], effects: Effects, commit: str) -> tuple[Table, ...]:
     """Everything; by module; the most sensitive; those that change nothing."""
     return (
-        _all(constants, effects), _by_module(constants, effects), _most(constants, effects),
+        _all(constants, effects, commit), _by_module(constants, effects), _most(constants, effects),
         _unchanged(constants, effects),
     )  # fmt: skip
 
@@ -52,7 +52,7 @@ def harm(one: Effect) -> float:
     )
 
 
-def _all(constants: Sequence[Constant], effects: Effects) -> Table:
+def _all(constants: Sequence[Constant], effects: Effects, commit: str) -> Table:
     rows = []
     for constant in constants:
         for one in effects[constant.name]:
@@ -61,10 +61,11 @@ def _all(constants: Sequence[Constant], effects: Effects) -> Table:
                     constant.module, constant.name, f"{constant.value:.7g}", f"{one.value:.7g}",
                     str(one.used), str(one.changed), one.failed or "",
                     *(_signed(one.change(name)) for name in DELTAS), f"{harm(one):.2f}",
+                    commit,
                 )
             )  # fmt: skip
     head = ("module", "constant", "value", "tried", "scenes that use it", "that change", "failed",
-            *DELTAS.values(), "harm, points")  # fmt: skip
+            *DELTAS.values(), "harm, points", "commit")  # fmt: skip
     return Table("constants", head, tuple(rows))
 
 
@@ -91,9 +92,7 @@ def _by_module(constants: Sequence[Constant], effects: Effects) -> Table:
 
 def _most(constants: Sequence[Constant], effects: Effects) -> Table:
     """The twenty whose worse value does most harm."""
-    worst = {
-        one.name: max(effects[one.name], key=harm) for one in constants if not one.is_size
-    }
+    worst = {one.name: max(effects[one.name], key=harm) for one in constants if not one.is_size}
     ranked = sorted(
         (one for one in constants if one.name in worst), key=lambda one: -harm(worst[one.name])
     )
@@ -130,13 +129,14 @@ def _signed(value: float) -> str:
 
 
 def words_of(
-    constants: Sequence[Constant], effects: Effects, scenes: Sequence[Scene], facts: Mapping[str, Any]
+    constants: Sequence[Constant],
+    effects: Effects,
+    scenes: Sequence[Scene],
+    facts: Mapping[str, Any],
 ) -> dict[str, str]:
     """What was run."""
-    some = next(
-        (e.before for one in constants if one.module != "fast" for e in effects[one.name] if e.before),
-        {},
-    )  # fmt: skip
+    whole = [one.name for one in constants if one.module != "fast"]
+    some = next((one.before for name in whole for one in effects[name] if one.before), {})
     return {
         "set": (
             f"Commit {facts['commit']}; {len(scenes)} scenes of"

@@ -28,8 +28,14 @@ AVX2 = "-mavx2 -mfma -mf16c -DEITS_BUILD_AVX2"
 # sizes of arrays in structures: a variable cannot be one; the module that has them is rebuilt in
 # a later issue
 SIZES = frozenset(
-    {"FAST_MAX_TOUCHES", "FAST_MAX_ROWS", "FAST_HELD", "FAST_STARTS", "FAST_PAIR_HELD",
-     "SPLIT_DIRECTIONS"}
+    {
+        "FAST_MAX_TOUCHES",
+        "FAST_MAX_ROWS",
+        "FAST_HELD",
+        "FAST_STARTS",
+        "FAST_PAIR_HELD",
+        "SPLIT_DIRECTIONS",
+    }
 )
 # constants that the source writes out as a product: file, its text, and the text with a variable
 WRITTEN_OUT = {
@@ -170,7 +176,9 @@ def build_variant(folder: Path) -> Variant:
                "-o", str(target)]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        first = "; ".join([line for line in done.stderr.splitlines() if "error" in line]) or done.stderr
+        first = (
+            "; ".join([line for line in done.stderr.splitlines() if "error" in line]) or done.stderr
+        )
         raise UsageError(f"constants: the variant of the core does not compile: {first}")
     return Variant(_imported(target), constants)
 
