@@ -3,15 +3,15 @@
 # Contraction and re-association stay off: kernels say fma where they mean it, and the bits must not depend on the target.
 
 set(EITSKIN_CORE_SOURCES
-    base/arithmetic.c base/status.c base/texts.c
+    base/arithmetic.c base/cholesky.c base/status.c base/texts.c
     kernels/kernels.c kernels/portable.c
     model/model.c model/options.c model/force.c model/row_form.c model/uncertainty.c model/scan_order.c
-    context/column_cache.c context/products.c
+    context/column_cache.c context/products.c context/triangle.c
     context/projection.c context/places.c frame/reference.c frame/places.c frame/fold.c frame/regularisation.c frame/whitening.c
     frame/whitening_products.c frame/rows_out.c frame/follow.c
     diagnostics/electrodes.c diagnostics/outliers.c diagnostics/model_mismatch.c
     diagnostics/crowded.c diagnostics/reference_outliers.c
-    solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c solve/coordinate_descent.c
+    solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c
     solve/active_set.c solve/violations.c solve/active_columns.c
     touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c touch/seek.c
     touch/touch.c touch/tracker.c
@@ -21,7 +21,7 @@ set(EITSKIN_CORE_SOURCES
     api/setup.c api/access.c api/save.c api/frame_stage.c api/reference.c api/reconstruct.c
     api/touches.c api/batch.c api/self_test.c
     fast/setup.c fast/rows.c fast/tracks.c fast/map.c fast/births.c fast/wait.c fast/path.c fast/frames.c
-    gesture/gesture.c gesture/one_finger.c gesture/two_fingers.c gesture/zones.c
+    gesture/plane.c gesture/one_finger.c gesture/two_fingers.c gesture/gesture.c gesture/zones.c
     link/link.c)
 
 set(EITSKIN_WARNINGS -Wall -Wextra -Wconversion -Wdouble-promotion)

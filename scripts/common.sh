@@ -44,11 +44,11 @@ find_python() {
 
 # changed_since STAMP FOLDER...: whether a source in one of the folders is newer; what an installation leaves behind does not count.
 changed_since() {
-    stamp=$1
+    made=$1
     shift
-    [ -e "$stamp" ] || return 0
+    [ -e "$made" ] || return 0
     [ -n "$(find "$@" -type d \( -name __pycache__ -o -name build -o -name '*.egg-info' \) -prune \
-        -o -newer "$stamp" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
+        -o -newer "$made" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
 }
 
 # packages ARGUMENTS...: what pip's install takes, into the environment. By uv, which fetches and unpacks several at once and
@@ -78,8 +78,8 @@ make_environment() {
     "$python" -m venv "$venv"
 }
 
-# install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since; with it what only
-# a checkout has: the emulated board and the numpy reference.
+# install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since; with it the
+# emulated board, and for the tests the numpy reference, which only a checkout has.
 install_package() {
     stamp=$venv/installed-$(printf '%s' "$1" | tr ',' '-')
     make_environment
@@ -90,20 +90,28 @@ install_package() {
         again="eitskin eitskin-emulator eitskin-reference"
         case $1 in
         build) packages "$root[$1]" ;;
-        *) packages "$root[$1]" "$root/firmware/emulator" "$root/python" ;;
+        test) packages "$root[$1]" "$root/firmware/emulator" "$root/python" ;;
+        *) packages "$root[$1]" "$root/firmware/emulator" ;;
         esac
         mv "$stamp.next" "$stamp"
     fi
 }
 
-# install_studies: the studies and what they compare with, beside the project with the extra test.
+# install_studies: beside the project with the extra test, the studies and what they compare with.
 install_studies() {
     install_package test
-    if changed_since "$venv/installed-studies" "$root/studies"; then
+    if changed_since "$venv/installed-studies" "$root/studies/eitskin_studies" "$root/studies/pyproject.toml"; then
         say "installing the studies, and the packages that they compare with"
         touch "$venv/installed-studies.next"
         again=eitskin-studies
         packages "$root/studies[test]"
         mv "$venv/installed-studies.next" "$venv/installed-studies"
     fi
+}
+
+# use_environment: its programs come first; processes run side by side, and threads of BLAS would only wait for each other.
+use_environment() {
+    PATH=$venv/bin:$PATH
+    OPENBLAS_NUM_THREADS=1
+    export PATH OPENBLAS_NUM_THREADS
 }

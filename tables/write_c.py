@@ -173,7 +173,7 @@ def limits(tables: Tables, kind: str, least: Any, greatest: Any) -> tuple[str, s
     if kind.startswith("bits "):
         return "0", str(enum_of(tables, kind.removeprefix("bits "))["all"])
     if kind.startswith("eits_"):
-        return "0", str(len(enum_of(tables, kind)["rows"]) - 1)
+        return "0", str(max(row[1] for row in enum_of(tables, kind)["rows"]))
     return number(least), number(greatest)
 
 

@@ -146,10 +146,15 @@ def _options_module(tables: Tables) -> Lines:
             low = 0 if bits else _limit(least)
             high = _all(enum_of(tables, kind[5:])) if bits else _limit(greatest)
             yield f'    "{name}": ({low}, {high}),'
-    yield from ("}", *remark("The names that an option may have, in the order of their numbers."))
-    choices = [(row[0], row[1]) for row in table["rows"] if row[1].startswith("eits_")]
-    items = [f'"{name}": {types[kind]["python"]}' for name, kind in choices]
-    yield f"CHOICES = {{{', '.join(items)}}}"
+    yield from (
+        "}",
+        *remark("The names that an option may have, and the numbers that stand for them."),
+    )
+    yield "CHOICES: dict[str, dict[str, int]] = {"
+    for name, kind, *_ in (row for row in table["rows"] if row[1].startswith("eits_")):
+        numbers = ", ".join(f'"{word(row[0])}": {row[1]}' for row in types[kind]["rows"])
+        yield f'    "{name}": {{{numbers}}},'
+    yield "}"
     yield from remark("What a model's own defaults say, by the same names.")
     yield from joined("OF_MODEL = ", [f'"{row[0]}"' for row in rows if row[2] == "model"])
 

@@ -95,10 +95,11 @@ class SinkError(EitskinError):
     exit_code = 13
 
 
-def missing_checkout(what: str, folder: str) -> MissingExtraError:
-    """The error for ``what`` is in ``folder`` of a checkout and not in the wheel."""
+def missing_checkout(what: str, *folders: str) -> MissingExtraError:
+    """The error for ``what`` that the wheel does not have, but ``folders`` of a checkout."""
+    names = " ".join(f"./{folder}" for folder in folders)
     return MissingExtraError(
-        f"{what} comes with eitskin's sources alone: run there  pip install ./{folder}"
+        f"{what} comes with eitskin's sources alone: run there  pip install {names}"
     )
 
 

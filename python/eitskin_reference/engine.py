@@ -22,7 +22,7 @@ from eitskin.model.storage import stride_for
 from eitskin_reference.constants_table import ERROR_MIN_NOISE, ERROR_SHARE, MIN_SQUARE
 from eitskin_reference.disc_fit import Disc, Reduced
 from eitskin_reference.evidence import DataErrors
-from eitskin_reference.exact import ActiveSet, coordinate
+from eitskin_reference.exact import ActiveSet
 from eitskin_reference.fista import fista
 from eitskin_reference.follow import Follower, gain_beside
 from eitskin_reference.frame_stage import FrameStage
@@ -280,8 +280,6 @@ class ReferenceEngine(FrameStage):
     def _run(self, problem: Problem, last: FloatArray | None) -> SolveResult:
         """The chosen solver, from the ``last`` coefficients or from zero."""
         start, o = self._start(problem, last), self.options
-        if o.solver == "coordinate":
-            return coordinate(problem, o, start)
         if o.solver == "active-set":
             return ActiveSet(problem, o, self.model.grid, self.model.lipschitz).run(start)
         return fista(

@@ -1,11 +1,10 @@
-"""Coordinate descent and active set of the numpy reference: the C core's rules, written for
-reading.
+"""Active set of the numpy reference: the C core's rules, written for reading.
 
-csrc/src/solve/coordinate_descent.c and active_set.c say where the methods are from. The columns'
-products are solved with again at each step; the core keeps a factor of them up to date.
+csrc/src/solve/active_set.c says where the method is from. The columns' products are solved with
+again at each step; the core keeps a factor of them up to date.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,59 +14,14 @@ from eitskin.fem.grid import Grid
 from eitskin_reference.constants_table import (
     EPSILON,
     INDEPENDENT,
-    LOOK_GROWTH,
     LOOKS_NEARBY,
     MAX_RISE,
     MAX_STALLS,
-    REST_EPSILONS,
-    SETTLED,
     TOLERANCE_EPSILONS,
     WORTHWHILE,
 )
-from eitskin_reference.problem import Problem, SolveResult, shrink
-
-
-def coordinate(
-    problem: Problem, options: Options, start: FloatArray | None = None, done: int = 0
-) -> SolveResult:
-    """Sweeps over the columns that are not zero or that a look found to move; ``done`` sweeps count
-    as made."""
-    p, lam = problem, problem.lam
-    x = np.zeros(p.n) if start is None else start.copy()
-    norms = np.einsum("ij,ij->j", p.s, p.s)
-    least = REST_EPSILONS * EPSILON**2 * float(p.y @ p.y)
-    certificate, gradient = p.check_gap(x)
-    sweeps, stop, interval = done, "iterations", options.gap_every
-    while sweeps < options.iterations:
-        listed = np.flatnonzero((x != 0) | (shrink(gradient, lam, p.sign) != 0))
-        due, first, worth = min(sweeps + interval, options.iterations), np.inf, np.inf
-        residual = p.residual(x)
-        while sweeps < due and not worth <= SETTLED * first < np.inf and not first <= least:
-            worth, kept = 0.0, []
-            for j in listed:
-                v = norms[j] * x[j] + p.s[:, j] @ residual
-                after = (
-                    float(shrink(np.array([v]), lam, p.sign)[0]) / norms[j] if norms[j] > 0 else 0.0
-                )
-                step, x[j] = after - x[j], after
-                if step != 0:
-                    residual = residual - step * p.seen[:, j]
-                if after != 0 or step != 0:
-                    kept.append(j)
-                worth += norms[j] * step * step
-            listed, sweeps = np.array(kept, dtype=np.int64), sweeps + 1
-            first = worth if first == np.inf else first
-        certificate, gradient = p.check_gap(x)
-        if not certificate.objective <= p.ceiling:
-            return SolveResult(x, sweeps, "diverged", certificate, 0)
-        if options.gap_rel > 0 and certificate.gap <= options.gap_rel * p.scale:
-            stop = "gap"
-            break
-        if first <= least:
-            stop = "optimum"
-            break
-        interval *= 1 if options.gap_rel > 0 else LOOK_GROWTH
-    return SolveResult(x, sweeps, stop, certificate, 0)
+from eitskin_reference.fista import fista
+from eitskin_reference.problem import Problem, SolveResult
 
 
 @dataclass
@@ -102,7 +56,7 @@ class ActiveSet:
     """One solve by the active set."""
 
     def __init__(self, problem: Problem, options: Options, grid: Grid, lipschitz: float) -> None:
-        self.p, self.options, self.held = problem, options, Held()
+        self.p, self.options, self.held, self.lipschitz = problem, options, Held(), lipschitz
         self.most = min(len(problem.y) - len(problem.basis), problem.n)
         self.tolerance = (
             TOLERANCE_EPSILONS * EPSILON * np.sqrt(lipschitz) * float(np.linalg.norm(problem.y))
@@ -225,7 +179,7 @@ class ActiveSet:
         return (now, *self._take_in(missing, gradient)) if missing else (now, False, False)
 
     def run(self, start: FloatArray | None) -> SolveResult:
-        """Rounds until something ends them; where they fail, coordinate descent goes on."""
+        """Rounds until something ends them; if they fail, FISTA continues."""
         p, o, held = self.p, self.options, self.held
         if start is not None:
             self._begin(start)
@@ -256,8 +210,12 @@ class ActiveSet:
             if moved:
                 c, gradient = p.check_gap(held.spread(p.n))
             if failed or not c.objective <= before * (1 + MAX_RISE):
-                x = held.spread(p.n)
-                return coordinate(p, o, x if c.objective <= p.ceiling else None, rounds)
+                x = held.spread(p.n) if c.objective <= p.ceiling else np.zeros(p.n)
+                if rounds == o.iterations:
+                    return SolveResult(x, rounds, "iterations", p.check_gap(x)[0], 0)
+                left = replace(o, iterations=o.iterations - rounds)
+                more = fista(p.s, p.y, p.lam, self.lipschitz, left, p.basis, x)
+                return replace(more, iterations=rounds + more.iterations)
             stalls = 0 if c.objective < before * (1 - EPSILON) else stalls + 1
             stalls = stalls if moved else MAX_STALLS
 

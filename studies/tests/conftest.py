@@ -1,22 +1,27 @@
-"""What every test of the studies may use: of the product's tests, their helpers."""
+"""What every test of the studies may use."""
 
+import fcntl
+import hashlib
+import json
+import os
 import re
-import sys
 from collections.abc import Iterator
 from fnmatch import translate
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import hypothesis
+import numpy as np
 import pytest
+
+from eitskin.fem import mesh, mesh_worker
+from eitskin_emulator.core_on_qemu import build_cortex_m7
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "python"))
-
-from cross_build import shared_build  # noqa: E402
-from kept_meshes import mesher_that_keeps  # noqa: E402
-
+BUILD = ROOT / "build"
 NEEDED = ("dask", "pyeit", "sklearn", "celer", "daqp", "unicorn", "netgen", "matplotlib")
 LONG = HERE / "long_tests.txt"
 hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
@@ -42,9 +47,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def meshes_are_kept() -> Iterator[None]:
-    """Netgen is a process of its own, about half a second a mesh."""
+    """In build/meshes, for every process and every run: Netgen is a process of its own, about half
+    a second a mesh. It only runs for a request, a mesh_worker.py or a netgen that is new."""
+    real, kept = mesh.run_mesher, BUILD / "meshes"
+    made_by = Path(mesh_worker.__file__).read_bytes() + version("netgen-mesher").encode()
+    kept.mkdir(parents=True, exist_ok=True)
+
+    def run(request: dict[str, Any], timeout_s: float, name: str) -> list[Any]:
+        asked = hashlib.sha256(made_by + json.dumps(request).encode()).hexdigest()
+        path = kept / f"{asked}.npz"
+        if not path.exists():
+            partial = kept / f"{asked}.{os.getpid()}.npz"
+            np.savez(partial, *real(request, timeout_s, name))
+            partial.replace(path)
+        with np.load(path) as arrays:
+            return [arrays[key] for key in arrays.files]
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("eitskin.fem.mesh.run_mesher", mesher_that_keeps())
+        patch.setattr(mesh, "run_mesher", run)
         yield
 
 
@@ -62,6 +82,9 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def cortex_m7() -> Path:
-    """A build of everything for the Cortex-M7: ``firmware/eitskin_BOARD.elf``, ``.bin`` and
-    ``.map``, ``tests/emulated``."""
-    return shared_build()
+    """A build of everything for the Cortex-M7, brought up to date by whichever process asks first:
+    ``firmware/eitskin_BOARD.elf``, ``.bin`` and ``.map``, ``tests/emulated``."""
+    BUILD.mkdir(exist_ok=True)
+    with (BUILD / "cortex-m7.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return build_cortex_m7(ROOT, BUILD / "cortex-m7")

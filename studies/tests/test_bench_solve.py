@@ -4,18 +4,22 @@ import numpy as np
 import pytest
 
 from eitskin.core.options_table import SOLVERS
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.scene.random_touches import random_touches
+from eitskin.scene.simulate import Measurement, simulate
 from eitskin_studies.benchmarks import solve as bench_solve
 from eitskin_studies.benchmarks import solve_peers as bench_solve_peers
 from eitskin_studies.benchmarks.solve_problems import Problems, make_problems
-from small_models import prebuilt, session
 
 OWN = {f"eitskin {solver}, {width}" for solver in SOLVERS for width in ("float32", "float64")}
 
 
 @pytest.fixture(scope="module")
 def problems() -> Problems:
-    model, blob = prebuilt()
-    return make_problems("rank 64", model, blob, session(scenes=2))
+    model, blob = load_prebuilt()
+    touches = random_touches(model.skin.outline, 3, 2, "test")
+    session = simulate(model.skin, model.protocol, touches, measurement=Measurement(snr_db=60.0))
+    return make_problems("rank 64", model, blob, session)
 
 
 def test_suboptimality_is_judged_in_float64(problems):

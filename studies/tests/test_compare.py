@@ -13,6 +13,7 @@ from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.scene.random_touches import random_touches
 from eitskin.scoring import metrics
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.compare import baselines
@@ -20,7 +21,6 @@ from eitskin_studies.compare.families import Family, FindsTouches, Learns, Setup
 from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.compare.run import CompareSettings, Comparison, compare, truth_masks
 from eitskin_studies.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text
-from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.thresholds import THRESHOLDS, miou_curves
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)

@@ -194,7 +194,7 @@ def test_without_dask_a_scheduler_asks_for_the_extra(tmp_path, monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'eitskin\[cluster\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install './studies\[cluster\]'"):
         write_dataset(small_job(), tmp_path / "d", scheduler="tcp://127.0.0.1:1")
 
 

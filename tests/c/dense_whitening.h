@@ -128,8 +128,8 @@ static inline void solve_what_is_seen(bench *b, int sign)
     o.lambda_rel = R(0.05);
     o.detection_factor = 0;
     /* the active set first: its gap bounds the optimum from below */
-    for (int solver = 3; solver >= 0; --solver) {
-        o.solver = (eits_solver)solver;
+    for (int solver = SOLVERS - 1; solver >= 0; --solver) {
+        o.solver = each_solver(solver);
         o.iterations = 4000;
         o.gap_rel = R(BOTH_WIDTHS(1e-5, 1e-9));
         CHECK_OK(eits_set_options(ctx, &o));
@@ -141,7 +141,7 @@ static inline void solve_what_is_seen(bench *b, int sign)
         const double lambda = (double)info.lambda, scale = 0.5 * dense_dot(y, y, RANK);
         CHECK_NEAR(info.gap, dense_gap(&b->b.d, y, got, lambda, o.sign), 300 * EPS * scale);
         const double objective = dense_objective(&b->b.d, y, got, lambda), room = 300 * EPS * scale;
-        if (solver == 3) {
+        if (o.solver == EITS_SOLVER_ACTIVE_SET) {
             CHECK(info.stop == EITS_STOP_GAP || info.stop == EITS_STOP_OPTIMUM);
             CHECK(info.gap <= BOTH_WIDTHS(1e-5, 1e-9) * scale);
             min = objective - (double)info.gap - room;

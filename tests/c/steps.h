@@ -24,6 +24,16 @@
         CHECK_OK(eits_reference_finish(ctx));                                 \
     } while (0)
 
+/* Each solver, of SOLVERS: their numbers have a gap at 2, which is reserved. */
+enum { SOLVERS = 3 };
+
+static inline eits_solver each_solver(int k)
+{
+    static const eits_solver solvers[SOLVERS] = {EITS_SOLVER_FISTA, EITS_SOLVER_WORKING_SET,
+                                                 EITS_SOLVER_ACTIVE_SET};
+    return solvers[k];
+}
+
 /* The frame stage, whatever it leaves out and costs. */
 #define STAGE(ctx, frame) \
     CHECK_OK(eits_frame_stage(ctx, frame, SMALL_ROWS, &(uint32_t){0}, &(uint64_t){0}))

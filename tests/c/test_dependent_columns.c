@@ -1,5 +1,5 @@
-/* The exact solvers where columns depend on each other and MACs run out, at whatever place: the
- * image is finite, and never worse than zero. */
+/* The active set if columns depend on each other and the multiply-accumulates run out, wherever
+ * that is: the image is finite, and never worse than zero. */
 #include "steps.h"
 
 static dense_bench b;
@@ -87,81 +87,6 @@ TEST(starts_that_cancel)
     free(y);
 }
 
-/* Columns of S without their part along `direction`, a unit vector. */
-static void project_columns(dense *d, const double *direction)
-{
-    for (uint32_t j = 0; j < d->n; ++j) {
-        double *column = d->s + (size_t)j * d->rank;
-        const double along = dense_dot(column, direction, d->rank);
-        for (uint32_t i = 0; i < d->rank; ++i)
-            column[i] -= along * direction[i];
-    }
-}
-
-/* Sweeps over the columns that may move at zero, less those that stay there; `square`: each
- * column's before the projection. */
-static void dense_sweeps(const dense *d, const double *square, double *r, double lambda, int sweeps,
-                         double *x)
-{
-    uint32_t list[N], count = 0;
-    for (uint32_t j = 0; j < N; ++j) {
-        if (fabs(dense_dot(d->s + (size_t)j * d->rank, r, d->rank)) > lambda)
-            list[count++] = j;
-    }
-    for (int sweep = 0; sweep < sweeps; ++sweep) {
-        uint32_t left = 0;
-        for (uint32_t k = 0; k < count; ++k) {
-            const uint32_t j = list[k];
-            const double *column = d->s + (size_t)j * d->rank,
-                         v = square[j] * x[j] + dense_dot(column, r, d->rank);
-            const double after = copysign(fmax(fabs(v) - lambda, 0), v) / square[j],
-                         step = after - x[j];
-            for (uint32_t i = 0; i < d->rank; ++i)
-                r[i] -= step * column[i];
-            x[j] = after;
-            if (after != 0 || step != 0)
-                list[left++] = j;
-        }
-        count = left;
-    }
-}
-
-/* A few sweeps, beside no direction that is ignored, and one. */
-TEST(sweeps_as_written_apart)
-{
-    enum { RANK_HERE = 12, SWEEPS = 3 };
-    for (uint32_t ignored = 0; ignored < 2; ++ignored) {
-        for (int storage = 0; storage < 4; ++storage) {
-            eits_context *ctx = dense_bench_open(
-                &b, (small_spec){.rank = RANK_HERE, .side = SIDE, .storage = (eits_storage)storage},
-                0);
-            double square[N], direction[RANK_HERE], *x = dense_numbers(N);
-            for (uint32_t j = 0; j < N; ++j)
-                square[j] = dense_dot(b.d.s + j * RANK_HERE, b.d.s + j * RANK_HERE, RANK_HERE);
-            for (uint32_t i = 0; i < RANK_HERE; ++i)
-                direction[i] = (i % 2 ? -1 : 1) / sqrt(RANK_HERE);
-            small_new_data(ctx, 84);
-            ctx->projection.count = ignored;
-            for (uint32_t i = 0; ignored && i < RANK_HERE; ++i)
-                ctx->projection.basis[i] = (eits_real)direction[i];
-            double *r = dense_copy(ctx->frame.y, RANK_HERE);
-            if (ignored) {
-                const double along = dense_dot(r, direction, RANK_HERE);
-                for (uint32_t i = 0; i < RANK_HERE; ++i)
-                    ctx->frame.y[i] = (eits_real)(r[i] -= along * direction[i]);
-                project_columns(&b.d, direction);
-            }
-            CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_COORDINATE, o.sign = EITS_SIGN_BOTH,
-                           o.iterations = SWEEPS, o.lambda_rel = R(0.02));
-            CHECK_OK(eits_solve(ctx, NULL));
-            CHECK_EQUAL(ctx->info.iterations, SWEEPS);
-            dense_sweeps(&b.d, square, r, (double)ctx->info.lambda, SWEEPS, x);
-            CHECK(dense_greatest_difference(x, eits_get_coefficients(ctx), N) < 3000 * EPS);
-            free(r), free(x);
-        }
-    }
-}
-
 /* The optimum to rounding, in few rounds. */
 TEST(the_active_set_ends_soon)
 {
@@ -215,4 +140,4 @@ TEST(hidden_columns)
     CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
 }
 
-RUN_TESTS("exact solvers at their edges", dense_bench_close(&b))
+RUN_TESTS("active set at its edges", dense_bench_close(&b))

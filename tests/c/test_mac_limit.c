@@ -2,7 +2,7 @@
  * than zero. */
 #include "steps.h"
 
-enum { SIDE = 7, N = SIDE * SIDE, RANK = 12, SOLVERS = 4 };
+enum { SIDE = 7, N = SIDE * SIDE, RANK = 12 };
 
 static dense_bench b;
 
@@ -70,7 +70,7 @@ TEST(every_limit_holds)
         for (int warm = 0; warm < 2; ++warm) {
             for (int gap = 0; gap < 2; ++gap) {
                 eits_context *ctx = set_up(&b);
-                const way w = {(eits_solver)solver, warm ? EITS_SIGN_INCREASE : EITS_SIGN_BOTH,
+                const way w = {each_solver(solver), warm ? EITS_SIGN_INCREASE : EITS_SIGN_BOTH,
                                warm, gap ? 1e-6 : 0};
                 const eits_info free_run = solve(ctx, w, 0);
                 CHECK(free_run.stop != EITS_STOP_MACS);
@@ -145,7 +145,7 @@ static void of_a_whole_frame(int masked)
         }
         uint64_t min = 0;
         for (uint32_t limit = 1; limit < 20000; limit += 1 + limit / 50) {
-            CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.mac_limit = limit);
+            CHANGE_OPTIONS(ctx, o.solver = each_solver(solver), o.mac_limit = limit);
             eits_info info;
             CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, &info));
             min = limit == 2 ? info.macs : min; /* the first frame also builds the basis */

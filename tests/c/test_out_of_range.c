@@ -99,8 +99,8 @@ TEST(a_reference_frame_out_of_range_is_refused)
 TEST(data_too_small_to_square_give_zero)
 {
     eits_context *ctx = dense_bench_open(&b, SPEC, 0);
-    for (uint32_t solver = 0; solver <= EITS_SOLVER_ACTIVE_SET; ++solver) {
-        CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver);
+    for (int solver = 0; solver < SOLVERS; ++solver) {
+        CHANGE_OPTIONS(ctx, o.solver = each_solver(solver));
         small_new_data(ctx, 3);
         for (uint32_t i = 0; i < SPEC.rank; ++i)
             ctx->frame.y[i] *= (eits_real)BOTH_WIDTHS(1e-24, 1e-165);

@@ -2,7 +2,7 @@
  * nobody's. */
 #include "steps.h"
 
-enum { RANK = 12, SIDE = 12, N = SIDE * SIDE, SOLVERS = 4, FRAMES = 24, KEPT_NOISE = 6 };
+enum { RANK = 12, SIDE = 12, N = SIDE * SIDE, FRAMES = 24, KEPT_NOISE = 6 };
 
 static const small_spec SPECS[] = {
     {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES},
@@ -80,8 +80,8 @@ TEST(what_lies_in_the_scratch_makes_no_difference)
     for (size_t spec = 0; IN_TABLE(spec, SPECS); ++spec) {
         for (int way = 0; way < 2 * SOLVERS; ++way) {
             dense_bench clean = {0}, spoilt = {0};
-            eits_context *ctx = set_up(&clean, SPECS[spec], way % 2, (eits_solver)(way / 2)),
-                         *other = set_up(&spoilt, SPECS[spec], way % 2, (eits_solver)(way / 2));
+            eits_context *ctx = set_up(&clean, SPECS[spec], way % 2, each_solver(way / 2)),
+                         *other = set_up(&spoilt, SPECS[spec], way % 2, each_solver(way / 2));
             uint64_t state = 17;
             for (int k = 0; k < FRAMES; ++k) {
                 const eits_real with = (eits_real)junk[k % 3];

@@ -44,14 +44,14 @@ TEST(a_halved_step_starts_afresh)
  */
 TEST(a_start_worse_than_zero)
 {
-    for (int solver = 0; solver < 4; ++solver) {
+    for (int solver = 0; solver < SOLVERS; ++solver) {
         dense_bench warm = {0}, cold = {0};
         eits_context *ctx = dense_bench_open(&warm, RANDOM, 0),
                      *other = dense_bench_open(&cold, RANDOM, 0);
         small_new_data(ctx, 92);
         small_new_data(other, 92);
         eits_options o = *eits_get_options(ctx);
-        o.solver = (eits_solver)solver;
+        o.solver = each_solver(solver);
         o.warm_start = 1;
         o.lambda_rel = R(1e-4);
         o.iterations = 3000;
@@ -84,7 +84,7 @@ static eits_context *open_warm(dense_bench *b, int solver)
     eits_real frame[SMALL_ROWS];
     small_reference(&b->c.model, 1, frame);
     CHECK_OK(eits_reference_set(ctx, frame, SMALL_ROWS));
-    CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.warm_start = 1, o.iterations = 4,
+    CHANGE_OPTIONS(ctx, o.solver = each_solver(solver), o.warm_start = 1, o.iterations = 4,
                    o.sign = EITS_SIGN_BOTH);
     return ctx;
 }
@@ -92,7 +92,7 @@ static eits_context *open_warm(dense_bench *b, int solver)
 /* Whether touches are looked for between warm frames makes no difference to the images. */
 TEST(touches_leave_no_trace)
 {
-    for (int solver = 0; solver < 4; ++solver) {
+    for (int solver = 0; solver < SOLVERS; ++solver) {
         dense_bench seen = {0}, unseen = {0};
         eits_context *ctx = open_warm(&seen, solver), *other = open_warm(&unseen, solver);
         for (uint32_t k = 0; k < 12; ++k) {
@@ -166,10 +166,10 @@ TEST(the_longest_intervals)
  * way. */
 TEST(iterations_without_number)
 {
-    for (int solver = 0; solver < 4; ++solver) {
+    for (int solver = 0; solver < SOLVERS; ++solver) {
         eits_context *ctx = dense_bench_open(&b, RANDOM, 1);
         small_new_data(ctx, 96);
-        CHANGE_OPTIONS(ctx, o.solver = (eits_solver)solver, o.iterations = 100000,
+        CHANGE_OPTIONS(ctx, o.solver = each_solver(solver), o.iterations = 100000,
                        o.lambda_rel = R(0.05));
         const eits_info info = solve(ctx);
         CHECK(solver < 2 ? info.stop == EITS_STOP_ITERATIONS && info.iterations == 100000

@@ -199,6 +199,8 @@ TEST(refused_options)
     eits_options o = *eits_get_options(ctx);
     o.solver = (eits_solver)(EITS_SOLVER_ACTIVE_SET + 1);
     CHECK_REFUSED(eits_set_options(ctx, &o));
+    o.solver = (eits_solver)2; /* reserved */
+    CHECK_REFUSED(eits_set_options(ctx, &o));
 }
 
 /* The same peaks in the same order, of the columns around the active ones alone. */

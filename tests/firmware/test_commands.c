@@ -169,7 +169,7 @@ TEST(test_solver)
                                       .sign = 2,
                                       .lambda_rel = 0.05f,
                                       .gap_rel = 0.01f,
-                                      .solver = EITS_SOLVER_COORDINATE,
+                                      .solver = EITS_SOLVER_ACTIVE_SET,
                                       .mac_limit = 123456,
                                       .diagnostics = EITS_DIAGNOSTIC_OUTLIER};
 #define SOLVER(change, a, last)                           \
@@ -186,6 +186,7 @@ TEST(test_solver)
     SOLVER(c.lambda_rel = 1.5f, 20, 1);
     SOLVER(c.lambda_rel = (float)NAN, 20, 0);
     SOLVER(c.gap_rel = -0.1f, 24, 0);
+    SOLVER(c.solver = 2, 28, 3); /* reserved */
     SOLVER(c.solver = 4, 28, 3);
     SOLVER(c.diagnostics = EITS_DIAGNOSTICS_ALL + 1, 36, EITS_DIAGNOSTICS_ALL);
     SOLVER(c.track = 2, 40, 1);
@@ -206,7 +207,7 @@ TEST(test_solver)
     CHECK_EQUAL(options->sign, EITS_SIGN_BOTH);
     CHECK_NEAR(options->lambda_rel, 0.05f, 0);
     CHECK_NEAR(options->gap_rel, 0.01f, 0);
-    CHECK_EQUAL(options->solver, EITS_SOLVER_COORDINATE);
+    CHECK_EQUAL(options->solver, EITS_SOLVER_ACTIVE_SET);
     CHECK_EQUAL(options->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
     CHECK_EQUAL(options->mac_limit, 123456);
     CHECK(options->track_confirm == 0 && options->track_hold == 0 && options->track_smooth == 0);

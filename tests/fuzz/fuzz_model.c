@@ -65,7 +65,10 @@ static void use(const eits_model *model)
     reconstruct(ctx, frame);
     options.sign = EITS_SIGN_BOTH;
     options.second_pass = 1;
-    options.solver = (eits_solver)((model->defaults->solver + 1u) % 4u);
+    /* another solver than the model's; 2 is reserved */
+    options.solver = model->defaults->solver == EITS_SOLVER_WORKING_SET ? EITS_SOLVER_ACTIVE_SET
+                     : model->defaults->solver == EITS_SOLVER_FISTA     ? EITS_SOLVER_WORKING_SET
+                                                                        : EITS_SOLVER_FISTA;
     MUST(eits_set_options(ctx, &options) == EITS_OK);
     frame_of(model, model->golden.frame, 1.5f, frame);
     reconstruct(ctx, frame);

@@ -222,10 +222,12 @@ static void frame(void)
 
 static void set_options(uint8_t how, uint8_t more)
 {
+    static const eits_solver SOLVERS[] = {EITS_SOLVER_FISTA, EITS_SOLVER_WORKING_SET,
+                                          EITS_SOLVER_ACTIVE_SET, EITS_SOLVER_ACTIVE_SET};
     eits_options o = *eits_get_options(ctx);
     o.iterations = 12;
     o.sign = (eits_sign)(how % 3);
-    o.solver = (eits_solver)(how / 4 % 4);
+    o.solver = SOLVERS[how / 4 % 4];
     o.touch_test = !(how & 0x10);
     o.touch_seek = (how & 0x20) != 0;
     o.second_pass = (how & 0x40) != 0;

@@ -53,7 +53,8 @@ static void models(void)
             continue;
         small_model made = small_model_make(spec);
         small_put_u32(small_model_section(&made, "DEFS", NULL), 1 + k);      /* iterations */
-        small_put_u32(small_model_section(&made, "DEFS", NULL) + 56, k % 4); /* solver */
+        small_put_u32(small_model_section(&made, "DEFS", NULL) + 56,
+                      k % 3 < 2 ? k % 3 : EITS_SOLVER_ACTIVE_SET);
         small_model_seal(&made);
         keep("small", k, made.blob, made.size);
         if (k % 4 < 2)
@@ -85,7 +86,7 @@ static void packets(void)
 static void scripts(void)
 {
     for (unsigned model = 0; model < 16; ++model) {
-        for (unsigned solver = 0; solver < 4; ++solver) {
+        for (unsigned solver = 0; solver < 4; ++solver) { /* 2 is rejected */
             uint8_t script[256] = {(uint8_t)(model | (model + solver) % 4 << 4)};
             size_t at = 1;
             const uint8_t learn[] = {1, 4, 1, 127, 1, 2, 3,   4, 5, 6,   7, 8,  9,

@@ -19,7 +19,7 @@ from margins import (  # noqa: F401
     pytest_unconfigure,
 )
 
-NEEDED = ("dask", "matplotlib", "netgen", "pyeit", "scipy", "skfem", "sklearn", "unicorn")
+NEEDED = ("matplotlib", "netgen", "scipy", "skfem", "sklearn", "unicorn")
 LONG = Path(__file__).with_name("long_tests.txt")
 hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
 

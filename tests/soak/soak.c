@@ -114,8 +114,10 @@ static void set_options(eits_context *ctx, eits_options o)
 
 static void change_options(void)
 {
+    static const eits_solver SOLVERS[] = {EITS_SOLVER_FISTA, EITS_SOLVER_WORKING_SET,
+                                          EITS_SOLVER_ACTIVE_SET};
     eits_options o = *eits_get_options(run.ctx);
-    o.solver = (eits_solver)hand_draw(&fingers, 4);
+    o.solver = SOLVERS[hand_draw(&fingers, 3)];
     o.iterations = 5 + hand_draw(&fingers, 40);
     o.gap_rel = hand_draw(&fingers, 2) ? R(1e-2) : 0;
     o.sign = hand_draw(&fingers, 4) ? EITS_SIGN_INCREASE : EITS_SIGN_BOTH;

@@ -85,7 +85,7 @@ typedef enum eits_stop {
     EITS_STOP_DIVERGED = 4,
     /* the next step would have passed mac_limit: the image is the best until then */
     EITS_STOP_MACS = 5,
-    /* no coefficient moves any more but by rounding: coordinate descent and active set */
+    /* no coefficient moves any more except by rounding; of the active set alone */
     EITS_STOP_OPTIMUM = 6
 } eits_stop;
 

@@ -29,7 +29,7 @@ typedef struct eits_contact {
     uint32_t state;    /* 0: none; 1 new, not told, 2 down, 3 lifted */
     uint32_t id;       /* that events name */
     uint32_t touch_id; /* that the tracker gave it last */
-    uint32_t flags;    /* csrc/src/gesture/gesture.h names them */
+    uint32_t flags;    /* csrc/src/gesture/contacts.h names them */
     uint32_t born_us, seen_us;
     uint32_t trail_count; /* the newest at (trail_count - 1) % EITS_TRAIL */
     uint32_t trail_us[EITS_TRAIL];

@@ -35,9 +35,8 @@ typedef enum eits_solver {
     /* FISTA on the columns that may differ from zero. They are chosen again after gap_every
      * iterations, then ever more rarely, or always so often where gap_rel asks for a gap */
     EITS_SOLVER_WORKING_SET = 1,
-    /* coordinate descent on such columns; an iteration is a sweep over them */
-    EITS_SOLVER_COORDINATE = 2,
-    /* to the optimum of the columns chosen, then more columns; an iteration is such a round */
+    /* to the optimum of the columns chosen, then more columns; an iteration is such a round. The
+     * number 2 is reserved: earlier versions had coordinate descent there, and it is rejected */
     EITS_SOLVER_ACTIVE_SET = 3
 } eits_solver;
 
@@ -69,7 +68,7 @@ typedef struct eits_options {
     uint32_t max_masked;
     /* the change that is looked for: increase (conducting touches), decrease or both */
     eits_sign sign;
-    /* fista, working-set, coordinate or active-set (solve.h) */
+    /* fista, working-set or active-set (solve.h) */
     eits_solver solver;
     /* 1: start from the last frame's coefficients, momentum reset (solve.h) */
     uint32_t warm_start;

@@ -622,7 +622,7 @@ typedef struct eits_command_solver {
     float lambda_rel;
     /* 0 to 1 */
     float gap_rel;
-    /* eits_solver: 0 FISTA, 1 working set, 2 coordinate descent, 3 active set */
+    /* eits_solver: 0 FISTA, 1 working set, 3 active set; 2 is reserved and rejected */
     uint32_t solver;
     /* multiply-accumulates a frame; 0: no limit */
     uint32_t mac_limit;

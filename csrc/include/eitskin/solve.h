@@ -11,12 +11,11 @@
  * image after a number of iterations is FISTA's but for what columns outside would have done since
  * the last look; its optimum is the same.
  *
- * EITS_SOLVER_COORDINATE sweeps over the columns that may differ from zero, one coefficient after
- * another; an iteration is a sweep. EITS_SOLVER_ACTIVE_SET finds the optimum itself, by Newton's
- * steps on a few columns that come and go; an iteration is a look at every column, and few are
- * needed. The support never exceeds the directions that the data have; where the factor is of no
- * use coordinate descent goes on, and the gap tells how far that came. The optimum is not the best
- * image: it is sparser than a touch (studies/results/benchmarks.md).
+ * EITS_SOLVER_ACTIVE_SET finds the optimum itself, by Newton's steps on a few columns that come and
+ * go. An iteration is a look at every column, and few are needed. The support never exceeds the
+ * number of directions that the data have. If the factor of these columns fails numerically, FISTA
+ * continues for the iterations that are left, and the gap reports how far it came. The optimum is
+ * not the best image: it is sparser than a touch (studies/results/benchmarks.md).
  *
  * With mac_limit > 0 each solver stops with the best so far (FISTA: the last so far) where the next
  * step, and the gap after it, would take info.macs beyond the limit. The frame stage's MACs count
@@ -50,7 +49,7 @@ eits_status eits_solve(eits_context *ctx, const eits_real *y);
 #define EITS_SELF_TEST_SUMS     8
 /* Counts up with every change of what the core's bits are: sums of another revision are not
  * compared. */
-#define EITS_SELF_TEST_REVISION 1u
+#define EITS_SELF_TEST_REVISION 2u
 
 /* Run the model's golden frame with default options: the image must have the bits that the model
  * states (float32), or be within `*difference` of it, relative to its peak (reported in either

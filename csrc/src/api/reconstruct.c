@@ -45,6 +45,13 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
     return status;
 }
 
+/* The solver adds to what info has counted: iterations and step halvings start again from zero. */
+static void solve_from_zero(eits_context *ctx, const eits_scratch *scratch)
+{
+    ctx->info.iterations = ctx->info.step_halvings = 0;
+    (void)eits_solve_frame(ctx, scratch, 0);
+}
+
 void eits_solve_again(eits_context *ctx, const eits_scratch *scratch, const eits_real *y)
 {
     const eits_info before = ctx->info;
@@ -52,12 +59,12 @@ void eits_solve_again(eits_context *ctx, const eits_scratch *scratch, const eits
     eits_copy(ctx->frame.y_log, ctx->frame.y, stride); /* of no more use for this frame */
     ctx->frame.has_y_log = 0;
     eits_copy(ctx->frame.y, y, stride);
-    (void)eits_solve_frame(ctx, scratch, 0);
-    /* The interaction is an estimate: one that leaves nothing of a frame with two touches was
-     * wrong. */
-    if (!ctx->solver.warm) { /* it came to nothing, or to no number */
+    solve_from_zero(ctx, scratch);
+    /* The interaction is an estimate. If it leaves nothing of a frame with two touches, or a result
+     * that is not finite, it was wrong. */
+    if (!ctx->solver.warm) {
         eits_copy(ctx->frame.y, ctx->frame.y_log, stride);
-        (void)eits_solve_frame(ctx, scratch, 0);
+        solve_from_zero(ctx, scratch);
     }
     ctx->info.iterations += before.iterations;
     ctx->info.step_halvings += before.step_halvings;

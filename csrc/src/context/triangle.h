@@ -1,5 +1,5 @@
-/* Packed triangles of rank x rank: of rows left out (frame/whitening.h) and of the test of touches.
- */
+/* Upper triangles of rank x rank, packed: those of rows left out (frame/whitening.h) and those of
+ * the touch test. Triangles of a few rows are in base/cholesky.h. */
 #ifndef EITSKIN_TRIANGLE_H
 #define EITSKIN_TRIANGLE_H
 
@@ -34,6 +34,15 @@ static inline void add_row(const eits_context *ctx, uint32_t i, eits_real *out, 
     eits_axpy(ctx->kernels, out + first_of(i), factor, a + first_of(i),
               EITS_STRIDE(ctx->model->rank) - first_of(i));
 }
+
+/* N = R'R, R in N's place. A pivot below `min_pivot` is raised to it. The strong directions come
+ * first, so that what rounding leaves of a lost one weighs little. The numbers that N gathered in
+ * its padding are set to zero. Returns the multiply-accumulates. */
+uint64_t eits_triangle_factor(const eits_context *ctx, eits_real min_pivot, eits_real *n);
+
+/* v = T^-1 v, and v = T'^-1 v. */
+void eits_triangle_solve(const eits_context *ctx, eits_real *triangle, eits_real *v);
+void eits_triangle_solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v);
 
 static inline uint64_t triangle_macs(const eits_context *ctx)
 {

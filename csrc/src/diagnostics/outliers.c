@@ -21,6 +21,7 @@
  * in rows.unusable, info. The caller folds the frame again where anything was marked. */
 #include "diagnostics/diagnostics.h"
 
+#include "base/cholesky.h"
 #include "base/vec.h"
 #include "kernels/column.h"
 
@@ -154,39 +155,32 @@ static int predict(eits_context *ctx, const eits_scratch *scratch, const uint32_
                    uint32_t n, eits_real *out, uint64_t *macs)
 {
     eits_real *weighed = scratch->row[0], *copy = scratch->row[1], *fit = scratch->row[3];
-    eits_real l[EITS_OUTLIER_MAX][EITS_OUTLIER_MAX], e[EITS_OUTLIER_MAX];
+    eits_real lower[EITS_LOWER_SIZE(EITS_OUTLIER_MAX)], e[EITS_OUTLIER_MAX];
     const uint32_t rank = ctx->model->rank;
-    /* Leave-several-out from one fit of all: (I - H_FF) e = (d - H d)_F, by Cholesky. Eight folds
-     * at most, so the small matrix is on the stack. */
+    /* Leave-several-out from one fit of all: (I - H_FF) e = (d - H d)_F. There are at most
+     * EITS_OUTLIER_MAX folds in F, so this matrix is on the stack. */
     fit_all(ctx, scratch, macs);
     for (uint32_t a = 0; a < n; ++a) {
         const eits_real *column = eits_column(&ctx->model->reduction, flagged[a], copy);
+        eits_real *row = eits_lower_row(lower, a);
         e[a] = ctx->frame.d[flagged[a]] - eits_dot(ctx->kernels, column, fit, rank);
         for (uint32_t i = 0; i < rank; ++i)
             weighed[i] = ctx->range.shrink[i] * column[i];
         for (uint32_t b = 0; b <= a; ++b) {
             const eits_real *other = eits_column(&ctx->model->reduction, flagged[b], copy);
-            eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx->kernels, weighed, other, rank);
-            for (uint32_t k = 0; k < b; ++k)
-                sum = eits_fma(-l[a][k], l[b][k], sum);
-            /* The fit follows this fold wherever it goes: nothing else measures what it does. */
-            if (a == b && !(sum > EITS_OUTLIER_PIVOT))
-                return 0;
-            l[a][b] = a == b ? eits_sqrt(sum) : sum / l[b][b];
+            row[b] = (a == b ? R(1.0) : 0) - eits_dot(ctx->kernels, weighed, other, rank);
         }
+        const eits_real pivot = eits_cholesky_row(lower, a);
+        /* The fit follows this fold wherever it goes: no other fold measures what it does. */
+        if (!(pivot > EITS_OUTLIER_PIVOT))
+            return 0;
+        row[a] = eits_sqrt(pivot);
     }
     *macs += (uint64_t)n * (n + 3u) / 2u * rank;
-    for (uint32_t a = 0; a < n; ++a) {
-        for (uint32_t k = 0; k < a; ++k)
-            e[a] = eits_fma(-l[a][k], e[k], e[a]);
-        e[a] /= l[a][a];
-    }
-    for (uint32_t a = n; a-- > 0;) {
-        for (uint32_t k = a + 1; k < n; ++k)
-            e[a] = eits_fma(-l[k][a], e[k], e[a]);
-        e[a] /= l[a][a];
+    eits_lower_solve(lower, n, e);
+    eits_lower_solve_transposed(lower, n, e);
+    for (uint32_t a = 0; a < n; ++a)
         out[a] = ctx->frame.d[flagged[a]] - e[a];
-    }
     return 1;
 }
 

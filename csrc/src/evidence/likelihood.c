@@ -7,11 +7,12 @@
  * is known. */
 #include "evidence/evidence.h"
 
+#include "base/cholesky.h"
 #include "base/vec.h"
 #include "evidence/constants.h"
 #include "kernels/kernels.h"
 
-typedef eits_real block[EITS_SHAPE_PARAMETERS][EITS_SHAPE_PARAMETERS];
+typedef eits_real block[EITS_LOWER_SIZE(EITS_SHAPE_PARAMETERS)];
 
 /* 1 / deviation^2 of a parameter's prior: none for strength and place. */
 static eits_real precision(uint32_t parameter)
@@ -182,21 +183,14 @@ static eits_real hold(const eits_scratch *scratch, const eits_answer *answer,
     for (uint32_t i = 0; i < p; ++i) {
         const eits_real *row = row_of_square(scratch, n, first + i) + first;
         const eits_real held = i == 0 ? -1 : -offset(answer, k, i);
-        for (uint32_t j = 0; j <= i; ++j) {
-            eits_real sum = row[j];
-            for (uint32_t m = 0; m < j; ++m)
-                sum = eits_fma(-l[i][m], l[j][m], sum);
-            if (i == j)
-                l[i][i] = eits_sqrt(sum > EITS_MIN_PIVOT * row[i] ? sum : EITS_MIN_PIVOT * row[i]);
-            else
-                l[i][j] = sum / l[j][j];
-        }
-        eits_real sum = likelihood->step[first + i] - held;
-        for (uint32_t m = 0; m < i; ++m)
-            sum = eits_fma(-l[i][m], w[m], sum);
-        w[i] = sum / l[i][i];
-        rise = eits_fma(w[i], w[i], rise);
+        eits_copy(eits_lower_row(l, i), row, i + 1u);
+        const eits_real pivot = eits_cholesky_row(l, i), min = EITS_MIN_PIVOT * row[i];
+        eits_lower_row(l, i)[i] = eits_sqrt(pivot > min ? pivot : min);
+        w[i] = likelihood->step[first + i] - held;
     }
+    eits_lower_solve(l, p, w);
+    for (uint32_t i = 0; i < p; ++i)
+        rise = eits_fma(w[i], w[i], rise);
     return rise;
 }
 
@@ -243,9 +237,9 @@ uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, eits_a
         eits_axpy(ctx->kernels, ctx->evidence.left, eits_shape_part(answer, k, i), row, rank);
         eits_copy(row, row_of_square(scratch, n, first + i), n);
         for (uint32_t m = 0; m < i; ++m)
-            eits_axpy(ctx->kernels, row, -l[i][m], of_block + stride * m, n);
+            eits_axpy(ctx->kernels, row, -eits_lower_row(l, i)[m], of_block + stride * m, n);
         for (uint32_t j = 0; j < n; ++j)
-            row[j] /= l[i][i];
+            row[j] /= eits_lower_row(l, i)[i];
     }
     for (uint32_t i = 0; i < p; ++i) {
         const eits_real *row = of_block + stride * i;

@@ -20,11 +20,9 @@ int eits_fast_invert(const eits_real h[4][4], uint32_t n, eits_real inverse[4][4
     }
     for (uint32_t i = 0; i < n; ++i) {
         eits_real *line = fast_line(factor, i);
-        for (uint32_t j = 0; j < i; ++j) {
-            const eits_real *other = fast_line(factor, j);
-            line[j] = (h[i][j] * scale[i] * scale[j] - fast_dot(line, other, j)) / other[j];
-        }
-        line[i] = eits_sqrt(h[i][i] * scale[i] * scale[i] - fast_dot(line, line, i));
+        for (uint32_t j = 0; j < i; ++j)
+            line[j] = h[i][j] * scale[i] * scale[j];
+        line[i] = eits_sqrt(fast_factor_row(factor, i, h[i][i] * scale[i] * scale[i]));
         if (!(fast_square(line[i]) > EITS_FAST_SINGULAR)) /* false for NaN */
             return 0;
     }

@@ -143,6 +143,18 @@ static inline eits_real *fast_line(eits_real *factor, uint32_t i)
     return factor + (size_t)i * (i + 1) / 2;
 }
 
+/* Row i of a factor L, once the rows before it are known: on entry A_ij for each j < i, on return
+ * L_ij. Returns the pivot, `diagonal` less the squares of these; its root is L_ii. */
+static inline eits_real fast_factor_row(eits_real *factor, uint32_t i, eits_real diagonal)
+{
+    eits_real *line = fast_line(factor, i);
+    for (uint32_t j = 0; j < i; ++j) {
+        const eits_real *other = fast_line(factor, j);
+        line[j] = (line[j] - fast_dot(line, other, j)) / other[j];
+    }
+    return diagonal - fast_dot(line, line, i);
+}
+
 /* v <- L^-1 v, L a triangle. */
 static inline void fast_whiten(eits_real *factor, eits_real *v, uint32_t count)
 {

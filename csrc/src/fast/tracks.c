@@ -81,15 +81,10 @@ static eits_real expected(const eits_fast *fast, uint32_t i, eits_real *error)
 /* Row i of S's factor, once those before it are known: S_ij less what they have in common. */
 static void factor_row(eits_fast *fast, uint32_t i, eits_real diagonal)
 {
-    eits_real *line = fast_line(fast->factor, i);
-    for (uint32_t j = 0; j < i; ++j) {
-        const eits_real *other = fast_line(fast->factor, j);
-        line[j] = (line[j] - fast_dot(line, other, j)) / other[j];
-    }
     /* P loses digits in float32 after thousands of updates. A pivot that is not positive says that
      * the row is already known to its noise. */
-    const eits_real pivot = diagonal - fast_dot(line, line, i);
-    line[i] = eits_sqrt(pivot > 0 ? pivot : fast_square(fast->sigma));
+    const eits_real pivot = fast_factor_row(fast->factor, i, diagonal);
+    fast_line(fast->factor, i)[i] = eits_sqrt(pivot > 0 ? pivot : fast_square(fast->sigma));
 }
 
 eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)

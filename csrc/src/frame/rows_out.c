@@ -12,6 +12,7 @@
  * they are nearly as many as P has rows. */
 #include "frame/whitening.h"
 
+#include "base/cholesky.h"
 #include "base/vec.h"
 #include "context/triangle.h"
 #include "frame/constants.h"
@@ -24,27 +25,17 @@ static eits_real precision(const eits_context *ctx, uint32_t i, uint32_t j)
     return (eits_real)ctx->model->precision[high * (high + 1u) / 2u + low];
 }
 
-/* Packed, unlike F: it has a row for each fold left out, and those are few. */
-static eits_real *packed_row(eits_real *triangle, uint32_t i)
-{
-    return triangle + (size_t)i * (i + 1u) / 2u;
-}
-
-/* L of R_mm = L L' in the metric's place, which it fits: as many rows at most as directions. A
- * pivot that rounding has eaten gives no number, which the check of the whole triangle F finds; the
- * stored whitening then stands in. */
+/* L of R_mm = L L', packed, in the metric's place. It fits: there are at most as many rows as
+ * directions. A pivot that rounding has eaten makes a NaN, which the check of the whole triangle F
+ * finds; the stored whitening is used then. */
 static uint64_t factor_left_out(eits_context *ctx, const uint32_t *out, uint32_t count)
 {
-    eits_real *l = ctx->whitening.metric;
+    eits_real *lower = ctx->whitening.metric;
     for (uint32_t i = 0; i < count; ++i) {
-        eits_real *row = packed_row(l, i);
-        for (uint32_t j = 0; j <= i; ++j) {
-            const eits_real *other = packed_row(l, j);
-            eits_real sum = precision(ctx, out[i], out[j]);
-            for (uint32_t k = 0; k < j; ++k)
-                sum = eits_fma(-row[k], other[k], sum);
-            row[j] = j < i ? sum / other[j] : eits_sqrt(sum);
-        }
+        eits_real *row = eits_lower_row(lower, i);
+        for (uint32_t j = 0; j <= i; ++j)
+            row[j] = precision(ctx, out[i], out[j]);
+        row[i] = eits_sqrt(eits_cholesky_row(lower, i));
     }
     return (uint64_t)count * count * count / 6u;
 }
@@ -73,7 +64,7 @@ uint64_t eits_fill_build(eits_context *ctx, const eits_scratch *scratch)
     /* Z = L^-1 P_m', a row of it for each row left out; I - Z'Z as it comes. */
     for (uint32_t a = 0; a < count; ++a) {
         eits_real *z = scratch->square + a * stride;
-        const eits_real *row = packed_row(ctx->whitening.metric, a);
+        const eits_real *row = eits_lower_row(ctx->whitening.metric, a);
         eits_zero(z, stride);
         eits_copy(z, eits_column(&ctx->model->reduction, scratch->index[a], scratch->row[3]), rank);
         for (uint32_t b = 0; b < a; ++b)
@@ -84,7 +75,7 @@ uint64_t eits_fill_build(eits_context *ctx, const eits_scratch *scratch)
             add_row(ctx, i, row_of(ctx, f, i), -z[i], z);
         macs += (uint64_t)a * rank + triangle_macs(ctx);
     }
-    macs += eits_factor_products(ctx, EITS_LOST * EITS_LOST, f);
+    macs += eits_triangle_factor(ctx, EITS_LOST_PIVOT * EITS_LOST * EITS_LOST, f);
     ctx->whitening.form = eits_all_finite(f, EITS_PADDED_TRIANGLE(rank)) ? EITS_WHITENING_TRIANGLE
                                                                          : EITS_WHITENING_STORED;
     return macs;
@@ -93,31 +84,22 @@ uint64_t eits_fill_build(eits_context *ctx, const eits_scratch *scratch)
 uint64_t eits_fill_rows(eits_context *ctx, const eits_scratch *scratch, uint32_t given,
                         eits_real *y)
 {
-    const eits_real *l = ctx->whitening.metric;
-    eits_real *x = scratch->square;
+    eits_real *lower = ctx->whitening.metric, *x = scratch->square;
     const float *p = ctx->model->reduction.data;
     uint32_t count = 0;
     if (ctx->model->precision == NULL || ctx->whitening.form != EITS_WHITENING_TRIANGLE)
         return 0;
-    /* L x = R_mo d_o forward, then L'x back: the factor serves every frame until other rows are
-     * out. */
+    /* x = R_mm^-1 R_mo d_o. The factor serves every frame until other rows are left out. */
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         if (ctx->frame.sides[k] != 0)
             continue;
         eits_real sum = 0;
         for (uint32_t t = 0; t < given; ++t)
             sum = eits_fma(precision(ctx, k, scratch->index[t]), scratch->value[t], sum);
-        const eits_real *row = l + (size_t)count * (count + 1u) / 2u;
-        for (uint32_t b = 0; b < count; ++b)
-            sum = eits_fma(-row[b], x[b], sum);
-        x[count] = sum / row[count];
-        ++count;
+        x[count++] = sum;
     }
-    for (uint32_t a = count; a-- > 0;) {
-        x[a] /= l[(size_t)a * (a + 1u) / 2u + a];
-        for (uint32_t b = 0; b < a; ++b)
-            x[b] = eits_fma(-l[(size_t)a * (a + 1u) / 2u + b], x[a], x[b]);
-    }
+    eits_lower_solve(lower, count, x);
+    eits_lower_solve_transposed(lower, count, x);
     /* y takes what the rows left out are expected to say, each by its column of P. */
     uint32_t a = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {

@@ -73,31 +73,6 @@ static uint64_t sum_products(eits_context *ctx, const eits_scratch *scratch, uin
     return (by_missing ? missing : p->cols - missing) * triangle_macs(ctx);
 }
 
-/* N = R'R in N's place. The strong directions come first, so that what rounding leaves of a lost
- * one weighs little. What the padding has gathered goes.
- *
- * Cholesky by rows, each row taken from all below it at once: the inner loop is axpy over a
- * padded row, which every processor here does well, and needs no gathering. */
-uint64_t eits_factor_products(const eits_context *ctx, eits_real lost, eits_real *n)
-{
-    const uint32_t rank = ctx->model->rank;
-    uint64_t macs = 0;
-    for (uint32_t i = 0; i < rank; ++i) {
-        eits_real *r = row_of(ctx, n, i);
-        const eits_real left = r[i] > EITS_LOST_PIVOT * lost ? r[i] : EITS_LOST_PIVOT * lost,
-                        pivot = eits_sqrt(left), fraction = 1 / pivot;
-        eits_zero(r + first_of(i), i - first_of(i));
-        r[i] = pivot;
-        for (uint32_t j = i + 1; j < rank; ++j)
-            r[j] *= fraction;
-        for (uint32_t j = i + 1; j < rank; ++j) {
-            add_row(ctx, j, row_of(ctx, n, j), -r[j], r);
-            macs += rank - j;
-        }
-    }
-    return macs;
-}
-
 /* G G' = R diag(s^2) R' + regularisation I, from the last row up.
  *
  * G is upper triangular although G G' is asked for: from the last row up, each row needs only
@@ -154,26 +129,6 @@ static uint64_t finish_whitening(const eits_context *ctx, eits_real fraction, ei
     return macs;
 }
 
-/* v = T^-1 v; v = T'^-1 v. */
-static void solve(const eits_context *ctx, eits_real *triangle, eits_real *v)
-{
-    for (uint32_t i = ctx->model->rank; i-- > 0;) {
-        const eits_real *row = row_of(ctx, triangle, i), before = v[i];
-        /* zero while its row is summed: the dot runs over the diagonal as well */
-        v[i] = 0;
-        v[i] = (before - dot_of_row(ctx, i, row, v)) / row[i];
-    }
-}
-
-static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v)
-{
-    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
-        const eits_real *row = row_of(ctx, triangle, i), after = v[i] / row[i];
-        add_row(ctx, i, v, -after, row);
-        v[i] = after;
-    }
-}
-
 /* Noise in S'F'y, over that in S'y with all rows. White noise on the rows has the covariance
  * (G'G)^-1 in y; its mean square over S's columns is the trace of S'F' (G'G)^-1 F S, found by
  * EITS_NOISE_PROBES sign vectors that are orthogonal within each EITS_NOISE_PROBES directions. The
@@ -193,7 +148,7 @@ static uint64_t measure_noise(eits_context *ctx, const eits_scratch *scratch)
             v[i] = odd ? -size : size;
         }
         (void)eits_whiten(ctx, v);
-        solve_transposed(ctx, ctx->whitening.metric, v);
+        eits_triangle_solve_transposed(ctx, ctx->whitening.metric, v);
         sum += eits_dot(ctx->kernels, v, v, rank);
     }
     for (uint32_t i = 0; i < rank; ++i) {
@@ -249,7 +204,7 @@ static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
         EITS_STEP_MARGIN * ctx->whitening.s1_square * (1 + regularisation) / (1 + lost);
     eits_real *f = ctx->whitening.map, *g = ctx->whitening.metric;
     uint64_t macs = sum_products(ctx, scratch, missing, lost, f);
-    macs += eits_factor_products(ctx, lost, f);
+    macs += eits_triangle_factor(ctx, EITS_LOST_PIVOT * lost, f);
     macs += factor_metric(ctx, scratch, regularisation, f, g);
     macs += finish_whitening(ctx, eits_sqrt(ctx->whitening.square), g, f);
     ctx->whitening.form = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank))
@@ -300,14 +255,14 @@ uint64_t eits_whiten_data(eits_context *ctx, eits_real *v)
     if (ctx->whitening.form == EITS_WHITENING_DIAGONAL)
         return eits_whiten(ctx, v);
     if (!ctx->whitening.possible) { /* a taught model: the rows left out are filled in by now */
-        solve_transposed(ctx, ctx->whitening.map, v);
+        eits_triangle_solve_transposed(ctx, ctx->whitening.map, v);
         return triangle_macs(ctx);
     }
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         v[i] *= ctx->whitening.square * ctx->whitening.row_scale[i] * ctx->whitening.row_scale[i];
-    solve_transposed(ctx, ctx->whitening.map, v);
-    solve_transposed(ctx, ctx->whitening.metric, v);
-    solve(ctx, ctx->whitening.metric, v);
+    eits_triangle_solve_transposed(ctx, ctx->whitening.map, v);
+    eits_triangle_solve_transposed(ctx, ctx->whitening.metric, v);
+    eits_triangle_solve(ctx, ctx->whitening.metric, v);
     return 3u * triangle_macs(ctx);
 }
 
@@ -318,6 +273,6 @@ uint64_t eits_noise_direction(const eits_context *ctx, uint32_t k, eits_real *ou
     const uint32_t rank = ctx->model->rank;
     eits_zero(out, EITS_STRIDE(rank));
     out[k] = eits_sqrt(ctx->whitening.square) / ctx->whitening.s1;
-    solve(ctx, ctx->whitening.metric, out);
+    eits_triangle_solve(ctx, ctx->whitening.metric, out);
     return triangle_macs(ctx);
 }

@@ -20,9 +20,6 @@ void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch);
  * Returns the multiply-accumulates. */
 uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch);
 
-/* N = R'R in N's place, an upper triangle; pivots at least EITS_LOST_PIVOT * lost. */
-uint64_t eits_factor_products(const eits_context *ctx, eits_real lost, eits_real *n);
-
 /* ---- rows_out.c: taught models ---- */
 
 /* F for a taught model that lacks rows, at most `rank` of them. Uses scratch->index, row[3] and

@@ -3,7 +3,9 @@
  * A tracker's ids are right nearly always. What it cannot know is made good here: a touch that is
  * missed in a frame or comes back under another id is the same finger; one that appears beside
  * another, or much fainter, is doubtful until it has lasted a while. */
-#include "gesture/gesture.h"
+#include "gesture/one_finger.h"
+#include "gesture/plane.h"
+#include "gesture/two_fingers.h"
 
 enum { NOBODY = EITS_MAX_CONTACTS };
 
@@ -89,7 +91,7 @@ static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
     uint32_t found = NOBODY;
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         const eits_contact *c = &g->contact[k];
-        const eits_real apart = eits_apart(touch->x_mm - c->x_mm, touch->y_mm - c->y_mm);
+        const eits_real apart = eits_distance(touch->x_mm - c->x_mm, touch->y_mm - c->y_mm);
         /* one that let go has lifted; only the tracker may know better */
         const int lifted = c->state == CONTACT_LIFTED && (c->flags & CONTACT_GOING) != 0;
         if (!lifted && waits(g, c, touch) && apart <= nearest) {
@@ -155,7 +157,7 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
         c->start_y_mm = c->y_mm;
         return;
     }
-    const eits_real far = eits_apart(c->x_mm - c->start_x_mm, c->y_mm - c->start_y_mm);
+    const eits_real far = eits_distance(c->x_mm - c->start_x_mm, c->y_mm - c->start_y_mm);
     c->farthest_mm = eits_larger(far, c->farthest_mm);
 }
 
@@ -192,7 +194,7 @@ static void go_on(eits_gestures *g, eits_contact *c, const eits_touch *touch, ev
         (c->state == CONTACT_NEW && g->time_us - c->born_us >= wait_us))
         land(g, c, out);
     else if (c->state == CONTACT_DOWN &&
-             eits_apart(c->x_mm - c->told_x_mm, c->y_mm - c->told_y_mm) >= g->options.move_mm)
+             eits_distance(c->x_mm - c->told_x_mm, c->y_mm - c->told_y_mm) >= g->options.move_mm)
         tell_place(g, c, EITS_EVENT_MOVE, out);
 }
 
@@ -205,7 +207,7 @@ static int is_doubtful(const eits_gestures *g, const eits_touch *touch)
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         const eits_contact *c = &g->contact[k];
         if (c->state == CONTACT_DOWN &&
-            (eits_apart(touch->x_mm - c->x_mm, touch->y_mm - c->y_mm) < g->options.split_mm ||
+            (eits_distance(touch->x_mm - c->x_mm, touch->y_mm - c->y_mm) < g->options.split_mm ||
              strength < g->options.faint * c->strength))
             return 1;
     }
@@ -293,7 +295,7 @@ static int is_renamed(eits_gestures *g, eits_contact *c)
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         eits_contact *other = &g->contact[k];
         if (other->state != CONTACT_NEW || (other->flags & CONTACT_SEEN) == 0 ||
-            eits_apart(other->x_mm - c->x_mm, other->y_mm - c->y_mm) > g->options.rejoin_mm)
+            eits_distance(other->x_mm - c->x_mm, other->y_mm - c->y_mm) > g->options.rejoin_mm)
             continue;
         const eits_touch touch = {.id = other->touch_id,
                                   .x_mm = other->x_mm,

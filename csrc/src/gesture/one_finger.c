@@ -1,29 +1,7 @@
 /* Tap, double tap, hold, swipe: what a finger by itself did. */
-#include "gesture/gesture.h"
+#include "gesture/one_finger.h"
 
-/* atan of 0 to 1 by Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.47: within 1e-5
- * rad. The reference does the same in the same order. */
-static eits_real angle_of_slope(eits_real t)
-{
-    const eits_real s = t * t;
-    eits_real sum = R(0.0208351);
-    sum = R(-0.0851330) + sum * s;
-    sum = R(0.1801410) + sum * s;
-    sum = R(-0.3302995) + sum * s;
-    sum = R(0.9998660) + sum * s;
-    return sum * t * R(57.29577951308232);
-}
-
-/* No atan2 of the C library: its last bits differ from target to target. */
-eits_real eits_angle_deg(eits_real y, eits_real x)
-{
-    const eits_real high = eits_fabs(y), wide = eits_fabs(x);
-    if (high == 0 && wide == 0)
-        return 0;
-    eits_real angle = high <= wide ? angle_of_slope(high / wide) : 90 - angle_of_slope(wide / high);
-    angle = x < 0 ? 180 - angle : angle;
-    return y < 0 ? -angle : angle;
-}
+#include "gesture/plane.h"
 
 /* Where it landed: a finger that lifts pulls its place aside, and what was tapped is where it was
  * put. */
@@ -41,7 +19,7 @@ static eits_event event_at(const eits_gestures *g, const eits_contact *c, uint32
 static void tap(eits_gestures *g, eits_contact *c, event_list *out)
 {
     const int again = g->tapped && c->born_us - g->tap_us <= g->options.double_us &&
-                      eits_apart(c->start_x_mm - g->tap_x_mm, c->start_y_mm - g->tap_y_mm) <=
+                      eits_distance(c->start_x_mm - g->tap_x_mm, c->start_y_mm - g->tap_y_mm) <=
                           g->options.double_mm;
     eits_tell(out, event_at(g, c, again ? EITS_EVENT_DOUBLE_TAP : EITS_EVENT_TAP));
     c->flags |= CONTACT_TAPPED;
@@ -69,7 +47,7 @@ static eits_real last_speed(const eits_gestures *g, const eits_contact *c)
     /* one point, or two in one instant: no speed is known, and none is no swipe */
     if (span_us == 0)
         return 0;
-    return eits_apart(c->x_mm - c->trail_x_mm[at], c->y_mm - c->trail_y_mm[at]) /
+    return eits_distance(c->x_mm - c->trail_x_mm[at], c->y_mm - c->trail_y_mm[at]) /
            ((eits_real)span_us * R(1e-6));
 }
 
@@ -77,7 +55,7 @@ static eits_real last_speed(const eits_gestures *g, const eits_contact *c)
 static int is_swipe(const eits_gestures *g, eits_contact *c, eits_real dx, eits_real dy,
                     eits_real speed, event_list *out)
 {
-    const eits_real length = eits_apart(dx, dy), angle = eits_angle_deg(dy, dx);
+    const eits_real length = eits_distance(dx, dy), angle = eits_angle_deg(dy, dx);
     /* it has gone on for settle_us before it was told */
     const eits_real before = speed * (eits_real)g->options.settle_us * R(1e-6);
     if (length + before < g->options.swipe_mm || speed < g->options.swipe_mm_per_s ||
@@ -95,7 +73,7 @@ static int is_swipe(const eits_gestures *g, eits_contact *c, eits_real dx, eits_
 static void swipe(const eits_gestures *g, eits_contact *c, event_list *out)
 {
     const uint32_t last_us = c->trail_us[(c->trail_count - 1) % EITS_TRAIL];
-    const eits_real going_mm = eits_apart(c->seen_x_mm - c->x_mm, c->seen_y_mm - c->y_mm);
+    const eits_real going_mm = eits_distance(c->seen_x_mm - c->x_mm, c->seen_y_mm - c->y_mm);
     if (!is_swipe(g, c, c->x_mm - c->start_x_mm, c->y_mm - c->start_y_mm, last_speed(g, c), out) &&
         c->seen_us != last_us && c->seen_us - c->born_us <= g->options.tap_us)
         (void)is_swipe(g, c, c->seen_x_mm - c->start_x_mm, c->seen_y_mm - c->start_y_mm,
@@ -120,7 +98,7 @@ void eits_lifted(eits_gestures *g, eits_contact *c, event_list *out)
 {
     const uint32_t lasted_us = c->seen_us - c->born_us;
     const eits_real going_mm =
-        eits_apart(c->seen_x_mm - c->start_x_mm, c->seen_y_mm - c->start_y_mm);
+        eits_distance(c->seen_x_mm - c->start_x_mm, c->seen_y_mm - c->start_y_mm);
     if (is_outlived(g, c))
         return;
     if ((c->flags & (CONTACT_WITH | CONTACT_DONE | CONTACT_TAPPED)) == 0 &&

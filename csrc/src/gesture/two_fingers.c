@@ -2,7 +2,9 @@
  *
  * Both have moved when the distance between them has changed, or one has gone round the other: the
  * longer of the two ways says what it is. A pinch that opens again becomes a spread. */
-#include "gesture/gesture.h"
+#include "gesture/two_fingers.h"
+
+#include "gesture/plane.h"
 
 /* Down, seen now, and there for long enough to say where it landed. */
 static int is_settled(const eits_gestures *g, const eits_contact *c)
@@ -14,7 +16,7 @@ static int is_settled(const eits_gestures *g, const eits_contact *c)
 /* Between two fingers; never 0, for it divides. */
 static eits_real distance(eits_real dx_mm, eits_real dy_mm)
 {
-    const eits_real apart = eits_apart(dx_mm, dy_mm);
+    const eits_real apart = eits_distance(dx_mm, dy_mm);
     return apart > EITS_MIN_APART_MM ? apart : EITS_MIN_APART_MM;
 }
 

@@ -1,6 +1,7 @@
 /* Presses of zones: where each finger is, with a border that a finger at rest does not cross. */
 #include "eitskin/zone.h"
-#include "gesture/gesture.h"
+#include "gesture/contacts.h"
+#include "gesture/plane.h"
 
 /* Outside, if only just: a place on the border that is not inside may not have the distance 0,
  * which means inside. */
@@ -48,7 +49,7 @@ static eits_real distance_to_edge(const eits_real *from, const eits_real *to, ei
     eits_real part = square > 0 ? along / square : 0;
     /* beyond either end the end itself is nearest; a segment without length is its first point */
     part = part > 0 ? (part < 1 ? part : 1) : 0;
-    return eits_apart(x - (from[0] + part * ex), y - (from[1] + part * ey));
+    return eits_distance(x - (from[0] + part * ex), y - (from[1] + part * ey));
 }
 
 /* How far outside the polygon; 0 inside. A place on an edge that two polygons share is in one of
@@ -75,7 +76,7 @@ static eits_real outside(const eits_zone *z, eits_real x, eits_real y)
 {
     if (z->corners_mm != NULL)
         return outside_polygon(z, x, y);
-    const eits_real from = eits_apart(x - z->x_mm, y - z->y_mm);
+    const eits_real from = eits_distance(x - z->x_mm, y - z->y_mm);
     if (from >= z->outer_mm)
         return some(from - z->outer_mm);
     return from < z->inner_mm ? some(z->inner_mm - from) : 0;

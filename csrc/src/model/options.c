@@ -61,8 +61,21 @@ static int is_in_range(const eits_options *options, const eits_option *one)
     return eits_is_finite(value) && value >= one->least && value <= one->greatest;
 }
 
-/* Ranges are wide: they keep numbers finite and counts in range, and do not say what is
- * sensible. */
+/* The range of the option has a gap: 2 was coordinate descent, which this core no longer has. Its
+ * number stays reserved, so that no model and no host that still names it gets another solver. */
+static int is_solver(eits_solver solver)
+{
+    switch (solver) {
+    case EITS_SOLVER_FISTA:
+    case EITS_SOLVER_WORKING_SET:
+    case EITS_SOLVER_ACTIVE_SET:
+        return 1;
+    }
+    return 0;
+}
+
+/* The ranges are wide: they keep numbers finite and counts in range, and do not say which values
+ * are sensible. */
 int eits_options_in_range(const eits_options *o)
 {
     for (size_t k = 0; k < sizeof OPTIONS / sizeof OPTIONS[0]; ++k) {
@@ -70,6 +83,6 @@ int eits_options_in_range(const eits_options *o)
             return 0;
     }
     /* A fit starts from the seed and is kept between the other two: a seed outside would jump. */
-    return o->touch_min_radius_mm <= o->touch_seed_radius_mm &&
+    return is_solver(o->solver) && o->touch_min_radius_mm <= o->touch_seed_radius_mm &&
            o->touch_seed_radius_mm <= o->touch_max_radius_mm;
 }

@@ -21,8 +21,8 @@
  * Invariants: working[] with x[], sign[], pull[] are parallel lists, in no order of columns; the
  * factor's column k belongs to working[k]; an active coefficient never has the sign opposite to
  * sign[k]. Three flags end the rounds: limited (multiply-accumulates spent), loose (a column is
- * active that the factor lacks) and broken (a step that is no number). The latter two hand over to
- * coordinate descent, which needs no factor and starts from what was reached. */
+ * active that the factor lacks) and broken (a step that is not finite). After the latter two, FISTA
+ * continues from the coefficients reached, since it needs no factor. */
 #include "base/vec.h"
 #include "context/products.h"
 #include "frame/whitening.h"
@@ -173,7 +173,7 @@ static int round_of(eits_context *ctx, const eits_scratch *scratch, eits_active 
     return moved;
 }
 
-/* Rounds until something ends them; 0 where another solver has to go on.
+/* Rounds until something ends them. Returns 0 if the factor failed and FISTA has to continue.
  *
  * At the level of rounding the objective no longer falls though columns still seem to violate. The
  * first such round is repeated with the worst column alone, since several at once may undo each
@@ -198,7 +198,9 @@ static int rounds(eits_context *ctx, const eits_scratch *scratch, eits_active *a
             ctx->info.stop = EITS_STOP_OPTIMUM;
             return 1;
         }
-        const int moved = round_of(ctx, scratch, a, stalls > 0 ? missing != 0 : missing, c);
+        /* After a stall at most one column is added: the one with the greatest violation. */
+        const uint32_t added = stalls > 0 && missing > 1 ? 1 : missing;
+        const int moved = round_of(ctx, scratch, a, added, c);
         if (a->broken || (a->loose && !a->limited) ||
             !(c->objective <= before * (1 + EITS_MAX_RISE)))
             return 0;
@@ -252,11 +254,13 @@ void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_re
         eits_report_duality_gap(ctx, c);
         return;
     }
-    if (!eits_affords(ctx, eits_macs_to_finish(ctx, ctx->info.nonzeros + 1))) {
-        ctx->info.stop = EITS_STOP_MACS;
-        eits_report_duality_gap(ctx, ctx->info.nonzeros == 0 ? eits_duality_gap_at_zero(ctx, lambda)
-                                                             : c);
+    /* FISTA's first gradient, and the gap after it. */
+    const int affordable = eits_affords(ctx, 2 * eits_gradient_macs(ctx));
+    if (affordable && ctx->info.iterations < ctx->options.iterations) {
+        eits_run_fista(ctx, scratch, lambda, 0);
         return;
     }
-    eits_run_coordinate(ctx, scratch, lambda, 0);
+    ctx->info.stop = affordable ? EITS_STOP_ITERATIONS : EITS_STOP_MACS;
+    eits_report_duality_gap(ctx,
+                            ctx->info.nonzeros == 0 ? eits_duality_gap_at_zero(ctx, lambda) : c);
 }

@@ -25,10 +25,6 @@
  * several columns at once may undo each other, and no round with one alone is tried */
 #define EITS_MAX_STALLS 2
 
-/* a sweep of coordinate descent that is worth less is at rest [(EPSILON |y|)^2]. larger: ends
- * before the optimum; smaller: sweeps over rounding */
-#define EITS_REST_EPSILONS 64
-
 /* a rise by less is rounding, by more a step too long [of the objective]. larger: divergence is
  * found late; smaller: rounding halves the step */
 #define EITS_MAX_RISE R(0.001)
@@ -58,10 +54,6 @@
 #define EITS_LOOK_GROWTH 6
 
 /* ---- Chosen: by hand; not measured. Check: eitskin bench solve */
-
-/* a sweep of coordinate descent worth less ends in a look at every column [of the first sweep].
- * larger: looks too often; smaller: polishes a list that lacks columns */
-#define EITS_SETTLED R(0.001)
 
 /* what a look nearby must have won to be followed by another [of the objective]. larger: more looks
  * at every column; smaller: looks nearby for nothing */

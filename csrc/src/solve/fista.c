@@ -172,11 +172,13 @@ static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, e
     const eits_real ceiling = eits_ceiling(ctx);
     eits_real step = 1 / (eits_real)ctx->model->lipschitz, t = 1;
     eits_duality_gap c = {0};
-    int gap_known = 0; /* c is that of x as it is */
-    schedule looks = {.next_look = 1, .interval = o->gap_every};
+    int gap_known = 0; /* 1: c belongs to the present x */
+    /* The active set may have spent iterations before FISTA continues its solve. */
+    const uint32_t first = ctx->info.iterations + 1;
+    schedule looks = {.next_look = first, .interval = o->gap_every};
     restart_momentum(ctx);
     ctx->info.stop = EITS_STOP_ITERATIONS;
-    for (uint32_t k = 1; k <= o->iterations; ++k) {
+    for (uint32_t k = first; k <= o->iterations; ++k) {
         const int known = gradient_known && k == 1;
         if (!known && !affords_gradient(ctx, k, &looks))
             ctx->info.stop = EITS_STOP_MACS;

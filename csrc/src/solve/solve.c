@@ -93,9 +93,6 @@ static void run(eits_context *ctx, const eits_scratch *scratch, int gradient_kno
     case EITS_SOLVER_WORKING_SET:
         eits_run_fista(ctx, scratch, lambda, gradient_known);
         break;
-    case EITS_SOLVER_COORDINATE:
-        eits_run_coordinate(ctx, scratch, lambda, gradient_known);
-        break;
     case EITS_SOLVER_ACTIVE_SET:
         eits_run_active_set(ctx, scratch, lambda, gradient_known);
         break;

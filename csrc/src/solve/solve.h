@@ -14,21 +14,18 @@ void eits_answer_zero(eits_context *ctx, eits_stop why);
 
 /* ---- the solvers ----
  *
- * Each from solver.x and solver.sx (both zero, or a warm start's).
- * `gradient_known`: x is zero and solver.gradient holds S'y. Each leaves x, sx and how it went
- * in info; where stop is EITS_STOP_DIVERGED, x is of no use. */
+ * Each starts from solver.x and solver.sx = S x (both zero, or those of a warm start).
+ * `gradient_known`: x is zero and solver.gradient holds S'y. Each leaves its result in x and sx,
+ * and in info how it ended; if info.stop is EITS_STOP_DIVERGED, x is of no use. */
 
-/* FISTA on every column or on a working set, as the options say: until the count or the gap; a rise
- * of the objective above its start halves the step and starts over from zero. */
+/* FISTA on a working set if the options say so, else on every column: until the count or the gap.
+ * The iterations that info counts already are part of the count. If the objective rises above its
+ * value at zero, the step is halved and the solve starts over from zero. */
 void eits_run_fista(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
                     int gradient_known);
 
-/* Coordinate descent: sweeps until the count, the gap, or until nothing moves. */
-void eits_run_coordinate(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
-                         int gradient_known);
-
-/* Active set: rounds until the count, the gap, or until no column is missing; where its factor
- * breaks down, coordinate descent goes on from where it came to. */
+/* Active set: rounds until the count, the gap, or until no column is missing. If its factor breaks
+ * down, FISTA on every column continues from the coefficients reached, for the iterations left. */
 void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
                          int gradient_known);
 

@@ -24,6 +24,7 @@
  */
 #include "touch/disc_fit.h"
 
+#include "base/cholesky.h"
 #include "base/vec.h"
 #include "diagnostics/diagnostics.h"
 #include "kernels/kernels.h"
@@ -108,35 +109,22 @@ void eits_fit_undo(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
  * effect, gets no step instead of an infinite one. */
 static void damped_step(const eits_real h[4][4], const eits_real g[4], eits_real step[4])
 {
-    eits_real scale[4], l[4][4] = {{0}}, w[4];
-    for (int i = 0; i < 4; ++i)
+    eits_real scale[4], lower[EITS_LOWER_SIZE(4)];
+    for (uint32_t i = 0; i < 4; ++i)
         scale[i] = h[i][i] > 0 ? 1 / eits_sqrt(h[i][i]) : 0;
-    for (int i = 0; i < 4; ++i) {
-        for (int j = 0; j <= i; ++j) {
-            eits_real sum = i == j ? 1 + EITS_DAMPING : h[i][j] * scale[i] * scale[j];
-            for (int k = 0; k < j; ++k)
-                sum = eits_fma(-l[i][k], l[j][k], sum);
-            if (i == j)
-                l[i][i] = eits_sqrt(sum > EITS_DAMPING * EITS_DAMPING_PIVOT
-                                        ? sum
-                                        : EITS_DAMPING * EITS_DAMPING_PIVOT);
-            else
-                l[i][j] = sum / l[j][j];
-        }
+    for (uint32_t i = 0; i < 4; ++i) {
+        eits_real *row = eits_lower_row(lower, i);
+        for (uint32_t j = 0; j <= i; ++j)
+            row[j] = i == j ? 1 + EITS_DAMPING : h[i][j] * scale[i] * scale[j];
+        const eits_real pivot = eits_cholesky_row(lower, i);
+        row[i] = eits_sqrt(
+            pivot > EITS_DAMPING * EITS_DAMPING_PIVOT ? pivot : EITS_DAMPING * EITS_DAMPING_PIVOT);
+        step[i] = g[i] * scale[i];
     }
-    for (int i = 0; i < 4; ++i) {
-        eits_real sum = g[i] * scale[i];
-        for (int k = 0; k < i; ++k)
-            sum = eits_fma(-l[i][k], w[k], sum);
-        w[i] = sum / l[i][i];
-    }
-    for (int i = 3; i >= 0; --i) {
-        eits_real sum = w[i];
-        for (int k = i + 1; k < 4; ++k)
-            sum = eits_fma(-l[k][i], w[k], sum);
-        w[i] = sum / l[i][i];
-        step[i] = w[i] * scale[i];
-    }
+    eits_lower_solve(lower, 4, step);
+    eits_lower_solve_transposed(lower, 4, step);
+    for (uint32_t i = 0; i < 4; ++i)
+        step[i] *= scale[i];
 }
 
 eits_real eits_expected_radius(const eits_options *o, const eits_disc *disc)

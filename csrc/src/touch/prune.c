@@ -12,6 +12,7 @@
 #include "touch/constants.h"
 #include "touch/disc_fit.h"
 
+#include "base/cholesky.h"
 #include "base/vec.h"
 #include "frame/whitening.h"
 #include "kernels/column.h"
@@ -22,26 +23,22 @@
 void eits_fit_explain(eits_context *ctx, eits_fit *f)
 {
     const uint32_t rank = ctx->model->rank, n = f->count;
-    eits_real l[EITS_MAX_TOUCHES][EITS_MAX_TOUCHES] = {{0}}, norm[EITS_MAX_TOUCHES];
+    eits_real lower[EITS_LOWER_SIZE(EITS_MAX_TOUCHES)], norm[EITS_MAX_TOUCHES];
     for (uint32_t i = 0; i < n; ++i) {
+        eits_real *row = eits_lower_row(lower, i);
         norm[i] = eits_sqrt(eits_dot(ctx->kernels, eits_atom(ctx, i), eits_atom(ctx, i), rank));
-        for (uint32_t j = 0; j <= i; ++j) {
+        for (uint32_t j = 0; j < i; ++j) {
             const eits_real both = norm[i] * norm[j];
-            /* On a unit diagonal, lifted a little: two discs in one place are dependent, and would
-             * make the factor's last pivot zero or less. They then explain about nothing each, and
-             * one goes. */
-            eits_real sum = i == j ? 1 + EITS_GAIN_LIFT
-                                   : (both > 0 ? eits_dot(ctx->kernels, eits_atom(ctx, i),
-                                                          eits_atom(ctx, j), rank) /
-                                                     both
-                                               : 0);
-            for (uint32_t k = 0; k < j; ++k)
-                sum = eits_fma(-l[i][k], l[j][k], sum);
-            if (i == j)
-                l[i][i] = eits_sqrt(sum > EITS_GAIN_PIVOT ? sum : EITS_GAIN_PIVOT);
-            else
-                l[i][j] = sum / l[j][j];
+            row[j] = both > 0
+                         ? eits_dot(ctx->kernels, eits_atom(ctx, i), eits_atom(ctx, j), rank) / both
+                         : 0;
         }
+        /* On a unit diagonal, lifted a little: two discs in one place are dependent, and would make
+         * the factor's last pivot zero or less. They then explain about nothing each, and one goes.
+         */
+        row[i] = 1 + EITS_GAIN_LIFT;
+        const eits_real pivot = eits_cholesky_row(lower, i);
+        row[i] = eits_sqrt(pivot > EITS_GAIN_PIVOT ? pivot : EITS_GAIN_PIVOT);
     }
     /* Leaving k out lets the others take up what it explained, as far as they can: that is what the
      * inverse Gram matrix says, and a disc beside a stronger one is not credited with what both can
@@ -49,13 +46,10 @@ void eits_fit_explain(eits_context *ctx, eits_fit *f)
     f->macs += (uint64_t)n * (n + 1) / 2 * rank;
     for (uint32_t k = 0; k < n; ++k) { /* column k of L^-1; its squared norm is (G^-1)_kk */
         eits_real column[EITS_MAX_TOUCHES] = {0}, squared = 0;
-        for (uint32_t i = k; i < n; ++i) {
-            eits_real sum = i == k ? 1 : 0;
-            for (uint32_t j = k; j < i; ++j)
-                sum = eits_fma(-l[i][j], column[j], sum);
-            column[i] = sum / l[i][i];
+        column[k] = 1;
+        eits_lower_solve(lower, n, column);
+        for (uint32_t i = k; i < n; ++i)
             squared = eits_fma(column[i], column[i], squared);
-        }
         /* Over the squared norm of L^-1's column: what no other disc can take over. */
         const eits_real size = f->disc[k].change * norm[k];
         f->explained[k] = f->total > 0 ? size * size / (squared * f->total) : 0;

@@ -210,6 +210,15 @@ static void set_tracking(const fw_instrument *instrument, eits_options *options,
         (void)eits_options_track(options);
 }
 
+/* The numbers of eits_solver have a gap at 2, which is reserved; for it the reply states the
+ * greatest number that may be used. */
+static bool no_solver(fw_answer *out, uint32_t solver)
+{
+    const bool reserved = solver == EITS_SOLVER_WORKING_SET + 1u;
+    return outside(out, offsetof(eits_command_solver, solver), reserved ? UINT32_MAX : solver, 0,
+                   EITS_SOLVER_ACTIVE_SET);
+}
+
 static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_t size)
 {
     eits_command_solver c;
@@ -223,7 +232,7 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
         outside(&bad, offsetof(eits_command_solver, sign), c.sign, 0, EITS_SIGN_BOTH) ||
         fraction_outside(&bad, offsetof(eits_command_solver, lambda_rel), c.lambda_rel) ||
         fraction_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel) ||
-        outside(&bad, offsetof(eits_command_solver, solver), c.solver, 0, EITS_SOLVER_ACTIVE_SET) ||
+        no_solver(&bad, c.solver) ||
         outside(&bad, offsetof(eits_command_solver, diagnostics), c.diagnostics, 0,
                 EITS_DIAGNOSTICS_ALL) ||
         outside(&bad, offsetof(eits_command_solver, track), c.track, 0, 1))

@@ -107,7 +107,7 @@ def _numbers_of(step: TareStep | Play | Solve | Drives) -> tuple[str, AnyArray]:
 def _option_lines(options: Options) -> list[str]:
     """Reals with the digits that give a float32 again."""
     values = asdict(options)
-    values |= {name: known.index(values[name]) for name, known in CHOICES.items()}
+    values |= {name: known[values[name]] for name, known in CHOICES.items()}
     return [
         f"option {name} {int(value) if isinstance(value, bool) else f'{value:.10g}'}"
         for name, value in values.items()

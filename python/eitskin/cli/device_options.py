@@ -10,6 +10,7 @@ from eitskin.cli.printing import say
 from eitskin.config import nearest
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.core.gestures import Zone
+from eitskin.core.options_table import SOLVERS
 from eitskin.device.client import TARE_FRAMES, Device, check_tare_frames
 from eitskin.device.open import open_with_files
 from eitskin.device.settings import ScanSettings, SolverSettings
@@ -101,11 +102,10 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
 
 def add_solver(parser: Any) -> None:
     """Which solver, and what ends it."""
-    known = ("fista", "working-set", "coordinate", "active-set")
     option(
-        parser, "--solver", "default: the model's; all minimise the same objective", choices=known
+        parser, "--solver", "default: the model's; all minimise the same objective", choices=SOLVERS
     )
-    most = "of FISTA, sweeps or rounds, at most (default: the model's)"
+    most = "the most iterations of FISTA, or rounds of the active set (default: the model's)"
     option(parser, "--iterations N", most, within=(1, 1_000_000))
     gap = "stop once the duality gap is below this share of |y|^2 / 2"
     option(parser, "--gap REL", gap, float, within=(above(0), 1))

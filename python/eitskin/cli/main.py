@@ -15,7 +15,7 @@ from typing import NoReturn
 from eitskin import __version__
 from eitskin.cli.arguments import option, refuse_named_twice
 from eitskin.config import nearest
-from eitskin.errors import EitskinError, FileError, UsageError
+from eitskin.errors import EitskinError, FileError, UsageError, missing_checkout
 
 COMMANDS = {  # each with what it does
     "demo": "three simulated touches, reconstructed in C, beside the truth",
@@ -44,7 +44,8 @@ FIRST = "eitskin stream --device sim:swipe"
 INVALID_CHOICE = re.compile(  # as argparse words it, quoted before Python 3.12
     r"argument (?P<what>.*?): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)"
 )
-ENTRY_POINT_GROUP = "eitskin.commands"  # of other packages; eitskin-studies names its own there
+ENTRY_POINT_GROUP = "eitskin.commands"  # of other packages
+STUDIES = ("bench", "compare", "dataset", "draw", "study", "tradeoff")  # of eitskin-studies
 
 
 class Parser(argparse.ArgumentParser):
@@ -78,6 +79,8 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
     if only not in COMMANDS:
         for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: one.name):
             entry.load().add_parser(subparsers)
+    if only in STUDIES and only not in subparsers.choices:
+        raise missing_checkout(f"eitskin {only}", "firmware/emulator", "studies")
     return parser
 
 

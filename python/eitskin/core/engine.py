@@ -116,11 +116,11 @@ class CoreEngine:
     def set_options(self, options: Options) -> None:
         values = asdict(options)
         try:
-            values |= {name: known.index(values[name]) for name, known in CHOICES.items()}
+            values |= {name: known[values[name]] for name, known in CHOICES.items()}
             given = self._ffi.new(
                 "eits_options *", {name: _plain(value) for name, value in values.items()}
             )
-        except (ValueError, TypeError, OverflowError) as error:
+        except (KeyError, TypeError, OverflowError) as error:
             raise UsageError(f"options: {error}") from None
         self._check(self._lib.eits_set_options(self._context, given), "options", UsageError)
         self._saturation_v = float(options.saturation_v)

@@ -7,7 +7,7 @@ from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS
 # eits_sign: Which conductivity changes are looked for.
 SIGNS = ("increase", "decrease", "both")
 # eits_solver: How an image is found; each minimises the same objective (solve.h).
-SOLVERS = ("fista", "working-set", "coordinate", "active-set")
+SOLVERS = ("fista", "working-set", "active-set")
 # eits_touch_fit: Bits: what the touch fit does beyond fitting discs to the image's peaks.
 LOG_DATA = 1
 SPLIT_MERGE = 2
@@ -26,7 +26,7 @@ class OptionFields:
     iterations: int  # the most iterations; exactly so many where gap_rel is 0
     max_touches: int  # the most touches that are reported; the model's number by default
     max_masked: int  # the core rejects a frame with more unusable rows; half of the rows by default
-    solver: str  # fista, working-set, coordinate or active-set (solve.h)
+    solver: str  # fista, working-set or active-set (solve.h)
     # 1: ignore changes along the reference frame, that is drift of the gain; 0 by default in taught
     # models
     project_reference: bool
@@ -129,8 +129,11 @@ RANGES: dict[str, tuple[float, float]] = {
     "reference_frames": (0, 2**32 - 1),
     "noise_floor_v": (0, 1e30),
 }
-# The names that an option may have, in the order of their numbers.
-CHOICES = {"sign": SIGNS, "solver": SOLVERS}
+# The names that an option may have, and the numbers that stand for them.
+CHOICES: dict[str, dict[str, int]] = {
+    "sign": {"increase": 0, "decrease": 1, "both": 2},
+    "solver": {"fista": 0, "working-set": 1, "active-set": 3},
+}
 # What a model's own defaults say, by the same names.
 OF_MODEL = (
     "iterations",

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from eitskin.core.options_table import SIGNS, SOLVERS
+from eitskin.core.options_table import CHOICES
 from eitskin.core.results import Options, check_options
 from eitskin.device.exchange import ANSWER_S, CommandExchange, Streamed
 from eitskin.device.link import Noted
@@ -110,8 +110,8 @@ class Device(CommandExchange):
         self.command(
             commands.Solver(
                 options.iterations, options.max_touches, int(options.warm_start),
-                SIGNS.index(options.sign),
-                options.lambda_rel, options.gap_rel, SOLVERS.index(options.solver),
+                CHOICES["sign"][options.sign],
+                options.lambda_rel, options.gap_rel, CHOICES["solver"][options.solver],
                 options.mac_limit,
                 options.diagnostics, int(options.tracks),
             ),

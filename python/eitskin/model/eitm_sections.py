@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
+from eitskin.core.options_table import ALL_TOUCH_FIT, CHOICES
 from eitskin.errors import ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json
@@ -37,6 +37,8 @@ FIELDS_HEAD = struct.Struct("<2f8x")
 MIRROR_ROWS = 4
 FOLD_DTYPE = np.dtype([("first", "<u2"), ("second", "<u2"), ("sign", "<i2"), ("reserved", "<u2")])
 FOLD_NONE = 0xFFFF
+REMOVED_SOLVER = 2
+"""Coordinate descent, in models of earlier versions: the number stays reserved."""
 SCALED = ("i16", "i8")
 MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
 MAX_ITERATIONS = 100_000
@@ -105,7 +107,7 @@ def encode_sections(model: Model) -> Sections:
 
 def _encode_defaults(defaults: Defaults) -> bytes:
     return DEFAULTS.pack(
-        *astuple(defaults)[:-2], SOLVERS.index(defaults.solver), defaults.touch_fit_left_out
+        *astuple(defaults)[:-2], CHOICES["solver"][defaults.solver], defaults.touch_fit_left_out
     )
 
 
@@ -242,14 +244,20 @@ def _read_grid(content: bytes, d: _Dims, where: str) -> Grid:
     return Grid(d.nx, d.ny, d.pixel_mm, (d.origin_x_mm, d.origin_y_mm), index)
 
 
+def _solver_of(number: int, where: str) -> str:
+    """The name of a solver's number; files of format 1.0 have 0 there, FISTA."""
+    if number == REMOVED_SOLVER:
+        _refuse(where, "the solver coordinate descent, which eitskin no longer has")
+    names = {value: name for name, value in CHOICES["solver"].items()}
+    if number not in names:
+        _refuse(where, f"solver {number}, which this eitskin does not know")
+    return names[number]
+
+
 def _read_defaults(content: bytes, where: str) -> Defaults:
     names = [entry.name for entry in fields(Defaults)]
     values: dict[str, Any] = dict(zip(names, map(_short, DEFAULTS.unpack(content)), strict=False))
-    if values["solver"] >= len(SOLVERS):
-        _refuse(where, "a solver that this eitskin does not know")
-    d = Defaults(
-        **{**values, "solver": SOLVERS[values["solver"]]}
-    )  # files of 1.0 have 0 there: FISTA
+    d = Defaults(**{**values, "solver": _solver_of(values["solver"], where)})
     shares = (d.lambda_rel, d.mask_threshold, d.touch_threshold, d.touch_min_fraction)
     sizes = (
         d.lambda_noise_factor,

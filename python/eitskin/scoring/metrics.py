@@ -66,6 +66,19 @@ def disc_mask(
     return inside
 
 
+def pixel_cover(
+    grid: Grid, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike, samples: int = 16
+) -> FloatArray:
+    """The fraction of each pixel that discs cover, from ``samples`` squared points per pixel: (n,).
+    It is the perfect image of these discs: its MIoU is the best that the pixels allow."""
+    steps = ((np.arange(samples) + 0.5) / samples - 0.5) * grid.pixel_mm
+    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    points = (grid.centres_mm()[:, None, :] + offsets[None]).reshape(-1, 2)
+    return np.asarray(
+        disc_mask(points, centres_mm, radii_mm).reshape(grid.n_pixels, -1).mean(axis=1)
+    )
+
+
 def mask_on_points(
     points_mm: FloatArray, mask: npt.ArrayLike, box_mm: tuple[float, float, float, float]
 ) -> BoolArray:

@@ -24,11 +24,11 @@ from eitskin.model.eitm import decode_model, encode_model
 from eitskin.model.model import Model
 from eitskin.progress import Progress, silent
 from eitskin.scene.random_touches import TouchRules, random_touches
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.harness.bare_core import bare_calls
-from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, text_table
 

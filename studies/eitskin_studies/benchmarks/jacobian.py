@@ -22,13 +22,14 @@ import numpy.typing as npt
 
 from eitskin import __version__
 from eitskin.arrays import FloatArray
-from eitskin.errors import UsageError, missing_extra
+from eitskin.errors import UsageError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.fem.sensitivity import element_to_pixel, sensitivity
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
+from eitskin_studies.harness.extras import missing_studies_extra
 from eitskin_studies.harness.machine import machine
 
 ELEMENTS = (3000, 10000)
@@ -56,7 +57,7 @@ def run(
     if rounds < 1:
         raise UsageError(f"bench: {rounds} rounds; use at least 1")
     if importlib.util.find_spec("pyeit") is None:
-        raise missing_extra("peers", "pyeit")
+        raise missing_studies_extra("peers", "pyeit")
     skin, protocol = paper_skin(), adjacent(16)
     grid = grid_for(skin.outline)
     limit, threads = _one_thread()

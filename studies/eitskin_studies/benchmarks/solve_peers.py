@@ -70,7 +70,7 @@ def ours(problems: Problems) -> list[Candidate]:
     """The C core's solvers in both widths, cold, through cffi."""
     found = []
     for width in ("float32", "float64"):
-        for solver in ("active-set", "coordinate", "working-set", "fista"):
+        for solver in ("active-set", "working-set", "fista"):
             found.append(_ours(problems, solver, width))
         found.append(_ours_in_a_row(problems, width))
     return found

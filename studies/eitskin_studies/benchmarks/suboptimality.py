@@ -25,7 +25,6 @@ MIN = 1e-7
 STEPS: dict[str, tuple[dict[str, int], ...]] = {
     "fista": tuple({"iterations": n} for n in (10, 20, 30, 60, 120, 250, 500, 1000, 2500, 6000)),
     "working-set": tuple({"iterations": n} for n in (10, 20, 30, 60, 120, 250, 500, 1000, 6000)),
-    "coordinate": tuple({"iterations": n} for n in (2, 3, 5, 8, 15, 30, 60, 200, 1000)),
     "active-set": tuple(
         {"iterations": 1000, "mac_limit": n}
         for n in (150_000, 180_000, 220_000, 260_000, 320_000, 0)

@@ -7,10 +7,10 @@ from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.build import BuildSettings, make_model
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.families import Family, Setup
-from eitskin_studies.harness.discs import pixel_cover
 
 
 class CoreMethod:

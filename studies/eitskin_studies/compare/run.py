@@ -22,11 +22,11 @@ from eitskin.scene.simulate import ELEMENTS, Measurement, Simulated, simulate
 from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import GATE_MM, Matching
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin_studies.compare.families import Family, FindsTouches, Learns, Method, Setup, setup_for
 from eitskin_studies.compare.methods import methods
-from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.summary import Summary, summarise
 from eitskin_studies.harness.thresholds import (
     THRESHOLDS,

@@ -23,7 +23,7 @@ import numpy as np
 
 from eitskin.arrays import AnyArray
 from eitskin.config import load_toml
-from eitskin.errors import ConfigError, EitskinError, FileError, UsageError, missing_extra
+from eitskin.errors import ConfigError, EitskinError, FileError, UsageError
 from eitskin.fileio import parse_json, write_bytes
 from eitskin.frames.arrays import read_npz
 from eitskin.frames.frames import Frames
@@ -36,6 +36,7 @@ from eitskin.scene.truth import truth_of
 from eitskin.skin.protocol import table as protocol_of_rows
 from eitskin.skin.skin import skin_to_table
 from eitskin_studies.datasets.ranges import Ranges, drawn, ranges_of
+from eitskin_studies.harness.extras import missing_studies_extra
 
 FORMAT = "eitskin-dataset"
 VERSION = 1
@@ -299,7 +300,7 @@ def _over_dask(job: Job, chunks: list[int], scheduler: str) -> Iterator[tuple[in
     try:
         from dask.distributed import Client, as_completed
     except ImportError:
-        raise missing_extra("cluster", "dask[distributed]") from None
+        raise missing_studies_extra("cluster", "dask[distributed]") from None
     try:
         client = Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:

@@ -1,13 +1,7 @@
-"""Equal discs at least so far apart, and the perfect image of discs on pixels."""
+"""Equal discs at least so far apart."""
 
-import numpy as np
-import numpy.typing as npt
-
-from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
-from eitskin.fem.grid import Grid
 from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
-from eitskin.scoring.metrics import disc_mask
 from eitskin.skin.outline import Outline
 
 
@@ -42,16 +36,3 @@ def spaced_touches(
         rim_margin_mm,
     )
     return random_touches(outline, seed, count, f"{touches} at {spacing_radii:g} radii", rules)
-
-
-def pixel_cover(
-    grid: Grid, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike, samples: int = 16
-) -> FloatArray:
-    """The part of each pixel that discs cover, from ``samples`` squared points a pixel: (n,). A
-    perfect pixel image."""
-    steps = ((np.arange(samples) + 0.5) / samples - 0.5) * grid.pixel_mm
-    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    points = (grid.centres_mm()[:, None, :] + offsets[None]).reshape(-1, 2)
-    return np.asarray(
-        disc_mask(points, centres_mm, radii_mm).reshape(grid.n_pixels, -1).mean(axis=1)
-    )

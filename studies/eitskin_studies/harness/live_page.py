@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from eitskin.errors import DeviceError, missing_extra
+from eitskin.errors import DeviceError
+from eitskin_studies.harness.extras import missing_studies_extra
 
 DRIVER = "/usr/bin/chromedriver"
 FLAGS = (
@@ -26,7 +27,7 @@ def need_browser() -> None:
     try:
         import selenium  # noqa: F401
     except ImportError:
-        raise missing_extra("test", "selenium") from None
+        raise missing_studies_extra("browser", "selenium") from None
 
 
 @contextmanager

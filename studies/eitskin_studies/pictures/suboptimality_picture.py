@@ -9,13 +9,11 @@ from eitskin_studies.benchmarks.suboptimality import MIN, GapCurves
 COLOURS = {
     "fista": "#777777",
     "working-set": "#1f6fb2",
-    "coordinate": "#d1761d",
     "active-set": "#2a8a3f",
 }
 NAMES = {
     "fista": "FISTA, iterations",
     "working-set": "FISTA on a working set, iterations",
-    "coordinate": "coordinate descent, sweeps",
     "active-set": "active set, kMAC at most",
 }
 
@@ -45,7 +43,7 @@ def draw(path: Path, curves: GapCurves) -> None:
                 if solver == "active-set" and stop.effort
                 else f"{stop.effort or 'optimum'}"
             )
-            below = solver == "coordinate" or (solver == "active-set" and number % 2)
+            below = solver == "active-set" and number % 2
             axes.annotate(
                 label, (x[number], y[number]), color=colour, fontsize=7,
                 xytext=(0, -10 if below else 5),

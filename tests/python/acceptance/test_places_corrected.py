@@ -9,7 +9,7 @@ import pytest
 from eitskin.model.model import Model
 from eitskin.scoring.matching import match
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
+from other_worlds import WorldFactory, WorldScenes
 from small_models import prebuilt
 
 SCENES, SEED = 8, 5

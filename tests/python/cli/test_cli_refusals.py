@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eitm_bytes import sealed, sections_of
-from eitskin.cli.main import COMMANDS, build_parser, main
+from eitskin.cli.main import COMMANDS, STUDIES, build_parser, main
 from eitskin.skin.protocol import opposite
 from fresh_python import MAIN, run_python, without
 from small_models import prebuilt, session, small_blob
@@ -50,6 +50,15 @@ def test_every_command_has_help(command, capsys):
     assert end.value.code == 0
     assert f"usage: eitskin {command}" in capsys.readouterr().out
     assert command in build_parser().format_help()
+
+
+@pytest.mark.parametrize("command", STUDIES)
+def test_a_command_of_the_studies_says_where_they_are(command, refused, monkeypatch):
+    monkeypatch.setattr("eitskin.cli.main.entry_points", lambda group: [])
+    assert refused(EXTRA, f"{command} --help") == (
+        f"eitskin {command} comes with eitskin's sources alone: run there"
+        "  pip install ./firmware/emulator ./studies"
+    )
 
 
 def test_version(capsys):
@@ -386,8 +395,6 @@ def test_options_of_the_demo(arguments, refused, tmp_path):
     [
         ("scipy", "model", ["model", "build", "--paper", "-o", "OUT"]),
         ("netgen", "model", ["model", "build", "--paper", "-o", "OUT"]),
-        ("netgen", "model", ["compare", "--scenes", "2", "--train", "2", "--csv", "OUT"]),
-        ("matplotlib", "plot", ["compare", "--scenes", "2", "--train", "2", "--picture", "PNG"]),
         ("matplotlib", "plot", ["reconstruct", "FRAMES", "-o", "OUT", "--picture", "PNG"]),
         ("matplotlib", "plot", ["demo", "--picture", "PNG"]),
         ("netgen", "model", ["demo", "--picture", "PNG"]),

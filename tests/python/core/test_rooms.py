@@ -3,7 +3,7 @@ writes."""
 
 import re
 from collections import Counter
-from graphlib import TopologicalSorter
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -99,6 +99,42 @@ def test_no_circle_of_files(folder, read):
         edges.setdefault(name, set()).update(others - {name})
     TopologicalSorter(edges).prepare()  # which raises CycleError, with the circle
     assert read[1] in edges[read[0]]
+
+
+def uses(texts: dict[str, str]) -> dict[str, set[str]]:
+    """For each source the other sources whose functions it names; a header belongs to none."""
+    bare = {name: re.sub(r"/\*.*?\*/", "", text, flags=re.S) for name, text in texts.items()}
+    defined = re.compile(r"^(?!static|typedef)\w[\w *]*?\b(\w+)\([^;{}]*\)\s*\{", re.M)
+    owner = {one: name for name, text in bare.items() for one in defined.findall(text)}
+    return {
+        name: {owner[word] for word in re.findall(r"\w+", text) if word in owner} - {name}
+        for name, text in bare.items()
+    }
+
+
+def sources(folder: Path) -> dict[str, str]:
+    return {
+        str(path.relative_to(folder)): path.read_text(encoding="ascii")
+        for path in sorted(folder.rglob("*.c"))
+        if "kernels" not in path.parts  # the same functions once for each processor
+    }
+
+
+def test_no_circle_of_calls():
+    """Files may call each other in a circle although their includes have none: where one header
+    declares the functions of several files."""
+    edges = uses(sources(CSRC / "src"))
+    TopologicalSorter(edges).prepare()
+    assert "frame/rows_out.c" in edges["frame/whitening.c"]
+    assert "gesture/one_finger.c" in edges["gesture/gesture.c"]
+
+
+def test_a_circle_of_calls_is_found():
+    edges = uses(
+        {"a.c": "void one(void)\n{\n    two();\n}\n", "b.c": "int two(int x)\n{\n    one();\n}\n"}
+    )
+    with pytest.raises(CycleError):
+        TopologicalSorter(edges).prepare()
 
 
 @pytest.mark.parametrize(("room", "below"), FIRMWARE.items())

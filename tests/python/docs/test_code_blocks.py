@@ -25,7 +25,6 @@ PAGES = (
     "docs/guide/your-board.md",
     "docs/reference/python-api.md",
     "docs/reference/frames-format.md",
-    "studies/results/tradeoff.md",
 )
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SET_UP = {"scripts/demo", "scripts/test"}
@@ -38,6 +37,7 @@ def blocks(page: str) -> list[tuple[str, str]]:
 @pytest.mark.parametrize("page", PAGES)
 def test_blocks_run(page, tmp_path):
     ran = 0
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for language, text in blocks(page):
         set_up = SET_UP & set(text.split("\n"))
@@ -62,6 +62,22 @@ def test_pages_link_to_files_that_exist():
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
             there = "://" in target or (page.parent / target).exists()
             assert there, f"{page.relative_to(ROOT)} links to {target}, which is not there"
+
+
+def test_pages_reach_the_studies_through_one_page():
+    """The README and the docs link to studies/results/README.md, at a place that it has; only
+    pictures are shown from beside it."""
+    results = ROOT / "studies" / "results"
+    places = re.findall(r'<a id="([\w-]+)">', (results / "README.md").read_text(encoding="utf-8"))
+    for page in [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]:
+        for target in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+            name, _, place = target.partition("#")
+            file = (page.parent / name).resolve()
+            if "://" in target or ROOT / "studies" not in file.parents or file.suffix == ".png":
+                continue
+            at = f"{page.relative_to(ROOT)} links to {target}"
+            assert file == results / "README.md", f"{at}; link to studies/results/README.md"
+            assert not place or place in places, f"{at}; no such place"
 
 
 def test_paths_that_pages_name_exist():

@@ -9,7 +9,7 @@ from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin_emulator.core_on_qemu import PROGRAM, EmulatedRun, run_steps
 from eitskin_emulator.core_steps import Choose, Drives, Load, TareStep
-from eitskin_studies.experiments.fast_path.scans import ROW_S, STEP, order
+from scans_in_time import ROW_S, STEP, order
 
 # one finger, then none, then two at once, light ones that are long in doubt
 SCENES = {"quiet": (0, 0), "one": (0, 1, 1, 1, 0, 0), "two": (0, 2, 2, 2), "light": (0, 2, 2, 2)}

@@ -1,5 +1,5 @@
-"""studies/results/hard-cases.md: what the catalogue is, and its pictures. ``scripts/hard-cases`` runs
-it and makes the page."""
+"""studies/results/hard-cases.md: what the catalogue is, and its pictures. ``scripts/hard-cases``
+runs it and makes the page."""
 
 import sys
 from pathlib import Path

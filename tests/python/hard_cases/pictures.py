@@ -12,11 +12,9 @@ from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_st
 from touch_scenes import frames_of, groups
 
 from eitskin.model.options import default_options
-from eitskin.scene.random_touches import TouchScene
 from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
 from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
-from eitskin_studies.pictures.comparison_pictures import truth_marks
 from everywhere import on_host
 from small_models import prebuilt
 
@@ -43,7 +41,11 @@ def panel(group: str, which: int, sign: str, title: str) -> Panel:
     frames = frames_of(group)[which : which + 1]
     tare = TareStep(touch_scenes.simulated().quiet_v)
     _, (one,) = on_host([Load(blob), Choose(options), tare, Play(frames)])
-    truth = truth_marks(TouchScene(title, groups()[group][which]), model.skin.conductivity_s_per_m)
+    sheet = model.skin.conductivity_s_per_m
+    truth = tuple(
+        Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1.0) * sheet)
+        for t in groups()[group][which]
+    )
     found = tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in one.touches)
     said = f"{len(found)} touch{'' if len(found) == 1 else 'es'} found"
     return Panel(f"{title}\n{said}", one.image, truth, found)

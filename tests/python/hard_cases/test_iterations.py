@@ -48,7 +48,7 @@ def check_rate(margins: Margins, name: str, best: Judged, k: int, point: Judged)
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_iterations(same_everywhere, margins, solver):
-    """Coordinate descent and active set never raise the objective but for rounding. FISTA may
+    """The active set never raises the objective except by rounding. FISTA may
     ripple; it stays within its rate, and so does the working set, whose columns left out are looked
     after."""
     steps: list[Step] = []

@@ -22,8 +22,8 @@ PROBLEMS = {"gaussian": gaussian(31), "smooth": smooth(32), "whitened": whitened
 def test_step_too_long(same_everywhere, margins, solver, iterations):
     """Up to 2^8 times too long, the halvings leave most of 300 iterations: at least 99 % of what
     the objective can lose is lost. Where the step cannot be brought down, or there is no time, the
-    image is zero and the stop is "diverged". Coordinate descent and active set take no step from
-    the constant."""
+    image is zero and the stop is "diverged". The active set takes no step
+    from the constant."""
     within, steps = margins.of(CASE), []
     what = list(product(PROBLEMS, FACTORS, SIGNS))
     for name, factor, sign in what:

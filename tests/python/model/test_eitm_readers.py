@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from two_readers import accepts, agreed
 
 from eitm_bytes import ENTRY_SIZE, entry_place, patched, sealed, sections_of
-from eitskin.core.options_table import SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.reconstructor import Reconstructor
@@ -277,5 +276,9 @@ def test_both_take_a_file_of_format_1_0_as_fista():
         reconstructor.tare(model.golden.reference_v)
         macs[solver] = reconstructor.reconstruct(model.golden.frame_v).info.macs
     assert macs[None] == macs["fista"] > macs["working-set"]
-    blob[place] = len(SOLVERS)
-    assert not agreed(sealed(blob), "solver 4")
+    for number in (2, 4):
+        blob[place] = number
+        assert not agreed(sealed(blob), f"solver {number}")
+    blob[place] = 2
+    with pytest.raises(ModelError, match="coordinate descent, which eitskin no longer has"):
+        decode_model(sealed(blob), "x")

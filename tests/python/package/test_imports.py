@@ -132,3 +132,30 @@ def test_the_installed_package_imports_two_things_that_only_a_checkout_has():
 def test_of_a_checkouts_packages_only_the_studies_import_another(package):
     others = {name for other in CHECKOUT if other != package for name in modules(other)}
     assert not any(imported(path, others) for path in modules(package).values())
+
+
+def packages_imported(folder: Path) -> dict[str, set[str]]:
+    """Of each file in ``folder``, the packages and single modules that it imports."""
+    found = {}
+    for path in folder.rglob("*.py"):
+        names = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names.add(node.module.partition(".")[0])
+            elif isinstance(node, ast.Import):
+                names |= {alias.name.partition(".")[0] for alias in node.names}
+        found[path.relative_to(ROOT).as_posix()] = names
+    return found
+
+
+@pytest.mark.parametrize("folder", ["python", "firmware", "tests", "tables"])
+def test_the_product_and_its_tests_import_nothing_of_the_studies(folder):
+    files = packages_imported(ROOT / folder)
+    assert files and [name for name, used in files.items() if "eitskin_studies" in used] == []
+
+
+def test_the_studies_import_nothing_of_the_products_tests():
+    ours = {path.stem for path in (ROOT / "tests").rglob("*.py")}
+    ours -= {path.stem for path in (ROOT / "studies" / "tests").glob("*.py")}
+    assert {name: used & ours for name, used in packages_imported(ROOT / "studies").items()
+            if used & ours} == {}  # fmt: skip

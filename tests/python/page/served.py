@@ -13,9 +13,12 @@ from selenium.webdriver.chrome.service import Service
 from eitskin.device.wire.link_table import Stream
 from eitskin.live.settings import SessionSettings
 from eitskin.page.server import PageServer, listen
-from eitskin_studies.harness.live_page import FLAGS
 
 TOKEN = "a word for tests"
+FLAGS = (
+    "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run"
+    " --disable-background-networking --disable-component-update --disable-sync"
+)
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 

@@ -10,11 +10,11 @@ from eitskin.model.build import BuildSettings, make_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.model.reduction import fold_rows
+from eitskin.scoring.metrics import pixel_cover
 from eitskin_reference.disc_fit import Disc, Fit, Reduced, damped_step
 from eitskin_reference.engine import ReferenceEngine
 from eitskin_reference.fista import fista
 from eitskin_reference.problem import greatest, project, shrink
-from eitskin_studies.harness.discs import pixel_cover
 from small_models import DATA_KINDS, SIGNS, prebuilt, small, small_model
 
 GENERATOR = np.random.default_rng(41)

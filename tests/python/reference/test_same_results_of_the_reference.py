@@ -140,7 +140,6 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "usual": {},
     "fista": {"solver": "fista", "iterations": 30},
     "fista to a gap": {"solver": "fista", "iterations": 2000, "gap_rel": 1e-5, "gap_every": 3},
-    "coordinate": {"solver": "coordinate", "iterations": 60},
     "active set": {"solver": "active-set", "iterations": 60},
     "working set": {"solver": "working-set", "iterations": 40},
     "both signs": {"sign": "both", "iterations": 30},

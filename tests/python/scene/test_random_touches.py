@@ -7,9 +7,9 @@ from eitskin.errors import GeometryError, UsageError
 from eitskin.scene.random_touches import TouchRules, TouchScene, random_touches, rim_distance_mm
 from eitskin.scene.streams import stream
 from eitskin.skin.outline import disk, polygon
-from eitskin_studies.harness.discs import spaced_touches
 
 PAPER = disk(194.0)
+FIVE = TouchRules((5, 5), (9.0, 9.0))
 ELL = polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)])
 
 
@@ -66,21 +66,10 @@ def test_places_are_uniform_over_the_skin():
     assert np.abs(xy.mean(axis=0)).max() < 6
 
 
-def test_spaced_touches_have_the_count_and_the_spacing():
-    drawn = spaced_touches(PAPER, 3, 8, touches=7, spacing_radii=4.0)
-    assert drawn.name == "7 at 4 radii-s3-n8"
-    for scene in drawn.scenes:
-        xy = scene.centres_mm()
-        gaps = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))[np.triu_indices(7, 1)]
-        assert len(xy) == 7 and gaps.min() >= 36.0
-        assert {(t.radius_mm, t.contrast) for t in scene.touches} == {(9.0, 5.0)}
-
-
 @pytest.mark.parametrize(
     ("make", "error", "said"),
     [
-        (lambda: spaced_touches(disk(40.0), 0, 1, touches=5), GeometryError, "do not fit"),
-        (lambda: spaced_touches(PAPER, 0, 1, touches=2, spacing_radii=1.5), UsageError, "overlap"),
+        (lambda: random_touches(disk(40.0), 0, 1, rules=FIVE), GeometryError, "do not fit"),
         (lambda: random_touches(PAPER, 0, 0), UsageError, "at least 1 scene"),
         (lambda: TouchRules(radius_mm=(12.0, 6.0)), UsageError, "radius_mm"),
         (lambda: TouchRules(shape="fist"), UsageError, "shape 'fist'"),

@@ -1,4 +1,4 @@
-"""Touches out of images: components, centroids, their threshold."""
+"""Touches out of images: components, centroids."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import pytest
 from eitskin.fem.grid import grid_for
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.skin.outline import polygon
-from eitskin_studies.harness.thresholds import best_touch_threshold
 
 GRID = grid_for(polygon([(0, 0), (80, 0), (80, 80), (0, 80)]), 8)
 XY = GRID.centres_mm()
@@ -37,9 +36,3 @@ def test_threshold_drops_the_weak_and_the_sign_is_obeyed():
         np.array([[35.0, 75.0]])
     )
     assert touches_in_image(np.zeros(64), GRID.index, XY, 0.5).shape == (0, 2)
-
-
-def test_best_threshold_counts_most_scenes_exactly():
-    images = np.stack([image((1, 1, 1.0), (5, 5, 0.5)), image((2, 2, 1.0), (6, 6, 0.2))])
-    truths = [np.array([[15.0, 15.0], [55.0, 55.0]]), np.array([[25.0, 25.0]])]
-    assert best_touch_threshold(images, truths, GRID.index, XY, (0.1, 0.3, 0.4, 0.6)) == 0.3

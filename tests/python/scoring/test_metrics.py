@@ -1,4 +1,4 @@
-"""MIoU by hand, by masks and by counts; the curve over the threshold and its best value."""
+"""MIoU by hand and by masks; rasters, lookups, and the perfect image of discs."""
 
 import math
 
@@ -9,8 +9,6 @@ from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.scoring import metrics
 from eitskin.skin.outline import disk, polygon
-from eitskin_studies.harness.discs import pixel_cover
-from eitskin_studies.harness.thresholds import THRESHOLDS, best_threshold, miou_curves
 
 SQUARE = polygon([(0, 0), (30, 0), (30, 30), (0, 30)])
 
@@ -111,81 +109,8 @@ def test_touch_mask_is_strict_and_signed():
     assert not metrics.touch_mask(-np.ones(4), 0.0).any()
 
 
-@pytest.mark.parametrize("lookup", metrics.LOOKUPS)
-def test_curves_equal_masks_on_the_raster(lookup):
-    outline = disk(60.0)
-    grid = grid_for(outline, 12)
-    image_scorer = metrics.judge_for(outline, grid, 1.0, lookup)
-    generator = np.random.default_rng(5)
-    images = generator.normal(size=(7, grid.n_pixels))
-    images[5] = -np.abs(images[5])
-    images[6] = 0.0
-    centres = generator.uniform(-20, 20, size=(7, 2))
-    points = image_scorer.raster.points_mm
-    truths = np.stack([metrics.disc_mask(points, [c], [6.0]) for c in centres])
-    truths[4] = False
-    thresholds = [0.0, 0.3, 0.8, 1.0]
-    for sign in (1, -1):
-        curves = miou_curves(image_scorer, images, truths, thresholds, sign)
-        for k in range(7):
-            top = (sign * images[k]).max()
-            for j, t in enumerate(thresholds):
-                shown = (sign * image_scorer.lookup.show(images[k]) > t * top) & (top > 0)
-                assert curves[k, j] == pytest.approx(metrics.miou(shown, truths[k]), abs=1e-12)
-
-
-def test_nearest_curve_is_the_pixel_mask_spread_over_cells():
-    grid = grid_for(SQUARE, 6)
-    image_scorer = metrics.judge_for(SQUARE, grid, 1.0, "nearest")
-    image = np.random.default_rng(2).uniform(size=36)
-    truth = metrics.disc_mask(image_scorer.raster.points_mm, [[12, 17]], [6])
-    mask = metrics.touch_mask(image, 0.6)[image_scorer.lookup.pixel[:, 0]]
-    found = miou_curves(image_scorer, image[None], truth[None], [0.6])[0, 0]
-    assert found == pytest.approx(metrics.miou(mask, truth))
-
-
 def test_pixel_cover_is_exact_in_area():
     grid = grid_for(disk(194.0))
-    part = pixel_cover(grid, [[-40, 11], [20, 30]], [9, 7])
+    part = metrics.pixel_cover(grid, [[-40, 11], [20, 30]], [9, 7])
     assert part.sum() * grid.pixel_area_mm2 == pytest.approx(math.pi * (81 + 49), rel=5e-3)
     assert part.min() == 0 and part.max() == 1
-
-
-def test_a_perfect_image_is_limited_by_its_pixels_only():
-    """The ceiling that a 32-pixel image has, and none where pixels are cells."""
-    outline = disk(194.0)
-    grid = grid_for(outline)
-    raster = metrics.raster_inside(outline)
-    discs = [([[x, y]], [9.0]) for x in (-40.0, 3.0, 33.0) for y in (-21.0, 11.0)]
-    truths = np.stack([metrics.disc_mask(raster.points_mm, *d) for d in discs])
-    perfect = np.stack([pixel_cover(grid, *d) for d in discs])
-    score = {}
-    for kind in metrics.LOOKUPS:
-        curves = miou_curves(metrics.judge_for(outline, grid, lookup=kind), perfect, truths)
-        score[kind] = curves.mean(axis=0).max()
-    assert 0.83 < score["nearest"] < 0.90
-    assert 0.95 < score["bilinear"] < 0.99
-    fine = grid_for(SQUARE, 20)
-    image_scorer = metrics.judge_for(SQUARE, fine, lookup="nearest")
-    truth = metrics.disc_mask(image_scorer.raster.points_mm, [[12, 17]], [6])[None]
-    assert miou_curves(image_scorer, truth.astype(float), truth, [0.5])[0, 0] == 1.0
-
-
-def test_curves_refuse_what_they_cannot_judge():
-    image_scorer = metrics.judge_for(SQUARE, grid_for(SQUARE, 6))
-    truths = np.zeros((2, len(image_scorer.raster.points_mm)), dtype=bool)
-    broken = np.zeros((2, 36))
-    broken[1, 3] = np.nan
-    for images, thresholds, said in (
-        (np.zeros((2, 35)), [0.5], r"\(2, 36\)"),
-        (np.zeros((2, 36)), [0.5, 0.4], "ascend"),
-        (broken, [0.5], "image 1"),
-    ):
-        with pytest.raises(UsageError, match=said):
-            miou_curves(image_scorer, images, truths, thresholds)
-
-
-def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals():
-    curves = np.array([[0.2, 0.9, 0.5, 0.5], [0.2, 0.1, 0.6, 0.6]])
-    assert best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
-    assert (THRESHOLDS[0], THRESHOLDS[-1], len(THRESHOLDS)) == (0.02, 0.98, 49)

@@ -11,9 +11,9 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.scoring.score import FrameScore, Scorer, scorer_for
 from eitskin.skin.protocol import adjacent
-from eitskin_studies.harness.discs import pixel_cover
 from small_models import prebuilt, small_model
 
 INFO = Info(60, "iterations", 0, 0, 0, 0, 0, 0, *[0.0] * 7)

@@ -1,7 +1,6 @@
 """Outlines and electrodes out of SVG and DXF files: sizes, sides, transforms, and a refusal of one
 line for the rest."""
 
-import io
 import math
 import sys
 from pathlib import Path
@@ -18,14 +17,6 @@ from eitskin.skin.drawing_shapes import DrawingReading
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import Skin, load_skin, skin_from_table, skin_to_table
-from eitskin_studies.experiments.shapes.example_drawings import (
-    forearm_corners,
-    hand_corners,
-    hand_places_mm,
-    hand_svg,
-    write_drawings,
-)
-from eitskin_studies.experiments.shapes.rounded import Corner, as_outline
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" {} >{}</svg>'
@@ -302,35 +293,9 @@ def test_an_absent_library_is_named(monkeypatch, tmp_path, name, library):
         read_drawing(path, DrawingReading())
 
 
-def test_examples_are_what_the_script_draws(tmp_path):
-    write_drawings(tmp_path)
-    assert (tmp_path / "hand.svg").read_text() == (EXAMPLES / "hand.svg").read_text() == hand_svg()
-    drawn, kept = (outline(folder / "forearm.dxf", "skin") for folder in (tmp_path, EXAMPLES))
-    np.testing.assert_allclose(drawn.vertices_mm, kept.vertices_mm, atol=1e-9)
-
-
-def test_drawings_give_the_shapes_that_they_were_drawn_from():
-    for name, corners in (("hand", hand_corners()), ("forearm", forearm_corners())):
-        skin, _ = load_skin(EXAMPLES / f"{name}.toml")
-        assert skin.outline.area_mm2 == pytest.approx(as_outline(corners).area_mm2, rel=1e-3)
-        if name == "hand":
-            np.testing.assert_allclose(skin.electrode_centres_mm(), hand_places_mm(), atol=0.3)
-    with pytest.raises(GeometryError, match="the side after corner 0"):
-        as_outline([Corner(0, 0, 9), Corner(10, 0, 9), Corner(10, 10, 9), Corner(0, 10, 9)])
-
-
 def test_a_model_does_not_need_the_drawing(tmp_path):
     skin = described(tmp_path, BOX)
     settings = BuildSettings(rank=5, pixels_across=8, elements=300, samples=0)
     model = build_model(skin, adjacent(8), settings)
     (tmp_path / "a.svg").unlink()
     assert decode_model(encode_model(model), "model").skin == skin
-
-
-def test_dxf_bytes_are_the_same_in_two_runs(tmp_path):
-    texts = []
-    for _ in range(2):
-        write_drawings(tmp_path)
-        texts.append((tmp_path / "forearm.dxf").read_bytes())
-    assert texts[0] == texts[1]
-    assert ezdxf.read(io.StringIO(texts[0].decode())).modelspace()

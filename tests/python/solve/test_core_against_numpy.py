@@ -19,7 +19,7 @@ FRAMES = 20
 F64_BOUND = 1e-12
 # relative to a frame's own peak; the worst, .8e-4 and 1.1e-4, is a frame that is noise, its peak a
 # tenth of the others'
-F32_BOUND = {"fista": 1e-4, "working-set": 1.2e-4, "coordinate": 1.5e-4, "active-set": 1.5e-4}
+F32_BOUND = {"fista": 1e-4, "working-set": 1.2e-4, "active-set": 1.5e-4}
 FISTAS = ("fista", "working-set")
 SOLVED = ("iterations", "optimum")
 

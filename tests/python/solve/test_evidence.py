@@ -14,7 +14,7 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 from eitskin_reference.constants_table import CENTRE_SURE, PLACE_APART
-from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
+from other_worlds import WorldFactory, WorldScenes
 from small_models import prebuilt
 
 SCENES = 2

@@ -10,12 +10,12 @@ from eitskin.model.build import BuildSettings, Linearisation, linearise, make_mo
 from eitskin.scene.random_touches import TouchScene, TouchSet, random_touches, rim_distance_mm
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.scored import Evaluator, session_in_parts
 from eitskin_studies.experiments.shapes.variants import ShapeVariant
-from eitskin_studies.harness.discs import pixel_cover
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 from eitskin_studies.harness.thresholds import miou_curves
 

@@ -13,12 +13,12 @@ from eitskin.fem.grid import Grid
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.model import Model
 from eitskin.model.reduction import fold_rows
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.families import Family, Method
 from eitskin_studies.compare.methods import baseline_methods
-from eitskin_studies.harness.discs import pixel_cover
 
 DISCS = "eitskin, touches as discs"
 TUNED_DISCS = "eitskin, touches as discs, change from simulation"

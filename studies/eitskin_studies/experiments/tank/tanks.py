@@ -73,8 +73,8 @@ def folder_of(data: Path | None) -> Path:
     for name in (PHANTOMS, *(rods[0] for rods in RODS)):
         if not (data / name).is_file():
             raise UsageError(
-                f"--data {data}: has no {name}; studies/results/tank.md says where to get the measured"
-                " frames"
+                f"--data {data}: has no {name}; studies/results/tank.md says where to get the"
+                " measured frames"
             )
     return data
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.errors import missing_extra
+from eitskin_studies.harness.extras import missing_studies_extra
 
 # data and places (n, m), (n, 2) taught, data (k, m) judged: places (k, 2)
 Baseline = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
@@ -27,7 +27,7 @@ def _searched(estimator: Any, grid: dict[str, list[Any]]) -> Baseline:
             from sklearn.pipeline import make_pipeline
             from sklearn.preprocessing import StandardScaler
         except ModuleNotFoundError:
-            raise missing_extra("peers", "scikit-learn") from None
+            raise missing_studies_extra("peers", "scikit-learn") from None
         centred = TransformedTargetRegressor(estimator(), transformer=StandardScaler())
         search = GridSearchCV(
             make_pipeline(StandardScaler(), centred),

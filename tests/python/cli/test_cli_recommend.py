@@ -1,4 +1,4 @@
-"""``eitskin recommend``, ``tradeoff``, and ``--budget`` and ``--accuracy`` on frames and boards."""
+"""``eitskin recommend``, and ``--budget`` and ``--accuracy`` on frames and boards."""
 
 import json
 from pathlib import Path
@@ -9,17 +9,8 @@ from board_cases import write_scene
 import eitskin
 from eitskin.errors import UsageError
 from eitskin.model.eitm import load_model
-from eitskin.skin.protocol import adjacent
-from eitskin.skin.skin import paper_skin
 from eitskin.tuning.front import PRESETS, Conditions, load_front
-from eitskin_studies.pictures.tradeoff_pictures import DRAWN
-from eitskin_studies.tradeoff.engines import ModelShop
 from small_models import prebuilt
-
-TINY_RUN = (
-    "--scenes 3 --train 2 --set-scenes 2 --sets pairs --snr-db 60 --elements 1200 --random-skins 2"
-    " --no-peers --counted 0 --rounds 1 --only 'tiny,mini,standard rank 32'"
-)
 
 
 @pytest.fixture
@@ -27,21 +18,7 @@ def scene(tmp_path) -> Path:
     return write_scene(tmp_path / "one.toml", frames=2, elements=900)
 
 
-def test_run_writes_tables_and_pictures(done, tmp_path):
-    out = done(
-        f"tradeoff run -o {tmp_path / 'out'}", TINY_RUN, f"--front {tmp_path / 'small.json'}"
-    )
-    assert "standard rank 32" in out and "* " in out
-    found = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
-    pictures = set(DRAWN)
-    assert found == {"results.jsonl", "front.json", "table.csv"} | pictures
-    assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
-    assert len(load_front(tmp_path / "out" / "front.json").points) == 3
-    front = tmp_path / "small.json"
-    assert "MIoU" in done(f"recommend --front {front} --budget 1s --board host")
-
-
-def test_the_recommended_model_is_the_measured_one(told, tmp_path, monkeypatch):
+def test_the_recommended_model_has_the_points_settings(told, tmp_path, monkeypatch):
     """But for its model errors, of 300 random skins."""
     monkeypatch.setattr("eitskin.model.build.with_model_errors", lambda model, *_, **__: model)
     path = tmp_path / "model.eitm"
@@ -56,9 +33,6 @@ def test_the_recommended_model_is_the_measured_one(told, tmp_path, monkeypatch):
     found = model.defaults.iterations, model.defaults.solver
     assert found == (settings.iterations, settings.solver)
     assert model.defaults.mask_threshold == pytest.approx(one.threshold)
-    measured = ModelShop(paper_skin(), adjacent(16)).build(settings).model
-    assert (measured.stored.columns == model.stored.columns).all()
-    assert (measured.projection == model.projection).all()
 
 
 def test_recommendations_name_what_bounds_the_rate(done, told):
@@ -92,13 +66,6 @@ def test_presets_are_dearer_and_better_from_fast_to_accurate(told, board):
         (2, "recommend --budget 9ms --period 9kMACs", "--period"),
         (3, "recommend --budget 9ms --front nowhere.json", "nowhere.json"),
         (3, "recommend --budget 9ms -o nowhere/model.eitm", "does not exist"),
-        (3, "tradeoff run --set nowhere.toml", "nowhere.toml"),
-        (2, "tradeoff run --only standrad", "did you mean 'standard'"),
-        (2, "tradeoff run --snr-db 60;80", "--snr-db"),
-        (2, "tradeoff run --sets quads", "quads"),
-        (2, "tradeoff run --scenes 0", "scenes"),
-        (2, "tradeoff run --seed -1", "--seed"),
-        (2, "tradeoff run --elements 3", "--elements"),
     ],
 )
 def test_refusals(refused, code, arguments, said):

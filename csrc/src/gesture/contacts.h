@@ -1,6 +1,7 @@
-/* What the parts of this room share. */
-#ifndef EITSKIN_GESTURE_ROOM_H
-#define EITSKIN_GESTURE_ROOM_H
+/* A finger's contact with the skin, and the list that a frame's events go to: what the files of
+ * this module share. */
+#ifndef EITSKIN_CONTACTS_H
+#define EITSKIN_CONTACTS_H
 
 #include "base/vec.h"
 #include "eitskin/gesture.h"
@@ -32,28 +33,5 @@ static inline void eits_tell(event_list *out, eits_event event)
     else
         ++*out->dropped;
 }
-
-static inline eits_real eits_apart(eits_real dx_mm, eits_real dy_mm)
-{
-    return eits_sqrt(dx_mm * dx_mm + dy_mm * dy_mm);
-}
-
-/* No number is none, nor is one whose square would overflow. */
-static inline int eits_is_place(eits_real x_mm, eits_real y_mm)
-{
-    return eits_fabs(x_mm) <= EITS_MAX_PLACE_MM && eits_fabs(y_mm) <= EITS_MAX_PLACE_MM;
-}
-
-/* The angle of (x, y) from the first axis, -180 to 180 degrees; of (0, 0) it is 0. */
-eits_real eits_angle_deg(eits_real y, eits_real x);
-
-/* One finger: what its lifting was, and whether it holds. */
-void eits_lifted(eits_gestures *g, eits_contact *c, event_list *out);
-void eits_hold(eits_gestures *g, event_list *out);
-
-/* Two fingers: after all contacts of a frame are known. */
-void eits_pair_step(eits_gestures *g, event_list *out);
-/* Before the contact at this place lifts. */
-void eits_pair_lift(eits_gestures *g, uint32_t place, event_list *out);
 
 #endif
