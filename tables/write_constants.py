@@ -9,11 +9,13 @@ from write_c import comment
 
 def c_constants(tables: Tables) -> Iterator[tuple[str, Lines]]:
     """A header a room."""
-    for room in tables["constants"]["room"]:
-        yield room.get("header", f"csrc/src/{room['name']}/constants.h"), _header(room)
+    rooms = tables["constants"]["room"]
+    known = {row[0]: row[1] for room in rooms for group in room["group"] for row in group["rows"]}
+    for room in rooms:
+        yield room.get("header", f"csrc/src/{room['name']}/constants.h"), _header(room, known)
 
 
-def _header(room: Table) -> Lines:
+def _header(room: Table, known: dict[str, Any]) -> Lines:
     core = "header" not in room
     prefix = room.get("prefix", "EITS_")
     yield from comment(f"What is a choice in this room, with its reason. {origin('constants')}")
@@ -31,7 +33,7 @@ def _header(room: Table) -> Lines:
             if written_out:
                 yield f"/* {name} = {value}, in the source as {written_out[0]} */"
             else:
-                yield f"#define {prefix}{name} {_c_value(value)}"
+                yield f"#define {prefix}{name} {_c_value(value, known, core)}"
     yield from ("", "/* clang-format on */", "", "#endif")
 
 
@@ -39,11 +41,16 @@ def _said(what: str, unit: str) -> str:
     return f"{what} [{unit}]" if unit else what
 
 
-def _c_value(value: Any) -> str:
-    """Its bits are those of a double literal that is cast; a text is C as it stands."""
+def _c_value(value: Any, known: dict[str, Any], core: bool) -> str:
+    """Its bits are those of a double literal that is cast; a text is C as it stands, or names the
+    row that has the value. Firmware has floats."""
+    if isinstance(value, str) and value.startswith("= "):
+        value = known[value.removeprefix("= ")]
     if isinstance(value, list):
         return f"R(sizeof(eits_real) == 4 ? {value[0]} : {value[1]})"
-    return f"R({value!r})" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"R({value!r})" if core else f"{value!r}f"
+    return str(value)
 
 
 def python_constants(tables: Tables, package: str) -> Lines:

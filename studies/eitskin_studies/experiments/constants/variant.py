@@ -9,7 +9,7 @@ import importlib.util
 import platform
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,7 +23,7 @@ from eitskin.errors import UsageError
 from eitskin_emulator.core_on_qemu import checkout_root, need_tools
 
 NAME = "constants_core"
-FLAGS = "-std=c11 -O2 -fPIC -w -fno-fast-math -ffp-contract=off -fno-math-errno -fvisibility=hidden"
+FLAGS = "-std=c11 -O2 -fPIC -w -fno-fast-math -ffp-contract=off -fno-math-errno"
 AVX2 = "-mavx2 -mfma -mf16c -DEITS_BUILD_AVX2"
 # sizes of arrays in structures: a variable cannot be one; the module that has them is rebuilt in
 # a later issue
@@ -164,26 +164,42 @@ def build_variant(folder: Path) -> Variant:
     root = checkout_root()
     need_tools("cc")
     constants = constants_of(root)
-    folder.mkdir(parents=True, exist_ok=True)
-    _write_headers(folder, root, constants)
-    sources = _sources(folder, root, constants)
+    sources = write_sources(folder, root, constants)
     binding = _binding(folder, root, len(constants))
     target = folder / f"{NAME}.so"
-    include = _python_include()
-    fast = AVX2.split() if _has_avx2() else []
-    command = ["cc", *FLAGS.split(), *fast, "-shared", f"-I{folder}", f"-I{root}/csrc/src",
-               f"-I{root}/csrc/include", f"-I{include}", *map(str, sources), str(binding), "-lm",
-               "-o", str(target)]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        first = (
-            "; ".join([line for line in done.stderr.splitlines() if "error" in line]) or done.stderr
-        )
-        raise UsageError(f"constants: the variant of the core does not compile: {first}")
+    compile_sources(
+        target, folder, root, [*sources, binding], (f"-I{_python_include()}", "-fvisibility=hidden")
+    )
     return Variant(_imported(target), constants)
 
 
-def _write_headers(folder: Path, root: Path, constants: list[Constant]) -> None:
+def write_sources(
+    folder: Path, root: Path, constants: list[Constant], more: str = ""
+) -> list[Path]:
+    """The variant's headers, and all of its sources; ``more`` C stands below the tables."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _write_headers(folder, constants, more)
+    return _sources(folder, root, constants)
+
+
+def compile_sources(
+    target: Path, folder: Path, root: Path, sources: Sequence[Path], flags: Sequence[str]
+) -> None:
+    """A shared library of ``sources``, whose generated headers are in ``folder``.
+
+    Raises:
+        UsageError: they do not compile.
+    """
+    fast = AVX2.split() if _has_avx2() else []
+    command = ["cc", *FLAGS.split(), *fast, *flags, "-shared", f"-I{folder}", f"-I{root}/csrc/src",
+               f"-I{root}/csrc/include", *map(str, sources), "-lm", "-o", str(target)]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        errors = [line for line in done.stderr.splitlines() if "error" in line] or [done.stderr]
+        raise UsageError(f"constants: the variant of the core does not compile: {errors[0]}")
+
+
+def _write_headers(folder: Path, constants: list[Constant], more: str) -> None:
     """``MODULE/constants.h`` for each module of the core, and the tables that they name."""
     count = len(constants)
     tables = "\n".join(_DECLARED.format(count=count).strip().splitlines())
@@ -196,7 +212,7 @@ def _write_headers(folder: Path, root: Path, constants: list[Constant]) -> None:
     (folder / "study_tables.c").write_text(
         f'#include "study_tables.h"\nfloat eits_study_real[{count}] = {{{values}}};\n'
         f"int eits_study_whole[{count}] = {{{whole}}};\n"
-        f"unsigned char eits_study_used[{count}];\n",
+        f"unsigned char eits_study_used[{count}];\n{more}",
         encoding="ascii",
     )
     for module in dict.fromkeys(one.module for one in constants):
