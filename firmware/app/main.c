@@ -1,5 +1,5 @@
 /* The application of a board: one instrument, in static memory. */
-#include "app/main_loop.h"
+#include "app/instrument.h"
 
 static fw_instrument instrument;
 

@@ -1,7 +1,7 @@
 #include "drivers/ad9833.h"
 
 enum {
-    CONTROL_B28 = 0x2000,     /* both halves of a frequency in two writes, taken over together */
+    CONTROL_B28 = 0x2000,     /* a frequency comes in two writes and takes effect with the second */
     CONTROL_OPBITEN = 0x0020, /* the accumulator's top bit to the pin instead of the converter */
     CONTROL_DIV2 = 0x0008,    /* ... undivided */
     CONTROL_MODE = 0x0002,    /* triangle instead of sine */
@@ -9,7 +9,7 @@ enum {
     ADDRESS_PHASE0 = 0xC000
 };
 
-#define MAX_MCLK_HZ 64000000u /* so that 2^28 times it in millihertz fits 64 bits */
+#define MAX_MCLK_HZ 64000000u /* 2^28 times this in millihertz fits 64 bits */
 #define FULL_TURN   ((uint64_t)1 << 28)
 
 uint32_t fw_ad9833_tuning(uint32_t mclk_hz, uint64_t millihertz)
@@ -79,7 +79,7 @@ fw_status fw_ad9833_start(fw_ad9833 *generator, uint32_t tuning, uint16_t phase,
         return FW_E_ARGUMENT;
     fw_ad9833_words(tuning, phase, waveform, words);
     generator->state = FW_AD9833_UNKNOWN;
-    /* one by one: what precedes a failure is known to be written */
+    /* one by one: if a write fails, all words before it have been written */
     for (size_t k = 0; k < FW_AD9833_WORDS; ++k) {
         const fw_status status = generator->spi.ops->write(generator->spi.ctx, &words[k], 1);
         if (status != FW_OK) {

@@ -20,24 +20,24 @@ typedef enum fw_waveform {
     FW_SQUARE_HALF /* at half the frequency */
 } fw_waveform;
 
-/* The 28-bit tuning word nearest to a frequency: round(millihertz 2^28 / (1000 mclk_hz)). 0 where
- * mclk_hz is 0 or above 64 MHz (the part stands 25 MHz) or the frequency is above half of it. */
+/* The 28-bit tuning word nearest to a frequency: round(millihertz 2^28 / (1000 mclk_hz)). 0 if
+ * mclk_hz is 0 or above 64 MHz (the part allows 25 MHz), or if the frequency is above half of it.
+ */
 uint32_t fw_ad9833_tuning(uint32_t mclk_hz, uint64_t millihertz);
 
-/* The frequency of a tuning word, rounded to a millihertz; 0 where mclk_hz is above 64 MHz. */
+/* The frequency of a tuning word, rounded to a millihertz; 0 if mclk_hz is above 64 MHz. */
 uint64_t fw_ad9833_millihertz(uint32_t mclk_hz, uint32_t tuning);
 
-/* The 12-bit phase word nearest to an angle in thousandths of a degree; whole turns are taken off.
- */
+/* The 12-bit phase word nearest to an angle in thousandths of a degree, modulo a turn. */
 uint16_t fw_ad9833_phase(uint32_t millidegrees);
 
-/* The words that start the generator: reset, frequency (low 14 bits, then high), phase, and reset
- * released. */
+/* The words that start the generator: reset, frequency (low 14 bits, then high), phase, release of
+ * the reset. */
 void fw_ad9833_words(uint32_t tuning, uint16_t phase, fw_waveform waveform,
                      uint16_t words[FW_AD9833_WORDS]);
 
 typedef enum fw_ad9833_state {
-    FW_AD9833_UNKNOWN, /* never written, or a write failed and so did the reset after it */
+    FW_AD9833_UNKNOWN, /* never written, or both a write and the reset after it failed */
     FW_AD9833_RESET,   /* output at mid-scale: no current */
     FW_AD9833_RUNNING
 } fw_ad9833_state;
@@ -50,13 +50,13 @@ typedef struct fw_ad9833 {
 
 void fw_ad9833_init(fw_ad9833 *generator, fw_spi spi);
 
-/* Start (or restart) with this tuning word and phase. After an error the part is put back into
- * reset, if the bus still lets it. Errors: FW_E_ARGUMENT (more than 28 or 12 bits), those of the
+/* Start (or restart) with this tuning word and phase. After an error the part is reset
+ * again, if the bus still works. Errors: FW_E_ARGUMENT (more than 28 or 12 bits), those of the
  * bus. */
 fw_status fw_ad9833_start(fw_ad9833 *generator, uint32_t tuning, uint16_t phase,
                           fw_waveform waveform);
 
-/* Into reset. Errors: those of the bus; the state is then unknown. */
+/* Reset the part. Errors: those of the bus; the state is unknown then. */
 fw_status fw_ad9833_stop(fw_ad9833 *generator);
 
 #endif

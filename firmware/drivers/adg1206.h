@@ -1,8 +1,8 @@
 /* Four ADG1206 16:1 multiplexers, one each for I+, I-, V+ and V-, switched together.
  *
- * Each decodes its own address, so that it joins one electrode at most; while they change, all are
- * disabled: for no moment are two electrodes joined through one, whatever the skew of the address
- * lines. */
+ * Each decodes its own address, so it connects at most one electrode. All are disabled while their
+ * addresses change. So two electrodes are never connected through one multiplexer, whatever the
+ * skew of the address lines. */
 #ifndef FW_ADG1206_H
 #define FW_ADG1206_H
 
@@ -23,11 +23,11 @@ typedef struct fw_adg1206 {
 } fw_adg1206;
 
 /* Drive through i_plus and i_minus, measure from v_plus to v_minus. Errors: FW_E_ARGUMENT (an
- * electrode above 15, or both of a pair the same; nothing is switched), those of the lines (then
- * all are left disabled, if the lines let it). */
+ * electrode above 15, or both of a pair the same; nothing is switched), those of the lines (all are
+ * left disabled then, if the lines still work). */
 fw_status fw_adg1206_select(const fw_adg1206 *bank, const uint8_t electrodes[4]);
 
-/* No electrode at all. Errors: those of the lines. */
+/* Disconnect all electrodes. Errors: those of the lines. */
 fw_status fw_adg1206_all_off(const fw_adg1206 *bank);
 
 #endif

@@ -60,12 +60,12 @@ typedef struct fw_burst {
 } fw_burst;
 
 typedef struct fw_capture_ops {
-    /* `done` is called from an interrupt when a slot's burst is complete. FW_E_RANGE: cannot be
-     * done. */
+    /* `done` is called from an interrupt when a slot's burst is complete. FW_E_RANGE: this board
+     * cannot do these settings. */
     fw_status (*configure)(void *ctx, const fw_capture_setup *setup,
                            void (*done)(void *user, const fw_burst *burst), void *user);
     fw_status (*start)(void *ctx); /* the first slot starts at least 20 us later */
-    void (*stop)(void *ctx);       /* after it `done` is not called */
+    void (*stop)(void *ctx);       /* afterwards `done` is not called */
 } fw_capture_ops;
 typedef struct fw_capture {
     const fw_capture_ops *ops;
@@ -75,7 +75,7 @@ typedef struct fw_capture {
     /* of the converter: full_scale_code + 1 steps (STM32 data sheets, "1 LSB ideal = VREF+ /
      * 4096") */
     uint32_t reference_uv;
-    /* volts at the converter for a volt between the electrodes, in millionths */
+    /* volts at the converter per volt between the electrodes, in millionths */
     uint32_t front_end_gain_ppm;
 } fw_capture;
 
@@ -84,15 +84,16 @@ typedef struct fw_link_ops {
     /* all or nothing; false: no room now */
     bool (*write)(void *ctx, const uint8_t *bytes, size_t size);
     size_t (*read)(void *ctx, uint8_t *bytes, size_t room);
-    bool (*ended)(void *ctx); /* no byte will come any more: fw_run returns. NULL: never */
+    bool (*ended)(void *ctx); /* no more bytes will come: fw_run returns. NULL: never */
 } fw_link_ops;
 typedef struct fw_link {
     const fw_link_ops *ops;
     void *ctx;
 } fw_link;
 
-/* ---- storage: regions that are erased whole and read in place. FW_BANKS of bank_bytes hold
- * models, those behind them up to FW_PAGES, of page_bytes, the owner's settings ---- */
+/* ---- storage: regions that are erased as a whole and read in place. The first FW_BANKS have
+ * bank_bytes each and hold models; the others, up to FW_PAGES, have page_bytes each and hold the
+ * owner's settings ---- */
 #define FW_BANKS 2u
 #define FW_PAGES 4u
 typedef struct fw_store_ops {
@@ -106,10 +107,10 @@ typedef struct fw_store {
     const fw_store_ops *ops;
     void *ctx;
     uint32_t bank_bytes;
-    uint32_t page_bytes; /* 0: no settings are kept */
+    uint32_t page_bytes; /* 0: no settings are stored */
 } fw_store;
 
-/* ---- the current through the skin, by a resistor in its way back ---- */
+/* ---- the current through the skin, measured over a resistor in its return path ---- */
 typedef struct fw_sense {
     uint32_t (*measure_ua_rms)(void *ctx); /* takes about 0.3 ms; NULL: it cannot be measured */
     void *ctx;
@@ -119,17 +120,17 @@ typedef struct fw_sense {
 typedef struct fw_system_ops {
     /* wraps; runs from the clock that the generator's MCLK comes from */
     uint32_t (*time_us)(void *ctx);
-    /* until an interrupt has come since the last call, or at most about 1 ms */
+    /* returns when an interrupt has come since the last call, or after about 1 ms */
     void (*wait)(void *ctx);
-    uint32_t (*lock)(void *ctx); /* interrupts off; returns what unlock wants */
+    uint32_t (*lock)(void *ctx); /* interrupts off; returns the state for unlock */
     void (*unlock)(void *ctx, uint32_t state);
     void (*feed_watchdog)(void *ctx);
     void (*reset)(void *ctx);                   /* does not return */
-    uint32_t (*stack_used)(void *ctx);          /* most bytes so far */
+    uint32_t (*stack_used)(void *ctx);          /* the most bytes so far */
     void (*set_leds)(void *ctx, uint32_t leds); /* bit 0 alive, bit 1 touch, bit 2 fault */
-    bool (*button)(void *ctx);                  /* the owner holds it now; NULL: there is none */
-    /* `work` runs soon, after the interrupts and before the main loop goes on; always the same.
-     * From the capture's interrupt, the main loop, or `work`. */
+    bool (*button)(void *ctx); /* the owner holds it now; NULL: the board has none */
+    /* `work` runs soon, after the interrupts and before the main loop continues. It is always the
+     * same function. Called from the capture's interrupt, the main loop, or `work`. */
     void (*later)(void *ctx, void (*work)(void *user), void *user);
 } fw_system_ops;
 
@@ -148,11 +149,11 @@ typedef struct fw_board {
     uint32_t f_cpu_hz;
     uint32_t mclk_hz; /* of the generator */
     uint32_t stack_bytes;
-    uint32_t frame_period_us; /* of the scan after a start; 0: as fast as it goes */
-    /* What the current source drives, as built; 0: none flows. It bounds the excitation from below
+    uint32_t frame_period_us; /* of the scan after a start; 0: as fast as possible */
+    /* The current of the source as built; 0: none flows. It bounds the excitation from below
      * (docs/guide/hardware.md, "Safety"). */
     uint32_t source_ua_rms;
-    /* dropped after the current was switched on, while capacitors in its way settle */
+    /* dropped after the current is switched on, while capacitors in its path settle */
     uint32_t settle_frames;
     fw_spi generator; /* AD9833 */
     /* lines 0-3 A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- */
@@ -166,7 +167,7 @@ typedef struct fw_board {
     fw_sense sense;
     const uint8_t *image; /* the program, for its hash; NULL: not known */
     size_t image_bytes;
-    bool frames_given; /* by another instrument, of whose scan nothing is known */
+    bool frames_given; /* by another instrument, whose scan is not known */
     void *workspace;   /* 16-byte aligned: the core's, and the frames' */
     size_t workspace_bytes;
 } fw_board;

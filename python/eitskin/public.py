@@ -7,15 +7,15 @@ from typing import Any
 
 from eitskin.device.settings import SolverSettings
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame, Notice
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings, kinds_of
-from eitskin.live.zones import load_zones
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_or_prebuilt
-from eitskin.sinks.outputs import Outputs
-from eitskin.sinks.sink import TouchSource
+from eitskin.session.frame import Frame, Notice
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings, kinds_of
+from eitskin.session.zones import load_zones
+from eitskin.sinks.outputs import attached_outputs
+from eitskin.truth import observe_scene
 from eitskin.tuning.for_model import chosen_point
 from eitskin.tuning.front import Target
 from eitskin.tuning.front import preset as named_preset
@@ -74,12 +74,13 @@ def stream(
         preset: "fast", "balanced" or "accurate": scan and solver by name, as ``--preset``.
         to: sinks, such as "udp://127.0.0.1:9000" (docs/guide/touches-out.md).
         record: a new recording of every packet.
-        zones: a file of named places, whose presses are told (docs/guide/gestures.md).
+        zones: a file of named places, whose presses are reported (docs/guide/gestures.md).
         speed: of what is simulated, emulated or recorded; 1 is as it was, 0 as fast as it can.
         solver: ``sign``, ``iterations``, ``track`` and what else SolverSettings has.
 
     Raises:
-        EitskinError: the board cannot be opened, set up or followed, or a sink not be opened.
+        EitskinError: the board cannot be opened or set up, its stream fails, or a sink cannot be
+            opened.
     """
     settings = SessionSettings(
         mode=kinds_of(mode, "mode"),
@@ -93,30 +94,33 @@ def stream(
         record=None if record is None else Path(record),
         zones=() if zones is None else load_zones(zones),
     )
-    with Session(url, settings, speed=speed) as session:
-        known = None if session.known is None else session.known.model
-        source = TouchSource(session.device.transport.url, session.device.board.board, known)
-        with Outputs(to, source, patient=session.patient) as outputs:
-            yield from _frames(session, outputs)
-            facts = session.finish().as_dict()
-            outputs.end(facts | {"truth": session.score.as_dict() if session.truth else None})
+    with (
+        Session(url, settings, speed=speed, observe=observe_scene) as session,
+        attached_outputs(session, to) as outputs,
+    ):
+        yield from _frames(session)
+        outputs.end(session_facts(session))
 
 
-def _frames(session: Session, outputs: Outputs) -> Iterator[Frame]:
+def session_facts(session: Session) -> dict[str, Any]:
+    """What a session amounted to, for JSON."""
+    truth = None if session.observer is None else session.observer.facts()
+    return session.finish().as_dict() | {"truth": truth}
+
+
+def _frames(session: Session) -> Iterator[Frame]:
     """Frames, each with the notices since the one before."""
     notices: list[Notice] = []
-    items = session.frames()
+    messages = session.messages()
     try:
-        for item in items:
-            outputs.put(item)
-            if isinstance(item, Notice):
-                notices.append(item)
-            if not isinstance(item, Frame):
-                continue
-            yield replace(item, notices=tuple(notices))
-            notices.clear()
+        for message in messages:
+            if isinstance(message, Notice):
+                notices.append(message)
+            if isinstance(message, Frame):
+                yield replace(message, notices=tuple(notices))
+                notices.clear()
     finally:
-        items.close()
+        messages.close()
 
 
 def _preset(name: str, solver: dict[str, Any]) -> Target:

@@ -61,7 +61,7 @@ def test_missing_extras_are_named(package, extra, option, tmp_path):
 
 
 def test_the_checks_of_constants_are_commands_of_ours():
-    tables = load_toml(ROOT / "tables" / "constants.toml", "table")["room"]
+    tables = load_toml(ROOT / "tables" / "constants.toml", "table")["module"]
     files = (ROOT / "studies" / "eitskin_studies" / "cli").glob("bench_*.py")
     benches = "".join(path.read_text(encoding="utf-8") for path in files)
     for group in (group for table in tables for group in table["group"]):

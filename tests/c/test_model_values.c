@@ -302,7 +302,7 @@ TEST(defaults)
     for (uint32_t solver = 0; solver < 6; ++solver)
         CHECK_EQUAL(with_word(TINY, "DEFS", 56, solver),
                     solver <= EITS_SOLVER_ACTIVE_SET && solver != 2 ? EITS_OK : EITS_E_MODEL_VALUE);
-    const uint32_t all = EITS_TOUCH_FIT_ALL | EITS_GAIN_DRIFT_KEPT | EITS_REFERENCE_FOLLOWS;
+    const uint32_t all = EITS_TOUCH_FIT_ALL | EITS_GAIN_DRIFT_KEPT | EITS_TRACKS_REFERENCE;
     for (uint32_t bits = 0; bits <= all + 1; ++bits)
         CHECK_EQUAL(with_word(TINY, "DEFS", 60, bits), bits <= all ? EITS_OK : EITS_E_MODEL_VALUE);
 }

@@ -1,4 +1,4 @@
-/* What most tests begin with: the sheet, a model of it in bank 0, the board and its host. */
+/* The start of most tests: the sheet, a model of it in bank 0, the board and its host. */
 #ifndef FW_TEST_BENCH_H
 #define FW_TEST_BENCH_H
 
@@ -13,18 +13,18 @@ typedef struct bench {
     eits_model open; /* a view of it */
 } bench;
 
-/* With `spec` NULL: no model. The application has started; what was there before is stopped. `b` is
- * static, or zero before the first time. */
+/* Start the application; what ran before is stopped. `spec` NULL: without a model. `b` is static,
+ * or zero before the first call. */
 void bench_start(bench *b, const skin_spec *spec);
 void bench_stop(bench *b);
 
-/* The board's `volts`: of the sheet. */
+/* The sheet's voltages, for the board's `volts`. */
 double bench_sheet(void *user, const uint8_t electrodes[4], uint64_t at_ns);
 
-/* Restart the board on what its flash holds. */
+/* Restart the board; its flash stays. */
 void bench_restart(bench *b);
 
-/* What the model's rows should read now, in volts. */
+/* The voltage that a row of the model should read now. */
 double bench_volts(const bench *b, uint32_t row);
 
 #endif

@@ -42,10 +42,10 @@ double fake_generator_hz(const fake_board *f)
     return turn * f->board.mclk_hz / 268435456.0;
 }
 
-/* Sine of the generator, in turns since it was released; 0 while nothing comes. */
+/* Sine of the generator, in turns since it was released; 0 while it is off. */
 static double generator(const fake_board *f, double at_ns)
 {
-    /* anything but a sine is no use here */
+    /* only a sine is modelled */
     if (fake_generator_hz(f) == 0 || (f->generator.control & 0x002Au) != 0)
         return 0;
     const double turns = fake_generator_hz(f) * 1e-9 * (at_ns - (double)f->released_ns) +
@@ -232,7 +232,7 @@ static fw_status store_erase(void *ctx, uint32_t bank)
 {
     fake_board *f = ctx;
     ++f->erases;
-    /* a sector cut while erasing reads as anything */
+    /* after a power cut during an erase a sector may hold anything */
     for (uint32_t part = 0; part < ERASE_STEPS; ++part) {
         const uint32_t bytes = bytes_of(bank) / ERASE_STEPS;
         uint8_t *sector = (uint8_t *)store_bank(ctx, bank) + part * bytes;
@@ -258,7 +258,7 @@ static fw_status store_program(void *ctx, uint32_t bank, uint32_t offset, const 
     for (size_t k = 0; k < size; ++k) {
         uint8_t *cell = &cells[k];
         const uint8_t byte = ((const uint8_t *)bytes)[k];
-        if (k % 4u == 2) /* power goes within a word */
+        if (k % 4u == 2) /* a power cut within a word */
             flash_step(f);
         f->rewrites += (uint32_t)((*cell & byte) != byte);
         *cell &= byte;

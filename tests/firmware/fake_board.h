@@ -1,4 +1,4 @@
-/* A board without hardware: pins, converter, flash and link in memory, on a clock of its own.
+/* A board without hardware: pins, converter, flash and link in memory, on its own clock.
  *
  * The skin's voltages come from a function of the electrodes that the lines select; the generator
  * is decoded from the words that were written to it; the multiplexers' output settles
@@ -12,7 +12,7 @@
 
 #include <setjmp.h>
 
-/* The fuzzer has its own: it copies a whole board before each input. */
+/* The fuzzer sets its own size, because it copies a whole board before each input. */
 #ifndef FAKE_BANK
 #define FAKE_WIRE      (1 << 20)
 #define FAKE_BANK      (128 * 1024)
@@ -45,14 +45,14 @@ typedef struct fake_board {
     /* buses */
     fake_write *log; /* the last log_room of `writes`; NULL: none is kept */
     uint32_t log_room, writes;
-    /* calls from number spi_fail_from on, so many, fail */
+    /* spi_fails calls fail, from number spi_fail_from on */
     uint32_t spi_calls, spi_fail_from, spi_fails;
     uint32_t lines_calls, lines_fail_from, lines_fails;
 
     /* generator */
     ad9833_model generator;
     uint64_t released_ns; /* when its phase began */
-    double extra_turn;    /* phase that the way through cables and skin adds */
+    double extra_turn;    /* phase that cables and skin add */
 
     /* multiplexers and skin */
     drive_monitor monitor; /* has the levels of the lines */
@@ -83,17 +83,17 @@ typedef struct fake_board {
     /* flash: NOR */
     _Alignas(16) uint8_t bank[FW_BANKS][FAKE_BANK];
     uint8_t page[FW_PAGES - FW_BANKS][FAKE_PAGE];
-    uint32_t flash_steps, cut_at; /* power goes at this step (counted from 1; 0: never) */
+    uint32_t flash_steps, cut_at; /* power is cut at this step (counted from 1; 0: never) */
     jmp_buf cut;
     fw_status erase_status, program_status;
-    uint32_t erases, rewrites; /* rewrites: a bit was to be programmed from 0 to 1 */
+    uint32_t erases, rewrites; /* rewrites: attempts to program a bit from 0 to 1 */
 
     uint32_t feeds, resets, leds;
     bool button;         /* the owner holds it */
     uint32_t current_ua; /* that flows */
     _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
 
-    /* link; the bytes under way last, so that a copy may leave them out */
+    /* link; its bytes come last, so that a copy may omit them */
     size_t to_board_size, to_board_at, to_host_size;
     bool writing;
     uint32_t nested_writes; /* that began within another */
@@ -105,20 +105,20 @@ typedef struct fake_board {
 /* Erased, at time start_us, with no voltage. */
 void fake_init(fake_board *fake, uint32_t start_us);
 
-/* Power up again: clock goes on, flash stays, all else is as after fake_init. */
+/* Power up again: the clock continues, the flash stays, everything else is as after fake_init. */
 void fake_restart(fake_board *fake);
 
 /* Write a bank with a valid record, as a programmer would. */
 void fake_put_model(fake_board *fake, uint32_t bank, uint32_t generation, const uint8_t *blob,
                     size_t size);
 
-/* Time passes; bursts that end meanwhile are told. */
+/* Let time pass; bursts that end meanwhile are reported. */
 void fake_advance(fake_board *fake, uint64_t ns);
 
-/* To the end of the next burst, or a millisecond. */
+/* Let time pass to the end of the next burst, at most a millisecond. */
 void fake_wait(fake_board *fake);
 
-/* The generator's frequency as its registers say; 0 while it is in reset. */
+/* The generator's frequency by its registers; 0 while it is in reset. */
 double fake_generator_hz(const fake_board *fake);
 
 double fake_lsb_v(const fake_board *fake);

@@ -1,6 +1,6 @@
 #include "host.h"
 
-#include "app/main_loop.h"
+#include "app/instrument.h"
 #include "app/safety/current_enable.h"
 
 #include <stdio.h>
@@ -39,13 +39,13 @@ static void collect(host *h)
     h->board->to_host_size = 0;
 }
 
-/* As if a keepalive came all the time; it would change the counters. */
+/* The same effect as a constant keepalive, which would change the counters. */
 static void listen(host *h)
 {
     if (h->quiet)
         return;
     drive_monitor_heard(&h->board->monitor, h->board->now_ns);
-    fw_drive_heard(&h->instrument);
+    fw_current_heard(&h->instrument.safety);
 }
 
 void host_start(host *h, fake_board *board)
@@ -61,7 +61,7 @@ void host_start(host *h, fake_board *board)
     fw_instrument_init(&h->instrument, &board->board);
     listen(h);
     if (!h->quiet)
-        (void)fw_drive_on(&h->instrument);
+        (void)fw_current_on(&h->instrument.safety);
     collect(h);
 }
 

@@ -19,10 +19,10 @@ typedef struct host {
     fw_instrument instrument;
     uint32_t request, sequence;
     bool kept_on;  /* the owner lets current flow without a host */
-    uint32_t gaps; /* sequence numbers of the board that did not come */
+    uint32_t gaps; /* missing sequence numbers of the board's packets */
     uint32_t expected;
     bool known;
-    bool quiet; /* does not ask for current, and is not heard but by what it sends */
+    bool quiet; /* does not ask for current, and is heard only by its packets */
     host_packet packet[HOST_PACKETS];
     uint32_t packets;
     size_t used;
@@ -34,8 +34,8 @@ typedef struct host {
 /* Start the application on the board. */
 void host_start(host *h, fake_board *board);
 
-/* One turn of the main loop, waiting where there is nothing to do; or for so many milliseconds of
- * the board's time. */
+/* One turn of the main loop, with a wait if there is nothing to do; or turns for so many
+ * milliseconds of the board's time. */
 void host_step(host *h);
 void host_run(host *h, uint32_t ms);
 
@@ -53,7 +53,7 @@ const eits_packet_fault *host_fault(const host *h, eits_fault code, bool raised,
 /* Send a packet as it is. */
 void host_send(host *h, uint8_t type, const void *payload, size_t size);
 
-/* Send a command whose first 4 bytes are the request number (set here, anew), and wait up to 60 s
+/* Send a command whose first 4 bytes are the request number (set here), and wait up to 60 s
  * for its reply; status 0xFFFF: none came. */
 eits_packet_reply host_command(host *h, eits_packet_type type, void *payload, size_t size);
 

@@ -59,7 +59,8 @@ static double *assemble(const sheet *s)
     for (int e = 0; e < SHEET_ELECTRODES; ++e)
         join(matrix, CELLS + e, rim_cell(e), s->detached[e] ? 0 : s->contact[e]);
     for (int k = 0; k < NODES; ++k)
-        matrix[k * NODES + k] += 1e-6; /* a weak earth; and nodes outside are not singular */
+        matrix[k * NODES + k] +=
+            1e-6; /* a weak connection to ground; nodes outside do not make the matrix singular */
     return matrix;
 }
 

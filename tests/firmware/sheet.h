@@ -11,12 +11,12 @@ enum { SHEET_SIDE = 15, SHEET_ELECTRODES = 16 };
 typedef struct sheet {
     double conductance[SHEET_SIDE][SHEET_SIDE]; /* of a cell; 1 untouched */
     double contact[SHEET_ELECTRODES];           /* of an electrode; 0: detached */
-    /* V at one for 1 mA into another; set by sheet_solve */
+    /* V at one electrode for 1 mA into another; set by sheet_solve */
     double transfer[SHEET_ELECTRODES][SHEET_ELECTRODES];
     bool detached[SHEET_ELECTRODES];
 } sheet;
 
-/* Untouched and solved. */
+/* An untouched sheet, solved. */
 void sheet_init(sheet *s);
 
 /* Multiply the conductance of the cells within `radius` of (x, y), in cells from the centre; then
@@ -24,7 +24,7 @@ void sheet_init(sheet *s);
 void sheet_touch(sheet *s, double x, double y, double radius, double factor);
 void sheet_solve(sheet *s);
 
-/* Voltage of [I+, I-, V+, V-] at 1 mA; 0 where one of them is detached. */
+/* Voltage of [I+, I-, V+, V-] at 1 mA; 0 if one of them is detached. */
 double sheet_volts(const sheet *s, const uint8_t electrodes[4]);
 
 #endif

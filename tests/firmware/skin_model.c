@@ -116,7 +116,7 @@ static uint32_t fields_stride(const skin_spec *spec)
     return (2 * spec->electrodes + 4 + 7u) & ~7u;
 }
 
-/* Currents that go in on a circle around the image; no mirror. */
+/* Currents that enter on a circle around the image; not symmetric. */
 static void fill_fields(const skin_spec *spec, uint8_t *flds)
 {
     const double pixel = 6, half = 0.5 * spec->side, radius = 0.6 * spec->side * pixel;
@@ -192,7 +192,7 @@ static void seal(skin_model *made)
     made->crc = eits_crc32(0, made->blob, made->size);
 }
 
-/* The golden image is what the core gives. */
+/* The golden image is the image that the core computes. */
 static void make_golden(skin_model *made, uint8_t *golden_image, int wrong)
 {
     small_context c;

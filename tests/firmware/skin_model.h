@@ -11,11 +11,11 @@ typedef struct skin_spec {
     /* pairs (d, d + step); 1, 1 is adjacent and 8, 1 opposite */
     uint32_t drive_step, measure_step;
     uint32_t rank, side; /* side x side pixels, at least rank of them */
-    /* every so many-th row measures the other way round; 0: none */
+    /* every so many-th row is measured with V+ and V- exchanged; 0: none */
     uint32_t turned;
-    uint32_t order;   /* drive order * k, modulo the drives, at place k; 0: as they stand */
-    int fields;       /* with the currents' fields, so that drives can be followed */
-    int wrong_golden; /* the golden image is another than the core gives */
+    uint32_t order;   /* the k-th drive is order * k modulo their number; 0: in sequence */
+    int fields;       /* with the currents' fields, so that drives can be tracked */
+    int wrong_golden; /* the golden image differs from the core's */
 } skin_spec;
 
 typedef struct skin_model {

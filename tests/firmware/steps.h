@@ -1,5 +1,5 @@
-/* What most tests of the application include: the one bench of a test program, and the steps that
- * they have in common. */
+/* Included by most tests of the application: the bench of a test program, and steps that tests
+ * share. */
 #ifndef FW_TEST_STEPS_H
 #define FW_TEST_STEPS_H
 
@@ -20,7 +20,7 @@ static inline eits_packet_reply scan_with(eits_command_scan scan)
     return host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
 }
 
-/* Both rows of each fold in every so many-th scan. */
+/* Measure both rows of each fold in every so many-th scan. */
 static inline void check_each(uint16_t scans)
 {
     eits_command_scan scan = host_default_scan();
@@ -28,7 +28,7 @@ static inline void check_each(uint16_t scans)
     TAKEN(scan_with(scan));
 }
 
-/* So many milliseconds, of which alone the packets are kept. */
+/* Run for so many milliseconds; earlier packets are forgotten. */
 static inline void hear(uint32_t ms)
 {
     host_forget(&b.host);
@@ -53,7 +53,7 @@ static inline void touch(double x, double y, double factor)
     sheet_solve(&b.sheet);
 }
 
-/* What a RAW packet says of row i. */
+/* The voltage and the quality of row i in a RAW packet. */
 static inline float raw_volts(const host_packet *packet, uint32_t i)
 {
     float volts;
@@ -66,14 +66,14 @@ static inline uint8_t raw_quality(const host_packet *packet, uint32_t i)
     return packet->payload[sizeof(eits_packet_raw) + 4 * (size_t)b.open.n_rows + i];
 }
 
-/* The largest that a row of it is off what the sheet gives, times `share`, in steps of the
+/* The largest difference between a row's voltage and `share` times the sheet's, in steps of the
  * converter. */
 static inline double raw_steps_off(const host_packet *packet, double share)
 {
     double worst = 0;
     for (uint32_t i = 0; i < b.open.n_rows; ++i)
         worst = fmax(worst, fabs((double)raw_volts(packet, i) - share * bench_volts(&b, i)));
-    for (uint32_t i = 0; i < b.open.n_rows; ++i) /* fmax passes over what is no number */
+    for (uint32_t i = 0; i < b.open.n_rows; ++i) /* fmax ignores NaN */
         worst = isnan(raw_volts(packet, i)) ? INFINITY : worst;
     return worst / fake_lsb_v(&b.board);
 }

@@ -1,5 +1,5 @@
-/* AD9833: words against the data sheet's and AN-1070's worked examples, the sequence, and buses
- * that fail. */
+/* AD9833: words against the data sheet's and AN-1070's worked examples, the sequence, and failing
+ * buses. */
 #include "check.h"
 #include "fake_board.h"
 
@@ -46,7 +46,7 @@ TEST(test_phase)
     CHECK_EQUAL(fw_ad9833_phase(180000), 2048);
     CHECK_EQUAL(fw_ad9833_phase(360000), 0);
     CHECK_EQUAL(fw_ad9833_phase(450000), 1024);
-    CHECK_EQUAL(fw_ad9833_phase(359990), 0); /* nearer to the whole turn than to its last unit */
+    CHECK_EQUAL(fw_ad9833_phase(359990), 0); /* closer to a whole turn than to the last unit */
     CHECK_EQUAL(fw_ad9833_phase(359900), 4095);
     CHECK_EQUAL(fw_ad9833_phase(44), 1);
     CHECK_EQUAL(fw_ad9833_phase(43), 0);
@@ -115,11 +115,11 @@ TEST(test_bus_fails_at_each_word)
         board.spi_fail_from = FW_AD9833_WORDS + at;
         board.spi_fails = 1;
         CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);
-        /* the write after the failure got through */
+        /* the write after the failure succeeded */
         CHECK_EQUAL(generator.state, FW_AD9833_RESET);
         CHECK_EQUAL(board.generator.control, 0x2100);
         CHECK_NEAR(fake_generator_hz(&board), 0, 0);
-        board.spi_fails = 100; /* from here on nothing gets through */
+        board.spi_fails = 100; /* from here on every write fails */
         CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);
         CHECK_EQUAL(generator.state, FW_AD9833_UNKNOWN);
         CHECK_EQUAL(fw_ad9833_stop(&generator), FW_E_BUS);

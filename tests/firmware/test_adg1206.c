@@ -1,4 +1,4 @@
-/* Four ADG1206: addresses of each, break before make, ranges, and lines that fail. */
+/* Four ADG1206: addresses of each, break before make, ranges, and failing lines. */
 #include "check.h"
 #include "fake_board.h"
 

@@ -1,5 +1,5 @@
-/* Commands: each status can be had, ranges and lengths hold, what is sent again is answered again
- * and not run again. */
+/* Commands: every status of a reply, ranges and lengths; a command that is sent again is answered
+ * again and not run again. */
 #include "steps.h"
 
 #include "small_model.h"
@@ -56,7 +56,8 @@ TEST(test_unknown)
     CHECK_EQUAL(b.host.packets, 0);
 }
 
-/* Names in INFO are cut to their room, the board's before a last zero, and have zeros behind them.
+/* Names in INFO are cut to the field's size and padded with zeros; the board's name always ends
+ * with a zero.
  */
 TEST(test_names)
 {
@@ -97,7 +98,7 @@ TEST(test_tare_ranges)
     CHECK_EQUAL(host_info(&b.host).tared, 0);
 }
 
-/* The reply to the default settings with `change` of them, said as `s.field = value`. */
+/* The reply to the default settings with `change`, given as `s.field = value`. */
 #define SCAN(change, status, a, c)                      \
     do {                                                \
         eits_command_scan s = host_default_scan();      \
@@ -116,7 +117,7 @@ TEST(test_scan_ranges)
     SCAN(s.excitation_millihz = 250000001, RANGE, 4, 250000000);
     SCAN(s.sample_rate_hz = 999, RANGE, 8, 1000);
     SCAN(s.sample_rate_hz = 5000001, RANGE, 8, 5000000);
-    /* in range, but more than this board's converter does; two samples a period: not enough */
+    /* in range, but too fast for this board's converter; two samples per period are too few */
     SCAN((s.sample_rate_hz = 5000000, s.samples = 400), RANGE, 8, 0);
     SCAN(s.sample_rate_hz = 100000, RANGE, 4, 49999999);
     SCAN(s.samples = 3, RANGE, 12, 4);
@@ -136,7 +137,8 @@ TEST(test_scan_ranges)
     REPLY(scan_with(host_default_scan()), EITS_REPLY_OK, 0, 0);
 }
 
-/* What is refused changes nothing: tare, settings and frames go on. What is taken forgets the tare.
+/* Refused settings change nothing: reference, settings and frames stay. Accepted settings forget
+ * the reference.
  */
 TEST(test_scan_and_tare)
 {
@@ -190,13 +192,13 @@ TEST(test_solver)
     SOLVER(c.solver = 4, 28, 3);
     SOLVER(c.diagnostics = EITS_DIAGNOSTICS_ALL + 1, 36, EITS_DIAGNOSTICS_ALL);
     SOLVER(c.track = 2, 40, 1);
-    const eits_options *options = eits_get_options(b.host.instrument.engine.ctx);
+    const eits_options *options = eits_get_options(b.host.instrument.solve.engine.ctx);
     CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
     CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
     CHECK_EQUAL(options->warm_start, 0);
     CHECK_EQUAL(options->mac_limit, 0);
     CHECK_EQUAL(options->iterations, 30);
-    /* the least of each */
+    /* the lowest value of each field */
     eits_command_solver c = {.iterations = 1, .max_touches = 1};
     REPLY(solver_with(c), EITS_REPLY_OK, 0, 0);
     CHECK_EQUAL(options->diagnostics, 0);
@@ -216,7 +218,7 @@ TEST(test_solver)
     c.track = 1;
     for (int k = 0; k < 2; ++k) { /* as after a start, and not a quarter lower each time */
         REPLY(solver_with(c), EITS_REPLY_OK, 0, 0);
-        c.iterations += 1; /* another command, not the last one again */
+        c.iterations += 1; /* a new command, not the last one repeated */
     }
     CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
     CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
@@ -226,17 +228,24 @@ TEST(test_mask_row)
 {
     REPLY(mask_row(208, 1), EITS_REPLY_RANGE, 4, 207);
     REPLY(mask_row(207, 2), EITS_REPLY_RANGE, 6, 1);
-    for (uint16_t bad = 1; bad < 2; --bad) {
-        REPLY(mask_row(207, bad), EITS_REPLY_OK, 0, 0);
+    const struct {
+        const char *name;
+        uint16_t masked;
+        uint8_t quality;
+    } cases[] = {{"masked", 1, EITS_QUALITY_MASKED}, {"not masked", 0, 0}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
+        REPLY(mask_row(207, cases[k].masked), EITS_REPLY_OK, 0, 0);
         REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 2), EITS_REPLY_OK, 0, 0);
         host_run(&b.host, 70);
         const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
-        CHECK_EQUAL(raw_quality(packet, 207), bad ? EITS_QUALITY_MASKED : 0);
-        CHECK_EQUAL(isnan(raw_volts(packet, 207)) != 0, bad);
+        CHECK_EQUAL(raw_quality(packet, 207), cases[k].quality);
+        CHECK_EQUAL(isnan(raw_volts(packet, 207)) != 0, cases[k].masked);
     }
 }
 
-/* A request sent again gives the same answer and nothing else; another number does it anew. */
+/* A request that is sent again gets the same answer and has no other effect; with another number it
+ * is run again. */
 TEST(test_sent_again)
 {
     eits_command_stream c = {.request = 5000, .what = EITS_STREAM_RAW, .every = 1, .frames = 3};
@@ -251,14 +260,15 @@ TEST(test_sent_again)
     const host_packet *first = host_packet_of(&b.host, EITS_PACKET_REPLY, 0),
                       *second = host_packet_of(&b.host, EITS_PACKET_REPLY, 1);
     CHECK(memcmp(first->payload, second->payload, sizeof(eits_packet_reply)) == 0);
-    CHECK_EQUAL(second->sequence, first->sequence + 4); /* but it is another packet */
+    CHECK_EQUAL(second->sequence, first->sequence + 4); /* in a packet of its own */
     /* the same number with another command is another command */
     eits_command_plain other = {5000};
     host_send(&b.host, EITS_PACKET_CLEAR_FAULTS, &other, sizeof other);
     host_run(&b.host, 5);
     const eits_packet_reply *last = (const void *)host_last(&b.host, EITS_PACKET_REPLY)->payload;
     CHECK_EQUAL(last->command, EITS_PACKET_CLEAR_FAULTS);
-    /* a tare under way is not restarted, and its answer comes once, and again when asked again */
+    /* a tare under way is not restarted; its answer comes once, and again if it is asked for again
+     */
     eits_command_tare tare = {.request = 6000, .frames = 10};
     host_forget(&b.host);
     host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
@@ -267,15 +277,15 @@ TEST(test_sent_again)
         host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
     }
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_REPLY), 0);
-    CHECK(b.host.instrument.tare.taken >= 7);
+    CHECK(b.host.instrument.solve.tare.taken >= 7);
     REPLY(host_reply(&b.host, 6000), EITS_REPLY_OK, 0, 0);
     (void)host_info(&b.host);
     REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
-    const uint32_t scanned = b.host.instrument.last_frame;
+    const uint32_t scanned = b.host.instrument.safety.faults.frame;
     host_forget(&b.host);
     host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
     REPLY(host_reply(&b.host, 6000), EITS_REPLY_OK, 0, 0);
-    CHECK(b.host.instrument.last_frame - scanned <= 1); /* at once */
+    CHECK(b.host.instrument.safety.faults.frame - scanned <= 1); /* at once */
 }
 
 TEST(test_stats_again)
@@ -309,7 +319,7 @@ TEST(test_stats_again)
           1);
 }
 
-/* While a tare is under way. */
+/* Which commands are refused while a tare is under way. */
 TEST(test_busy)
 {
     eits_command_tare tare = {.request = 8000, .frames = 50};
@@ -323,15 +333,15 @@ TEST(test_busy)
           EITS_PACKET_TARE, 0);
     REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 0), EITS_REPLY_OK, 0, 0);
     REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
-    CHECK(!b.host.instrument.reset_wanted);
+    CHECK(!b.host.instrument.link.reset_wanted);
     REPLY(host_plain(&b.host, EITS_PACKET_RESET), EITS_REPLY_OK, 0, 0);
-    CHECK(b.host.instrument.reset_wanted);
-    b.host.instrument.reset_wanted = false;
+    CHECK(b.host.instrument.link.reset_wanted);
+    b.host.instrument.link.reset_wanted = false;
     REPLY(host_reply(&b.host, 8000), EITS_REPLY_OK, 0, 0);
     REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
 }
 
-/* Bytes that are no packets are counted, and what follows them is understood. */
+/* Bytes outside packets are counted, and the packets after them are read. */
 TEST(test_bad_bytes)
 {
     const eits_packet_stats before = host_stats(&b.host, 0);
@@ -344,7 +354,7 @@ TEST(test_bad_bytes)
     f->to_board_size -= 6; /* cut short by the next packet */
     REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
     static uint8_t long_one[EITS_LINK_MAX_PAYLOAD];
-    /* longer than the board ever takes */
+    /* longer than the board accepts */
     host_send(&b.host, EITS_PACKET_MODEL_DATA, long_one, sizeof long_one);
     for (uint32_t k = 0; k < 20000; ++k)
         f->to_board[f->to_board_size++] = (uint8_t)(k * 2654435761u >> 24);
@@ -355,7 +365,7 @@ TEST(test_bad_bytes)
     CHECK(after.link_overruns > before.link_overruns);
     CHECK(after.link_packets >= before.link_packets + 3);
     CHECK_EQUAL(f->resets, 0);
-    CHECK(!b.host.instrument.reset_wanted);
+    CHECK(!b.host.instrument.link.reset_wanted);
 }
 
 int main(void)

@@ -1,11 +1,12 @@
-/* Demodulation: amplitudes and phases against the formula, the generator's own phase followed
- * across wraps, ends of range. */
+/* Demodulation: amplitudes and phases against the formula, the generator's own phase across wraps
+ * of the clock, ends of the range. */
 #include "app/acquire/sincos.h"
 #include "app/solve/phase.h"
 #include "check.h"
 #include "fake_board.h"
 
 #include <math.h>
+#include <string.h>
 
 #define TURN 6.283185307179586
 
@@ -57,7 +58,7 @@ TEST(test_scale)
     CHECK_EQUAL(fw_volts_per_code_nv(&CAPTURE), 805664); /* 3.3 V / 4096 */
     const fw_capture gained = {NULL, NULL, 4095, 3300000, 2500000};
     CHECK_EQUAL(fw_volts_per_code_nv(&gained), 322266);
-    /* 4 periods of 20 samples, 12 of 25 that are no more than 25 phases */
+    /* 4 periods of 20 samples, 12 of 25 samples, which have only 25 different phases */
     CHECK_NEAR(fw_rounding_v(805664, 50000000, 1000000, 80), 805.664e-6 / sqrt(6 * 20), 1e-10);
     CHECK_NEAR(fw_rounding_v(805664, 40000000, 1000000, 300), 805.664e-6 / sqrt(6 * 25), 1e-10);
     CHECK_EQUAL(fw_demodulate_setup(&d, &gained, 8000000, 1677722, 50000000, 1000000, 80), FW_OK);
@@ -67,18 +68,23 @@ TEST(test_scale)
     CHECK_NEAR(z.i, 0.5, 0.3 * 322e-6);
 }
 
-/* Amplitudes and phases within what rounding to whole codes leaves: 4 / pi times half a step at
- * worst, less where the samples of a burst fall on many places of the period. */
+/* The errors of amplitude and phase come from rounding to whole codes alone: at most 4 / pi times
+ * half a step, and less if the samples of a burst have many different phases. */
 TEST(test_amplitudes)
 {
     const struct {
+        const char *name;
         uint32_t millihertz, rate, samples;
         double steps;
-    } cases[] = {{50000000, 1000000, 80, 0.45},   {50000000, 1000000, 20, 0.45},
-                 {30000000, 1000000, 100, 0.3},   {250000000, 1000000, 64, 0.64},
-                 {125000000, 2000000, 1024, 0.5}, {1000000, 27000, 27, 0.3}};
+    } cases[] = {{"as after a start", 50000000, 1000000, 80, 0.45},
+                 {"one period", 50000000, 1000000, 20, 0.45},
+                 {"3 periods of 33.3 samples", 30000000, 1000000, 100, 0.3},
+                 {"4 samples per period", 250000000, 1000000, 64, 0.64},
+                 {"the longest burst", 125000000, 2000000, 1024, 0.5},
+                 {"an odd number of samples", 1000000, 27000, 27, 0.3}};
     const double lsb_v = 3.3 / 4096;
-    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; ++n) {
+    for (size_t n = 0; IN_TABLE(n, cases); ++n) {
+        CASE(cases[n].name);
         const uint32_t tuning = fw_ad9833_tuning(8000000, cases[n].millihertz);
         CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, tuning, cases[n].millihertz,
                                         cases[n].rate, cases[n].samples),
@@ -95,9 +101,9 @@ TEST(test_amplitudes)
     }
 }
 
-/* The generator's frequency is not quite the nominal one; the phase stays where it is, over hours
- * and the clock's wrap. */
-TEST(test_phase_followed)
+/* The generator's frequency differs slightly from the nominal one. The measured phase stays
+ * constant over hours and wraps of the clock. */
+TEST(test_phase_is_constant)
 {
     const uint32_t tuning = fw_ad9833_tuning(8000000, 50000000);
     const double turn_per_us = tuning * 8.0 / 268435456.0;
@@ -110,7 +116,7 @@ TEST(test_phase_followed)
                              4294967200u,
                              4294967296u + 100u,
                              5 * 4294967296u + 12345u};
-    for (size_t k = 0; k < sizeof when / sizeof when[0]; ++k) {
+    for (size_t k = 0; IN_TABLE(k, when); ++k) {
         const double turns =
             (double)((unsigned __int128)when[k] * tuning * 8u % 268435456u) / 268435456.0;
         fw_iq z;
@@ -141,7 +147,7 @@ TEST(test_ends_of_range)
                 FW_E_ARGUMENT);
 }
 
-/* The greatest sum of 16-bit codes over the longest burst does not overflow. */
+/* The largest sum of 16-bit codes over the longest burst does not overflow. */
 TEST(test_wide_converter)
 {
     const fw_capture wide = {NULL, NULL, 65535, 3300000, 1000000};
@@ -154,23 +160,29 @@ TEST(test_wide_converter)
     CHECK_NEAR(z.q, 0, 1e-4);
 }
 
-/* Two pairs of the model, upside down and half a turn away from what it expects: the phase follows,
- * whichever row of each pair can be used. */
+/* Two pairs of the model, also inverted, half a turn from the expected phase. The phase is learned
+ * from whichever row of each pair can be used. */
 TEST(test_phase_from_either_row)
 {
     static const eits_fold FOLD[2] = {{.first = 0, .second = 1, .sign = 1},
                                       {.first = 2, .second = 3, .sign = -1}};
     static const float V_REF[2] = {2, -1};
     static const float volts[4] = {2, 2, -1, 1};
-    for (int lost = 0; lost < 3; ++lost) {
+    const struct {
+        const char *name;
+        uint8_t quality[4];
+    } cases[] = {{"first rows are lost", {1, 0, 1, 0}},
+                 {"second rows are lost", {0, 1, 0, 1}},
+                 {"no row is lost", {0}}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
         for (int turn = 0; turn < 16; ++turn) {
             const double angle = TURN * (turn + 0.25) / 16;
             fw_iq z[4];
-            uint8_t quality[4] = {0};
-            for (int i = 0; i < 4; ++i) {
+            uint8_t quality[4];
+            memcpy(quality, cases[k].quality, sizeof quality);
+            for (int i = 0; i < 4; ++i)
                 z[i] = (fw_iq){(float)(volts[i] * cos(angle)), (float)(volts[i] * sin(angle))};
-                quality[i] = lost < 2 && i % 2 == lost;
-            }
             fw_engine engine = {.model = {.n_rows = 4, .n_folded = 2, .fold = FOLD, .v_ref = V_REF},
                                 .cosine = 1};
             const fw_frame frame = {.z = z, .quality = quality};

@@ -1,8 +1,8 @@
-/* What the core finds reaches the host by name: in the frame's head, and what persists as faults;
- * on frames of the sheet. */
+/* Diagnostics reach the host by name: in the frame's head, and as faults if they persist; on frames
+ * of the sheet. */
 #include "steps.h"
 
-/* Tared, and everything is streamed. */
+/* Start with a reference, and stream everything. */
 static void start(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -16,19 +16,17 @@ static const eits_packet_solved *head_of(const host_packet *packet)
     return (const void *)packet->payload;
 }
 
-/* Nothing is streamed, or every fifth frame: it is told all the same, in the frame that shows it.
+/* An open electrode is reported in the frame that shows it, whether or not that frame is streamed.
  */
-static void test_open_while_nobody_looks(uint16_t every)
+static void test_open_while_nobody_looks(uint16_t what, uint16_t every)
 {
     start();
-    CHECK_EQUAL(
-        host_stream(&b.host, every > 0 ? EITS_STREAM_TOUCHES : 0, every > 0 ? every : 1, 0).status,
-        EITS_REPLY_OK);
+    STREAM(what, every, 0);
     host_run(&b.host, 50);
     for (uint32_t e = 2; e < 16; e += 6) {
         host_forget(&b.host);
         detach(e, true);
-        const uint32_t before = b.host.instrument.last_frame;
+        const uint32_t before = b.host.instrument.safety.faults.frame;
         host_run(&b.host, 60);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
         CHECK(fault != NULL && fault->index == (int32_t)e && fault->frame <= before + 2);
@@ -38,11 +36,11 @@ static void test_open_while_nobody_looks(uint16_t every)
     }
 }
 
-/* Two electrodes that are merged: both named, each with the other. */
+/* Two electrodes that are connected are both named, each with the other. */
 static double bridged(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;
-    /* of the sheet with 6 and 7 as one: the pair's transfer impedances are their mean */
+    /* the sheet with electrodes 6 and 7 as one, whose transfer impedances are the mean of both */
     double volts = 0;
     for (int k = 0; k < 16; ++k) {
         uint8_t row[4];
@@ -77,7 +75,8 @@ TEST(test_bridged)
     CHECK_EQUAL(host_info(&b.host).faults >> EITS_FAULT_BRIDGED & 1u, 0);
 }
 
-/* One reading that is off for a frame: left out, in the head and in STATS, and no fault. */
+/* A single reading that is wrong for one frame is masked and counted, in the head and in STATS; it
+ * is not a fault. */
 static double one_row_off(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -97,7 +96,7 @@ TEST(test_outlier)
     uint32_t rows = 0;
     for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_TOUCHES); ++k) {
         const eits_packet_solved *head = head_of(host_packet_of(&b.host, EITS_PACKET_TOUCHES, k));
-        /* noise that passed for a touch may be said to be a guess */
+        /* a touch made of noise may be reported as crowded */
         const uint32_t crowded = EITS_DIAGNOSTIC_CROWDED;
         CHECK_EQUAL(head->diagnostics & ~crowded, head->outliers > 0 ? EITS_DIAGNOSTIC_OUTLIER : 0);
         CHECK(head->outliers <= 2 && head->masked == head->outliers);
@@ -108,11 +107,11 @@ TEST(test_outlier)
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_FAULT), 0);
 }
 
-/* What is not looked for is not found. */
+/* A diagnostic that is switched off reports nothing. */
 TEST(test_switched_off)
 {
     start();
-    const eits_options *o = eits_get_options(b.host.instrument.engine.ctx);
+    const eits_options *o = eits_get_options(b.host.instrument.solve.engine.ctx);
     eits_command_solver solver = {.iterations = o->iterations,
                                   .max_touches = o->max_touches,
                                   .lambda_rel = o->lambda_rel,
@@ -129,9 +128,11 @@ TEST(test_switched_off)
 
 int main(void)
 {
-    test_open_while_nobody_looks(0);
-    test_open_while_nobody_looks(5);
+    CASE("nothing is streamed");
+    test_open_while_nobody_looks(0, 1);
+    CASE("touches of every fifth frame are streamed");
+    test_open_while_nobody_looks(EITS_STREAM_TOUCHES, 5);
     run_tests();
     bench_stop(&b);
-    return checks_report("found");
+    return checks_report("diagnostics");
 }

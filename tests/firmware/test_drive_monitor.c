@@ -1,8 +1,8 @@
-/* The monitor of the drive sees what must never be: in traces by hand, and done by an instrument
- * with a fault planted in it. */
+/* The drive monitor finds violations: in traces written by hand, and in an instrument with a
+ * planted fault. */
 #include "steps.h"
 
-#include "app/main_loop.h"
+#include "app/instrument.h"
 #include "app/safety/current_enable.h"
 
 enum { MS = 1000000, ALL = 0xF0000, ROW = 0x3210, NEXT = 0x4321, FULL = 0x2000, RESET = 0x2100 };
@@ -27,7 +27,7 @@ typedef struct step {
 #define LATE {WAIT, DRIVE_MONITOR_SILENT_NS + 1}
 
 static const struct trace {
-    const char *violation; /* NULL: there is none */
+    const char *violation; /* NULL: none */
     step steps[12];
 } TRACES[] = {
     {NULL, {{HOST, 0}, RUNS, JOIN, OPEN, {ADDRESSES, NEXT}, {ENABLES, ALL}, {LOOK, 0}}},
@@ -118,7 +118,8 @@ static void does_not_wait(void *ctx, uint32_t ns)
     (void)ns;
 }
 
-/* The sentence about two seconds of an instrument before a host, or one that believes so. */
+/* The monitor's sentence after two seconds of an instrument with a host, or of one that wrongly
+ * assumes a host. */
 static const char *run(fw_lines_ops ops, bool asked, bool heard)
 {
     b.host.quiet = true;
@@ -131,10 +132,10 @@ static const char *run(fw_lines_ops ops, bool asked, bool heard)
     fw_instrument_init(instrument, &b.board.board);
     if (asked)
         drive_monitor_heard(&b.board.monitor, b.board.now_ns);
-    (void)fw_drive_on(instrument);
+    (void)fw_current_on(&instrument->safety);
     const uint64_t until_ns = b.board.now_ns + (uint64_t)2000 * MS;
     while (b.board.now_ns < until_ns && b.board.monitor.violation == NULL) {
-        fw_drive_heard(instrument);
+        fw_current_heard(&instrument->safety);
         if (heard)
             drive_monitor_heard(&b.board.monitor, b.board.now_ns);
         if (!fw_instrument_step(instrument))

@@ -1,8 +1,10 @@
-/* Faults: told once when they rise and once when they go; buses that fail and recover; what the
- * board says of its last end. */
+/* Faults: reported once when raised and once when cleared; buses that fail and recover; the report
+ * on the last reset. */
 #include "steps.h"
 
-static uint32_t told(eits_fault code, bool raised)
+#include "app/safety/faults.h"
+
+static uint32_t reports(eits_fault code, bool raised)
 {
     uint32_t count = 0;
     while (host_fault(&b.host, code, raised, count) != NULL)
@@ -21,38 +23,39 @@ TEST(test_last_reset)
     CHECK(crash != NULL);
     for (int k = 0; crash != NULL && k < 5; ++k)
         CHECK_EQUAL(crash->words[k], b.board.board.last_reset.words[k]);
-    CHECK_EQUAL(told(EITS_FAULT_WATCHDOG, true), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_WATCHDOG, true), 1);
     host_run(&b.host, 100);
-    /* until they are cleared */
+    /* they stay until they are cleared */
     CHECK_EQUAL(host_info(&b.host).faults, 1u << EITS_FAULT_CRASH | 1u << EITS_FAULT_WATCHDOG);
     CHECK((b.board.leds & 4u) != 0);
     TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
-    CHECK_EQUAL(told(EITS_FAULT_CRASH, false), 1);
-    CHECK_EQUAL(told(EITS_FAULT_WATCHDOG, false), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_CRASH, false), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_WATCHDOG, false), 1);
     CHECK_EQUAL(host_info(&b.host).faults, 0);
     host_run(&b.host, 5);
     CHECK((b.board.leds & 4u) == 0);
 }
 
-/* What is cleared by command and still there rises again. */
+/* A fault that is cleared by command and still there is raised again. */
 TEST(test_cleared_but_there)
 {
     bench_start(&b, NULL);
-    CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, true), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_NO_MODEL, true), 1);
     TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
-    CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, false), 1);
-    CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, true), 2);
+    CHECK_EQUAL(reports(EITS_FAULT_NO_MODEL, false), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_NO_MODEL, true), 2);
     bench_start(&b, &SKIN_ADJACENT);
     detach(9, true);
     host_run(&b.host, 200);
-    CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, true), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_ELECTRODE_OPEN, true), 1);
     TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
     host_run(&b.host, 60);
-    CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, true), 2);
-    CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, false), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_ELECTRODE_OPEN, true), 2);
+    CHECK_EQUAL(reports(EITS_FAULT_ELECTRODE_OPEN, false), 1);
 }
 
-/* The generator cannot be written at start-up: told, tried again, and the scan begins when it can.
+/* If the generator cannot be written at start-up, this is reported and tried again, and the scan
+ * begins once it works.
  */
 TEST(test_generator_bus)
 {
@@ -63,22 +66,22 @@ TEST(test_generator_bus)
         b.board.spi_fail_from = at;
         b.board.spi_fails = 1000;
         host_start(&b.host, &b.board);
-        CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
+        CHECK_EQUAL(reports(EITS_FAULT_BUS, true), 1);
         host_run(&b.host, 1200);
-        CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
+        CHECK_EQUAL(reports(EITS_FAULT_BUS, true), 1);
         CHECK_EQUAL(b.board.bursts, 0);
         CHECK_NEAR(fake_generator_hz(&b.board), 0, 0);
         CHECK_EQUAL(host_info(&b.host).faults, 1u << EITS_FAULT_BUS);
         b.board.spi_fails = 0;
         host_run(&b.host, 600);
-        CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
+        CHECK_EQUAL(reports(EITS_FAULT_BUS, false), 1);
         CHECK_NEAR(fake_generator_hz(&b.board), 50000, 0.02);
         TARE(4);
     }
 }
 
-/* Multiplexers that cannot be switched: once is measured again, always is told; then rows are no
- * numbers. */
+/* If the multiplexers fail once, the row is measured again; if they fail always, BUS is reported
+ * and rows are NaN. */
 TEST(test_multiplexer_bus)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -86,14 +89,14 @@ TEST(test_multiplexer_bus)
     STREAM(7, 1, 0);
     host_run(&b.host, 30);
     for (uint32_t at = 0; at < 3; ++at) {
-        const uint32_t repeated = b.host.instrument.scan.slots_repeated;
+        const uint32_t repeated = b.host.instrument.acquire.scan.slots_repeated;
         host_forget(&b.host);
         b.board.lines_fail_from = b.board.lines_calls + at;
         b.board.lines_fails = 1;
         host_run(&b.host, 70);
-        CHECK(b.host.instrument.scan.slots_repeated > repeated);
-        CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
-        CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
+        CHECK(b.host.instrument.acquire.scan.slots_repeated > repeated);
+        CHECK_EQUAL(reports(EITS_FAULT_BUS, true), 1);
+        CHECK_EQUAL(reports(EITS_FAULT_BUS, false), 1);
         for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
             const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
             for (uint32_t i = 0; i < 208; ++i)
@@ -104,17 +107,17 @@ TEST(test_multiplexer_bus)
     b.board.lines_fail_from = b.board.lines_calls;
     b.board.lines_fails = 1000000;
     host_run(&b.host, 500);
-    CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
-    CHECK_EQUAL(told(EITS_FAULT_SOLVER, true), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_BUS, true), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_SOLVER, true), 1);
     CHECK(b.board.monitor.violation == NULL);
     b.board.lines_fails = 0;
     host_run(&b.host, 500);
-    CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
-    CHECK_EQUAL(told(EITS_FAULT_SOLVER, false), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_BUS, false), 1);
+    CHECK_EQUAL(reports(EITS_FAULT_SOLVER, false), 1);
     CHECK_EQUAL(host_info(&b.host).faults, 0);
 }
 
-/* A bus that fails while a scan starts is told as that, and not as a converter that gives nothing.
+/* A bus that fails while a scan starts is reported as BUS, and not as a stalled scan.
  */
 TEST(test_bus_at_the_start_of_a_scan)
 {
@@ -126,59 +129,69 @@ TEST(test_bus_at_the_start_of_a_scan)
         b.board.lines_fail_from = b.board.lines_calls + at;
         b.board.lines_fails = 1;
         (void)scan_with(scan);
-        buses += told(EITS_FAULT_BUS, true);
+        buses += reports(EITS_FAULT_BUS, true);
         host_run(&b.host, 700); /* it is tried again */
-        CHECK_EQUAL(told(EITS_FAULT_SCAN_STALLED, true), 0);
+        CHECK_EQUAL(reports(EITS_FAULT_SCAN_STALLED, true), 0);
         CHECK_EQUAL(host_info(&b.host).faults, 0);
     }
     CHECK(buses >= 3);
 }
 
-/* So many frames with a fault and then without it: when it rises and goes, each electrode by
- * itself; a frame in between begins the count anew. */
+static bool is_raised(eits_fault code)
+{
+    return (fw_faults_raised(&b.host.instrument.safety) >> code & 1u) != 0;
+}
+
+/* After how many frames a fault is raised and cleared, for each electrode by itself. A frame that
+ * contradicts begins the count again. */
 TEST(test_hysteresis)
 {
     const struct {
+        const char *name;
         eits_fault code;
         uint32_t shown;
-    } kinds[] = {{EITS_FAULT_ELECTRODE_OPEN, 1}, {EITS_FAULT_SATURATED, 1},
-                 {EITS_FAULT_BRIDGED, 1},        {EITS_FAULT_ELECTRODE_NOISY, 3},
-                 {EITS_FAULT_MODEL_MISMATCH, 3}, {EITS_FAULT_STALE_REFERENCE, 3},
-                 {EITS_FAULT_UNLIKE_MODEL, 3}};
+    } kinds[] = {{"electrode open", EITS_FAULT_ELECTRODE_OPEN, 1},
+                 {"saturated", EITS_FAULT_SATURATED, 1},
+                 {"bridged", EITS_FAULT_BRIDGED, 1},
+                 {"electrode noisy", EITS_FAULT_ELECTRODE_NOISY, 3},
+                 {"model mismatch", EITS_FAULT_MODEL_MISMATCH, 3},
+                 {"stale reference", EITS_FAULT_STALE_REFERENCE, 3},
+                 {"unlike the model", EITS_FAULT_UNLIKE_MODEL, 3}};
     bench_start(&b, NULL);
-    fw_faults *faults = &b.host.instrument.faults;
+    fw_safety *safety = &b.host.instrument.safety;
     for (size_t k = 0; IN_TABLE(k, kinds); ++k) {
         const eits_fault code = kinds[k].code;
         const fw_fault_detail detail = {.index = 9, .value = 5};
+        CASE(kinds[k].name);
         for (uint32_t frame = 1; frame < kinds[k].shown; ++frame)
-            fw_fault_observe(faults, code, true, detail);
-        CHECK(!fw_fault_is(faults, code));
+            fw_fault_observe(safety, code, true, detail);
+        CHECK(!is_raised(code));
         if (kinds[k].shown > 1)
-            fw_fault_observe(faults, code, false, detail);
+            fw_fault_observe(safety, code, false, detail);
         for (uint32_t frame = 1; frame <= kinds[k].shown; ++frame) {
-            CHECK(!fw_fault_is(faults, code));
-            fw_fault_observe(faults, code, true, detail);
+            CHECK(!is_raised(code));
+            fw_fault_observe(safety, code, true, detail);
         }
-        CHECK(fw_fault_is(faults, code));
+        CHECK(is_raised(code));
         for (uint32_t again = 0; again < 2; ++again) {
             for (uint32_t frame = 1; frame < EITS_FAULT_CLEAR_FRAMES; ++frame)
-                fw_fault_observe(faults, code, false, detail);
-            CHECK(fw_fault_is(faults, code));
+                fw_fault_observe(safety, code, false, detail);
+            CHECK(is_raised(code));
             if (again == 0)
-                fw_fault_observe(faults, code, true, detail);
+                fw_fault_observe(safety, code, true, detail);
         }
-        fw_fault_observe(faults, code, false, detail);
-        CHECK(!fw_fault_is(faults, code));
+        fw_fault_observe(safety, code, false, detail);
+        CHECK(!is_raised(code));
         host_run(&b.host, 5);
-        CHECK_EQUAL(told(code, true), 1);
-        CHECK_EQUAL(told(code, false), 1);
+        CHECK_EQUAL(reports(code, true), 1);
+        CHECK_EQUAL(reports(code, false), 1);
         CHECK_EQUAL(host_fault(&b.host, code, true, 0)->value, 5);
     }
     for (int32_t e = 0; e < 16; e += 15)
-        fw_fault_observe(faults, EITS_FAULT_BRIDGED, true, (fw_fault_detail){.index = e});
-    CHECK_EQUAL(faults->there[EITS_FAULT_BRIDGED], 1u << 15 | 1u);
-    fw_faults_clear(faults, 0);
-    CHECK_EQUAL(faults->raised, 0);
+        fw_fault_observe(safety, EITS_FAULT_BRIDGED, true, (fw_fault_detail){.index = e});
+    CHECK_EQUAL(safety->faults.there[EITS_FAULT_BRIDGED], 1u << 15 | 1u);
+    fw_faults_clear(safety);
+    CHECK_EQUAL(fw_faults_raised(safety), 0);
 }
 
 TEST(test_watchdog_is_fed)

@@ -1,6 +1,8 @@
-/* From tare to stream: the reference, images with the core's own bits, streaming every n-th frame,
- * back-pressure. */
+/* From tare to stream: the reference, images with the same bits as the core's, streaming every n-th
+ * frame, back-pressure. */
 #include "steps.h"
+
+#include "app/solve/tare.h"
 
 #include "context/context.h"
 
@@ -23,9 +25,9 @@ static void mirror_start(uint32_t untouched)
     CHECK_OK(eits_init(mirror.workspace, eits_workspace_size(&b.open, 0), &b.open, &mirror.ctx));
     eits_options options = *eits_get_options(mirror.ctx);
     CHECK_OK(eits_options_track(&options)); /* as the firmware does */
-    options.noise_floor_v = eits_get_options(b.host.instrument.engine.ctx)->noise_floor_v;
-    options.warm_start = 1; /* of both, so that a frame depends on those before it */
-    b.host.instrument.engine.ctx->options.warm_start = 1;
+    options.noise_floor_v = eits_get_options(b.host.instrument.solve.engine.ctx)->noise_floor_v;
+    options.warm_start = 1; /* for both, so that a frame depends on earlier ones */
+    b.host.instrument.solve.engine.ctx->options.warm_start = 1;
     CHECK_OK(eits_set_options(mirror.ctx, &options));
     if (untouched > 1)
         CHECK_OK(eits_reference_begin(mirror.ctx, untouched));
@@ -68,7 +70,7 @@ static void mirror_touches(const host_packet *packet)
     mirror.found_count = count;
 }
 
-/* The board's events are those that its touches give here. */
+/* The board's events are the ones that follow from its touches here. */
 static void mirror_events(const host_packet *packet)
 {
     const eits_packet_events *head = (const eits_packet_events *)(const void *)packet->payload;
@@ -92,7 +94,7 @@ static void mirror_events(const host_packet *packet)
 }
 
 /* Take the packets that have come since the last call. */
-static void mirror_follow(void)
+static void mirror_catch_up(void)
 {
     for (; mirror.taken < b.host.packets; ++mirror.taken) {
         const host_packet *packet = &b.host.packet[mirror.taken];
@@ -120,50 +122,57 @@ static void mirror_follow(void)
     }
 }
 
-/* Images and touches have the bits of the core run on the frames that were sent; warm starts
- * included, whatever is masked. */
-static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t every,
-                           uint16_t check_every, uint32_t busy_ms)
+/* Images and touches have the same bits as those that the core computes here from the frames that
+ * were sent, with warm starts and masked rows. */
+typedef struct stream_case {
+    const char *name;
+    const skin_spec *spec;
+    uint32_t untouched;
+    uint16_t every, check_every;
+    uint32_t busy_ms, run_ms; /* of each write; of each part of the test */
+} stream_case;
+
+static void test_same_bits(const stream_case *c)
 {
-    bench_start(&b, spec);
+    CASE(c->name);
+    bench_start(&b, c->spec);
     b.board.noise_codes = 2;
-    b.board.write_cost_ns = busy_ms * 1000000u; /* meanwhile the scan goes on, as far as it may */
-    if (check_every != 1) {
-        check_each(check_every);
-    }
+    b.board.write_cost_ns =
+        c->busy_ms * 1000000u; /* meanwhile the scan continues while it has a free frame */
+    if (c->check_every != 1)
+        check_each(c->check_every);
     STREAM(EITS_STREAM_RAW, 1, 0);
     host_forget(&b.host);
-    mirror_start(untouched);
-    TARE(untouched);
-    STREAM(15, every, 0);
-    mirror_follow();
-    CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.99f);
-    CHECK(same_bits(mirror.ctx->reference.v0, b.host.instrument.engine.ctx->reference.v0,
+    mirror_start(c->untouched);
+    TARE(c->untouched);
+    STREAM(15, c->every, 0);
+    mirror_catch_up();
+    CHECK(b.host.instrument.solve.engine.ctx->reference.correlation > 0.99f);
+    CHECK(same_bits(mirror.ctx->reference.v0, b.host.instrument.solve.engine.ctx->reference.v0,
                     4 * b.open.n_rows));
     CHECK(same_bits(&mirror.ctx->reference.lambda_noise,
-                    &b.host.instrument.engine.ctx->reference.lambda_noise, 4));
-    const uint32_t ms = busy_ms > 0 ? 1500 : 150;
+                    &b.host.instrument.solve.engine.ctx->reference.lambda_noise, 4));
     touch(2, -3, 4);
-    host_run(&b.host, ms);
+    host_run(&b.host, c->run_ms);
     touch(-4, 1, 3);
-    host_run(&b.host, ms);
-    mirror_follow();
+    host_run(&b.host, c->run_ms);
+    mirror_catch_up();
     STREAM(EITS_STREAM_RAW, 1, 0);
-    if (untouched > 1)
-        CHECK_OK(eits_reference_begin(mirror.ctx, untouched));
-    /* with the touches: they are gone, and their ids */
-    TARE(untouched);
-    STREAM(15, every, 0);
+    if (c->untouched > 1)
+        CHECK_OK(eits_reference_begin(mirror.ctx, c->untouched));
+    /* a tare of touched frames: the touches and their ids are gone */
+    TARE(c->untouched);
+    STREAM(15, c->every, 0);
     touch(4, -2, 3);
-    host_run(&b.host, ms);
-    mirror_follow();
+    host_run(&b.host, c->run_ms);
+    mirror_catch_up();
     TAKEN(mask_row(17, 1));
-    host_run(&b.host, ms);
-    mirror_follow(); /* the row comes as not a number: nothing else is to be told */
+    host_run(&b.host, c->run_ms);
+    mirror_catch_up(); /* the row comes as NaN, and nothing else is needed */
     sheet_init(&b.sheet);
-    host_run(&b.host, ms);
-    mirror_follow();
-    CHECK(mirror.images >= 25u / every);
+    host_run(&b.host, c->run_ms);
+    mirror_catch_up();
+    CHECK(mirror.images >= 25u / c->every);
     CHECK_EQUAL(mirror.images, mirror.touches);
     CHECK_EQUAL(mirror.images, mirror.frames_of_events);
     CHECK(mirror.events > 0);
@@ -172,8 +181,7 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     CHECK_EQUAL(host_info(&b.host).tared, 1);
 }
 
-/* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the
- * angle. */
+/* If the skin is the model's, the gain is 1 and voltages have the right sign at every phase. */
 TEST(test_phase_of_the_voltages)
 {
     for (int k = 0; k < 9; ++k) {
@@ -181,11 +189,11 @@ TEST(test_phase_of_the_voltages)
         b.board.extra_turn = k / 9.0;
         STREAM(EITS_STREAM_RAW, 1, 0);
         TARE(8);
-        CHECK_NEAR(b.host.instrument.engine.ctx->reference.gain, 1, 1e-3);
-        CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.9999f);
+        CHECK_NEAR(b.host.instrument.solve.engine.ctx->reference.gain, 1, 1e-3);
+        CHECK(b.host.instrument.solve.engine.ctx->reference.correlation > 0.9999f);
         host_run(&b.host, 3000); /* the generator, 12 mHz off, would turn by 13 degrees */
         CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 1) <= 0.5);
-        /* what turns after the tare is not followed: half of a voltage is left */
+        /* a turn after the tare is not corrected: half of the voltage is left */
         b.board.extra_turn += 1 / 6.0;
         host_run(&b.host, 60);
         CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 0.5) <= 0.5);
@@ -208,12 +216,12 @@ TEST(test_streaming)
         CHECK_EQUAL(now->frame - last->frame, 3);
         CHECK(now->age_us < 1000);
     }
-    CHECK_EQUAL(host_info(&b.host).streaming, 0); /* five, and no more */
+    CHECK_EQUAL(host_info(&b.host).streaming, 0); /* it stops after five */
     CHECK_EQUAL(host_stats(&b.host, 0).frames_solved, 5);
     host_forget(&b.host);
     STREAM(EITS_STREAM_EVENTS, 1, 4);
     host_run(&b.host, 200);
-    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_EVENTS), 4); /* whether any happened or not */
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_EVENTS), 4); /* also if nothing happened */
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 0);
     CHECK_EQUAL(host_packet_of(&b.host, EITS_PACKET_EVENTS, 0)->size, sizeof(eits_packet_events));
     STREAM(EITS_STREAM_IMAGE, 2, 0);
@@ -225,20 +233,20 @@ TEST(test_streaming)
     CHECK_EQUAL(b.host.packets, 0);
 }
 
-/* Where the link takes no more, whole packets are dropped and counted, and nothing waits. */
+/* If the link is full, whole packets are dropped and counted, and nothing waits. */
 TEST(test_back_pressure)
 {
     bench_start(&b, &SKIN_ADJACENT);
     TARE(1);
     STREAM(7, 1, 0);
-    const uint32_t sent = b.host.instrument.tx_queue.sent;
+    const uint32_t sent = b.host.instrument.link.tx_queue.sent;
     b.host.gaps = 0;
     b.board.host_room = 3000;
     host_run(&b.host, 200);
-    const uint32_t frames = b.host.instrument.last_frame;
+    const uint32_t frames = b.host.instrument.safety.faults.frame;
     b.board.host_room = SIZE_MAX;
     host_run(&b.host, 200);
-    CHECK(b.host.instrument.last_frame >= frames + 9);
+    CHECK(b.host.instrument.safety.faults.frame >= frames + 9);
     const eits_packet_stats stats = host_stats(&b.host, 0);
     CHECK(stats.packets_dropped >= 15);
     CHECK_EQUAL(b.host.gaps, stats.packets_dropped);
@@ -246,14 +254,14 @@ TEST(test_back_pressure)
     CHECK_EQUAL(b.host.decoder.crc_errors + b.host.decoder.framing_errors, 0);
 }
 
-/* A tare that fails leaves the last reference, its angle and its images. */
+/* A tare that fails keeps the last reference, its phase and its images. */
 TEST(test_failed_tare)
 {
     bench_start(&b, &SKIN_ADJACENT);
     TARE(16);
     STREAM(EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0);
     mirror_start(0);
-    const fw_engine *engine = &b.host.instrument.engine;
+    const fw_engine *engine = &b.host.instrument.solve.engine;
     static float v0[256];
     memcpy(v0, engine->ctx->reference.v0, sizeof(float) * 208);
     const eits_reference before = engine->ctx->reference;
@@ -288,8 +296,8 @@ TEST(test_failed_tare)
     CHECK(peak < 1e-5f);
 }
 
-/* Frames whose scan began before the command are not untouched ones; frames of a tare are all sent,
- * whatever `every` is. */
+/* Frames whose scan began before the command do not count as untouched. All frames of a tare are
+ * sent, whatever `every` is. */
 TEST(test_reference_frames)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -322,33 +330,40 @@ TEST(test_self_test_keeps_the_tare)
     STREAM(7, 1, 0);
     touch(3, 3, 4);
     host_run(&b.host, 100);
-    mirror_follow();
+    mirror_catch_up();
     STREAM(EITS_STREAM_RAW, 1, 0);
     TAKEN(host_plain(&b.host, EITS_PACKET_SELF_TEST));
     STREAM(7, 1, 0);
-    mirror_follow();
+    mirror_catch_up();
     eits_forget(mirror.ctx);          /* a self-test forgets the warm start */
-    mirror.ctx->projection.stale = 1; /* and the basis, which costs MACs to build anew */
+    mirror.ctx->projection.stale = 1; /* and the basis, which costs MACs to build again */
     host_run(&b.host, 100);
-    mirror_follow();
+    mirror_catch_up();
     CHECK(mirror.images >= 8);
     CHECK_EQUAL(mirror.different, 0);
-    /* nor does it forget the voltages' angle: what turns now is not followed */
+    /* nor does it forget the phase: a turn now is not corrected */
     b.board.extra_turn += 1 / 6.0;
     host_run(&b.host, 60);
     const float volts = raw_volts(host_last(&b.host, EITS_PACKET_RAW), 0);
     CHECK_NEAR(volts, 0.5 * bench_volts(&b, 0), 0.5 * fake_lsb_v(&b.board));
 }
 
-/* A tare takes frames whose scan began with the command or later, also where the clock wraps. */
+/* A tare takes frames whose scan began with the command or later, also if the clock wraps. */
 TEST(test_tare_begins_with_the_command)
 {
-    static const uint32_t commands[] = {1000, 0, 0xFFFFFFFFu, 0x80000000u};
-    for (int k = 0; k < 4; ++k) {
-        const fw_tare tare = {.active = true, .since_us = commands[k]},
-                      over = {.since_us = commands[k]};
+    static const struct {
+        const char *name;
+        uint32_t since_us;
+    } commands[] = {{"no wrap", 1000},
+                    {"the clock is at 0", 0},
+                    {"the clock is about to wrap", 0xFFFFFFFFu},
+                    {"half of the clock's range", 0x80000000u}};
+    for (size_t k = 0; IN_TABLE(k, commands); ++k) {
+        CASE(commands[k].name);
+        const fw_solve tare = {.tare = {.active = true, .since_us = commands[k].since_us}},
+                       over = {.tare = {.since_us = commands[k].since_us}};
         for (int late = -2; late <= 2; ++late) {
-            const fw_frame frame = {.time_us = commands[k] + (uint32_t)late};
+            const fw_frame frame = {.time_us = commands[k].since_us + (uint32_t)late};
             CHECK_EQUAL(fw_tare_wants(&tare, &frame), late >= 0);
             CHECK(!fw_tare_wants(&over, &frame));
         }
@@ -357,10 +372,14 @@ TEST(test_tare_begins_with_the_command)
 
 int main(void)
 {
-    test_same_bits(&SKIN_ADJACENT, 8, 1, 1, 0);
-    test_same_bits(&SKIN_ADJACENT, 1, 2, 1, 0);
-    test_same_bits(&SKIN_OPPOSITE, 5, 1, 4, 0);
-    test_same_bits(&SKIN_ADJACENT, 4, 1, 1, 50);
+    const stream_case cases[] = {
+        {"every frame", &SKIN_ADJACENT, 8, 1, 1, 0, 150},
+        {"one untouched frame, every second frame", &SKIN_ADJACENT, 1, 2, 1, 0, 150},
+        {"reciprocal scans of an opposite protocol", &SKIN_OPPOSITE, 5, 1, 4, 0, 150},
+        {"a slow link", &SKIN_ADJACENT, 4, 1, 1, 50, 1500},
+    };
+    for (size_t k = 0; k < COUNT_OF(cases); ++k)
+        test_same_bits(&cases[k]);
     run_tests();
     bench_stop(&b);
     return checks_report("instrument");

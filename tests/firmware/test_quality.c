@@ -1,5 +1,5 @@
-/* Quality: open electrodes by name within one frame and never for touches, saturation, reciprocity,
- * on frames of the sheet. */
+/* Quality: open electrodes are named within one frame, and touches are not taken for them;
+ * saturation; reciprocity; on frames of the sheet. */
 #include "steps.h"
 
 static void start(uint16_t check_every)
@@ -26,8 +26,8 @@ static const eits_packet_solved *head_of(const host_packet *packet)
     return (const void *)packet->payload;
 }
 
-/* The first frame that RAW (without a reference: by its quality) or the head (with one) says
- * electrode e is open in; 0: none. */
+/* The first frame in which electrode e is open, by the head, or without a reference by the quality
+ * in RAW; 0: none. */
 static uint32_t first_named(uint32_t e, bool tared)
 {
     for (uint32_t k = 0; tared && k < host_count(&b.host, EITS_PACKET_IMAGE); ++k) {
@@ -47,8 +47,8 @@ static uint32_t first_named(uint32_t e, bool tared)
     return 0;
 }
 
-/* Rows of a frame that is wholly without electrode e: without a reference they are marked and no
- * numbers; with one the core gets them as they are. */
+/* Rows of a frame that was measured wholly without electrode e. Without a reference they are marked
+ * and NaN; with one the core gets them as they are. */
 static void check_rows(const host_packet *packet, uint32_t e, bool tared)
 {
     for (uint32_t i = 0; i < 208; ++i) {
@@ -57,8 +57,8 @@ static void check_rows(const host_packet *packet, uint32_t e, bool tared)
     }
 }
 
-/* An electrode comes off, with and without a tare, in full and reciprocal scans: named in the first
- * frame that is wholly so, by a fault and in the frame; gone eight frames after it is back. */
+/* An electrode comes off. It is named in the first frame that was measured wholly without it, by a
+ * fault and in the frame. The fault is cleared eight frames after the electrode is back. */
 static void test_open(bool tared, uint16_t check_every)
 {
     start(check_every);
@@ -72,7 +72,7 @@ static void test_open(bool tared, uint16_t check_every)
         host_run(&b.host, 60);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
         CHECK(fault != NULL && fault->index == (int32_t)e);
-        /* that one alone, and once */
+        /* only this electrode, and once */
         CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 1) == NULL);
         CHECK(fault != NULL && fault->frame == first_named(e, tared));
         uint32_t whole = 0;
@@ -86,7 +86,7 @@ static void test_open(bool tared, uint16_t check_every)
             check_rows(packet, e, tared);
         }
         CHECK(whole >= 1);
-        if (tared) { /* the image goes on, without those rows */
+        if (tared) { /* images continue without those rows */
             const eits_packet_solved *image = head_of(host_last(&b.host, EITS_PACKET_IMAGE));
             CHECK_EQUAL(image->status, 0);
             uint32_t lost = 0;
@@ -97,8 +97,8 @@ static void test_open(bool tared, uint16_t check_every)
                         EITS_DIAGNOSTIC_ELECTRODE_OPEN);
         }
         detach(e, false);
-        /* the frame under way may still be without it */
-        const uint32_t back = b.host.instrument.last_frame + 1;
+        /* the frame under way may still have been measured without it */
+        const uint32_t back = b.host.instrument.safety.faults.frame + 1;
         host_run(&b.host, 300);
         const eits_packet_fault *gone = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0);
         CHECK(gone != NULL && gone->index == (int32_t)e);
@@ -108,25 +108,31 @@ static void test_open(bool tared, uint16_t check_every)
     }
 }
 
-/* Two at once, neighbours or not. */
+/* Two electrodes are open at once. */
 TEST(test_two_open)
 {
     start(1);
     tare();
-    for (uint32_t other = 4; other < 12; other += 4) {
+    const struct {
+        const char *name;
+        uint32_t other;
+    } cases[] = {{"neighbours", 4}, {"far apart", 8}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        const uint32_t other = cases[k].other;
+        CASE(cases[k].name);
         b.sheet.detached[3] = true;
         detach(other, true);
         host_run(&b.host, 60);
-        CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN],
+        CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN],
                     1u << 3 | 1u << other);
         b.sheet.detached[3] = false;
         detach(other, false);
         host_run(&b.host, 300);
-        CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
+        CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
     }
 }
 
-/* An electrode behind an amplifier that runs into its limit is open too. */
+/* An electrode is open also if its amplifier saturates. */
 static double to_the_rail(void *user, const uint8_t electrodes[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -139,12 +145,12 @@ TEST(test_open_at_the_rail)
     tare();
     b.board.volts = to_the_rail;
     host_run(&b.host, 60);
-    CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 6);
+    CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 6);
     const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_SATURATED, true, 0);
     CHECK(fault != NULL);
 }
 
-/* A skin of other voltages than the model's by far: the tare says what is to be expected. */
+/* A skin with far smaller voltages than the model's: the tare gives the scale. */
 static double faint(void *user, const uint8_t electrodes[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -162,8 +168,7 @@ TEST(test_faint_skin)
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
 }
 
-/* One row that reads something whatever is connected, and is masked for that: it does not speak for
- * its electrodes. */
+/* A row that reads a constant, and is masked for that, is not counted for its electrodes. */
 static double stuck_row(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -182,25 +187,31 @@ TEST(test_masked_row_is_not_judged)
     }
     detach(5, true);
     host_run(&b.host, 60);
-    CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 5);
+    CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 5);
 }
 
-/* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half
- * the skin. Nothing is open. */
+/* Touches do not open electrodes, whether light or strong, near the rim, over electrodes, over half
+ * the skin, or insulating. */
 static void test_touches_are_not_open(bool tared)
 {
     start(1);
     if (tared)
         tare();
-    const double factors[] = {0.02, 0.3, 3, 10};
-    for (size_t f = 0; IN_TABLE(f, factors); ++f) {
-        for (int place = 0; place < 5; ++place) {
+    const struct {
+        const char *name;
+        double factor; /* of conductivity */
+    } touches[] = {{"almost insulating", 0.02}, {"insulating", 0.3}, {"light", 3}, {"strong", 10}};
+    const struct {
+        double x, y, radius;
+    } places[] = {{0, 0, 1}, {1.7, -0.4, 2}, {3.4, -0.8, 3}, {5.1, -1.2, 4}, {6.8, -1.6, 2.5}};
+    for (size_t k = 0; IN_TABLE(k, touches); ++k) {
+        CASE(touches[k].name);
+        for (size_t p = 0; p < COUNT_OF(places); ++p) {
             sheet_init(&b.sheet);
-            sheet_touch(&b.sheet, 1.7 * place, -0.4 * place, place == 4 ? 2.5 : 1 + place,
-                        factors[f]);
+            sheet_touch(&b.sheet, places[p].x, places[p].y, places[p].radius, touches[k].factor);
             sheet_solve(&b.sheet);
             host_run(&b.host, 45);
-            CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
+            CHECK_EQUAL(b.host.instrument.safety.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
         }
     }
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
@@ -224,7 +235,8 @@ TEST(test_saturation)
     if (fault != NULL) {
         const uint8_t *row = b.open.protocol + 4 * (size_t)fault->index;
         CHECK(row[0] == 2 && row[2] == 9);
-        CHECK(fault->value == 2 || fault->value == 1); /* the frame of the change may have one */
+        CHECK(fault->value == 2 ||
+              fault->value == 1); /* the frame of the change may have only one */
     }
     const host_packet *raw = host_last(&b.host, EITS_PACKET_RAW);
     uint32_t marked = 0;
@@ -248,7 +260,7 @@ static double broken_reciprocity(void *user, const uint8_t e[4], uint64_t at_ns)
     return sheet_volts(user, e) * (e[0] == 2 && e[2] == 5 ? 1.6 : 1);
 }
 
-/* Reciprocal rows that disagree are marked at once, and told when it lasts. */
+/* Reciprocal rows that disagree are marked at once, and reported if it lasts. */
 static void test_reciprocity(uint16_t check_every)
 {
     start(check_every);
@@ -257,7 +269,8 @@ static void test_reciprocity(uint16_t check_every)
     CHECK(host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0) == NULL);
     b.board.volts = broken_reciprocity;
     host_run(&b.host, 30);
-    CHECK(host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0) == NULL); /* not for a frame */
+    CHECK(host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0) ==
+          NULL); /* not for a single frame */
     host_run(&b.host, 70u * check_every + 30);
     const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0);
     CHECK(fault != NULL);
@@ -297,12 +310,12 @@ TEST(test_dead)
     tare();
     b.board.volts = nothing;
     host_run(&b.host, 60);
-    /* a cable unplugged looks like this */
+    /* this is what an unplugged cable looks like */
     CHECK(host_fault(&b.host, EITS_FAULT_SOLVER, true, 0) != NULL);
     const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
     const eits_packet_solved *head = (const void *)image->payload;
     CHECK_EQUAL((int16_t)head->status, -EITS_E_FRAME_ZERO);
-    CHECK_EQUAL(head->open_electrodes, 0); /* it is not the electrodes */
+    CHECK_EQUAL(head->open_electrodes, 0); /* the electrodes are not blamed */
     for (uint32_t j = 0; j < b.open.n_pixels; ++j) {
         float value;
         memcpy(&value, image->payload + sizeof *head + 4 * j, 4);
@@ -315,13 +328,23 @@ TEST(test_dead)
 
 int main(void)
 {
-    test_open(false, 1);
-    test_open(true, 1);
-    test_open(true, 4);
+    const struct {
+        const char *name;
+        bool tared;
+        uint16_t check_every;
+    } open[] = {{"no reference", false, 1},
+                {"reference, full scans", true, 1},
+                {"reference, every fourth scan is full", true, 4}};
+    for (size_t k = 0; k < COUNT_OF(open); ++k) {
+        CASE(open[k].name);
+        test_open(open[k].tared, open[k].check_every);
+    }
     run_tests();
     test_touches_are_not_open(true);
     test_touches_are_not_open(false);
+    CASE("every scan is full");
     test_reciprocity(1);
+    CASE("every third scan is full");
     test_reciprocity(3);
     bench_stop(&b);
     return checks_report("quality");

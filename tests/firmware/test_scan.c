@@ -8,8 +8,8 @@ static const eits_packet_raw *raw_head(uint32_t k)
     return packet == NULL ? NULL : (const eits_packet_raw *)(const void *)packet->payload;
 }
 
-/* Rows are measured in the model's order, each with its own four electrodes, and never is one made
- * before another broke. */
+/* Rows are measured in the model's order, each with its own four electrodes, and always break
+ * before make. */
 static void test_order(const skin_spec *spec, uint32_t rows)
 {
     bench_start(&b, spec);
@@ -24,49 +24,59 @@ static void test_order(const skin_spec *spec, uint32_t rows)
     CHECK_EQUAL(b.open.scan_order[13], spec->order == 7 ? 7 * 13 : 13);
     CHECK_EQUAL(wrong, 0);
     CHECK(b.board.monitor.violation == NULL);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, 0);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.slots_repeated, 0);
     CHECK_EQUAL(b.board.setup.slot_us, 100);
 }
 
-/* Voltages of untouched and touched skins within half a step of the converter, on every row. */
+/* The last frame has voltages within half a step of the converter on every row. */
+static void check_voltages(const char *name)
+{
+    CASE(name);
+    host_run(&b.host, 60); /* the frame under way began before the skin changed */
+    hear(60);
+    const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
+    CHECK(packet != NULL);
+    if (packet == NULL)
+        return;
+    CHECK_EQUAL(packet->size, sizeof(eits_packet_raw) + 5 * b.open.n_rows);
+    CHECK(raw_steps_off(packet, 1) <= 0.5);
+    for (uint32_t i = 0; i < b.open.n_rows; ++i)
+        CHECK_EQUAL(raw_quality(packet, i), 0);
+}
+
 static void test_voltages(const skin_spec *spec)
 {
     bench_start(&b, spec);
     STREAM(EITS_STREAM_RAW, 1, 0);
-    for (int touched = 0; touched < 2; ++touched) {
-        if (touched) {
-            TARE(4);
-            sheet_touch(&b.sheet, -3, 2, 2, 6);
-            sheet_solve(&b.sheet);
-        }
-        host_run(&b.host, 60); /* the frame under way is neither */
-        hear(60);
-        const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
-        CHECK(packet != NULL);
-        if (packet == NULL)
-            continue;
-        CHECK_EQUAL(packet->size, sizeof(eits_packet_raw) + 5 * b.open.n_rows);
-        CHECK(raw_steps_off(packet, 1) <= 0.5);
-        for (uint32_t i = 0; i < b.open.n_rows; ++i)
-            CHECK_EQUAL(raw_quality(packet, i), 0);
-    }
+    check_voltages("untouched");
+    TARE(4);
+    sheet_touch(&b.sheet, -3, 2, 2, 6);
+    sheet_solve(&b.sheet);
+    check_voltages("touched");
+    CASE("");
 }
 
-/* With settling as long as what the multiplexers take, what was before is not seen; without it, it
- * would be. */
+/* If the settling time covers the multiplexers' time constant, the row before leaves no trace. */
 TEST(test_settling)
 {
+    const struct {
+        const char *name;
+        uint16_t settle_us;
+        double least_off, most_off; /* in steps of the converter */
+    } cases[] = {{"a few time constants", 1, 2, 1e9}, {"twelve time constants", 36, -1, 0.5}};
     bench_start(&b, &SKIN_ADJACENT);
     b.board.tau_ns = 3000;
     STREAM(EITS_STREAM_RAW, 1, 0);
-    for (int settled = 0; settled < 2; ++settled) {
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         eits_command_scan scan = host_default_scan();
-        scan.settle_us = settled ? 36 : 1; /* twelve time constants, or a few */
+        CASE(cases[k].name);
+        scan.settle_us = cases[k].settle_us;
         scan.samples = 20;
         TAKEN(scan_with(scan));
         host_run(&b.host, 60);
-        const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
-        CHECK(settled ? raw_steps_off(packet, 1) < 0.5 : raw_steps_off(packet, 1) > 2);
+        const double off = raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 1);
+        CHECK(off > cases[k].least_off);
+        CHECK(off < cases[k].most_off);
     }
 }
 
@@ -76,28 +86,33 @@ TEST(test_late_switch)
     bench_start(&b, &SKIN_ADJACENT);
     STREAM(EITS_STREAM_RAW, 1, 0);
     host_run(&b.host, 30);
-    const uint32_t before = b.host.instrument.scan.slots_repeated;
-    b.board.late_once_ns = 5000; /* of 20 us from burst to burst, 16 are for settling */
-    host_run(&b.host, 2);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 1);
-    /* made 84.3 us after the slot's start: 15.7 us, though the clock says 84 */
-    b.board.late_once_ns = 3440;
-    host_run(&b.host, 2);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 2);
-    b.board.late_once_ns = 2900; /* 16.2 us */
-    host_run(&b.host, 2);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 2);
-    b.board.lose = 2;
-    host_run(&b.host, 2);
-    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 4);
+    /* of 20 us from burst to burst, 16 are for settling */
+    const struct {
+        const char *name;
+        uint32_t late_ns, lost, repeated;
+    } cases[] = {
+        {"15 us are left", 5000, 0, 1},
+        {"15.7 us are left, though the clock shows 16", 3440, 0, 1},
+        {"16.2 us are left", 2900, 0, 0},
+        {"two bursts are lost", 0, 2, 2},
+    };
+    uint32_t repeated = b.host.instrument.acquire.scan.slots_repeated;
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
+        b.board.late_once_ns = cases[k].late_ns;
+        b.board.lose = cases[k].lost;
+        host_run(&b.host, 2);
+        repeated += cases[k].repeated;
+        CHECK_EQUAL(b.host.instrument.acquire.scan.slots_repeated, repeated);
+    }
     host_run(&b.host, 60);
     const host_packet *packet = NULL;
     for (uint32_t k = 0; (packet = host_packet_of(&b.host, EITS_PACKET_RAW, k)) != NULL; ++k)
         CHECK(raw_steps_off(packet, 1) < 0.5);
-    CHECK_EQUAL(host_stats(&b.host, 0).slots_repeated, before + 4);
+    CHECK_EQUAL(host_stats(&b.host, 0).slots_repeated, repeated);
 }
 
-/* Rows that cannot be measured at all are given up, marked, and are not a number. */
+/* Rows that cannot be measured are marked, and are NaN. */
 TEST(test_never_settles)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -106,7 +121,7 @@ TEST(test_never_settles)
     host_run(&b.host, 400);
     const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
     CHECK(packet != NULL);
-    /* a row measured again has been selected for a whole slot: settled */
+    /* a row that is measured again has been selected for a whole slot, so it has settled */
     CHECK(packet != NULL && !isnan(raw_volts(packet, 0)));
     b.board.latency_ns = 600;
     b.board.lose = 1000000;
@@ -126,47 +141,71 @@ static void set_check_every(uint16_t every)
     host_forget(&b.host);
 }
 
-/* Reciprocal scans take half the rows; the others are copies with their sign. */
+typedef struct reciprocal_case {
+    const char *name;
+    uint16_t every;        /* which frame is full */
+    bool some_full;        /* in a tenth of a second */
+    bool masks_second;     /* which row of a fold is masked */
+    uint8_t first, second; /* quality of the fold's rows then */
+} reciprocal_case;
+
+/* The flags, the time and the rows of a reciprocal frame, or of a full one. */
+static void check_reciprocal_frame(uint32_t k, bool full)
+{
+    const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
+    const uint32_t rows = full ? b.open.n_rows : b.open.n_folded;
+    CHECK_EQUAL(raw_head(k)->flags, full ? EITS_RAW_CHECK : EITS_RAW_RECIPROCAL);
+    CHECK_EQUAL(raw_head(k)->scan_us, (rows - 1) * 100 + 80);
+    CHECK(raw_steps_off(packet, 1) <= 0.5);
+    for (uint32_t f = 0; f < b.open.n_folded; ++f) {
+        const eits_fold fold = b.open.fold[f];
+        CHECK(raw_volts(packet, fold.second) == (float)fold.sign * raw_volts(packet, fold.first));
+        CHECK_EQUAL(raw_quality(packet, fold.first), 0);
+        CHECK_EQUAL(raw_quality(packet, fold.second), EITS_QUALITY_COPIED);
+    }
+}
+
+/* A masked row has no value and does not change its reciprocal row. */
+static void check_masked_fold(const reciprocal_case *c)
+{
+    const eits_fold fold = b.open.fold[3];
+    const uint16_t row = c->masks_second ? fold.second : fold.first;
+    TAKEN(mask_row(row, 1));
+    host_run(&b.host, 60);
+    const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
+    CHECK_EQUAL(isnan(raw_volts(packet, fold.first)) != 0, !c->masks_second);
+    CHECK_EQUAL(isnan(raw_volts(packet, fold.second)) != 0, c->masks_second);
+    CHECK_EQUAL(raw_quality(packet, fold.first), c->first);
+    CHECK_EQUAL(raw_quality(packet, fold.second), c->second);
+    TAKEN(mask_row(row, 0));
+}
+
+/* Reciprocal scans measure half the rows; the others are copies with their sign. */
 static void test_reciprocal(const skin_spec *spec)
 {
+    static const reciprocal_case cases[] = {
+        {"no frame is full", 0, false, true, 0, EITS_QUALITY_COPIED | EITS_QUALITY_MASKED},
+        {"every third is full", 3, true, false, EITS_QUALITY_MASKED, EITS_QUALITY_COPIED},
+    };
     bench_start(&b, spec);
     STREAM(EITS_STREAM_RAW, 1, 0);
-    for (uint16_t every = 0; every <= 3; every += 3) {
-        set_check_every(every);
+    for (size_t n = 0; IN_TABLE(n, cases); ++n) {
+        const reciprocal_case *c = &cases[n];
+        CASE(c->name);
+        set_check_every(c->every);
         host_run(&b.host, 110);
         const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
         CHECK(frames >= 5);
-        uint32_t checks = 0;
+        uint32_t full_ones = 0;
         for (uint32_t k = 0; k < frames; ++k) {
-            const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
-            const eits_packet_raw *head = raw_head(k);
-            const bool check = every != 0 && head->frame % every == 0;
-            CHECK_EQUAL(head->flags, check ? EITS_RAW_CHECK : EITS_RAW_RECIPROCAL);
-            CHECK_EQUAL(head->scan_us, ((check ? b.open.n_rows : b.open.n_folded) - 1) * 100 + 80);
-            checks += check;
-            CHECK(raw_steps_off(packet, 1) <= 0.5);
-            for (uint32_t f = 0; f < b.open.n_folded; ++f) {
-                const eits_fold fold = b.open.fold[f];
-                CHECK(raw_volts(packet, fold.second) ==
-                      (float)fold.sign * raw_volts(packet, fold.first));
-                CHECK_EQUAL(raw_quality(packet, fold.first), 0);
-                CHECK_EQUAL(raw_quality(packet, fold.second), EITS_QUALITY_COPIED);
-            }
+            const bool full = c->every != 0 && raw_head(k)->frame % c->every == 0;
+            check_reciprocal_frame(k, full);
+            full_ones += full;
         }
-        CHECK(every == 0 ? checks == 0 : checks >= 1);
-        /* a row that is masked has no say and no value; its reciprocal has */
-        const eits_fold masked = b.open.fold[3];
-        const uint16_t row = every == 0 ? masked.second : masked.first;
-        TAKEN(mask_row(row, 1));
-        host_run(&b.host, 60);
-        const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
-        CHECK_EQUAL(isnan(raw_volts(packet, masked.first)) != 0, every != 0);
-        CHECK_EQUAL(isnan(raw_volts(packet, masked.second)) != 0, every == 0);
-        CHECK_EQUAL(raw_quality(packet, masked.first), every == 0 ? 0 : EITS_QUALITY_MASKED);
-        CHECK_EQUAL(raw_quality(packet, masked.second),
-                    EITS_QUALITY_COPIED | (every == 0 ? EITS_QUALITY_MASKED : 0));
-        TAKEN(mask_row(row, 0));
+        CHECK_EQUAL(full_ones > 0, c->some_full);
+        check_masked_fold(c);
     }
+    CASE("");
 }
 
 TEST(test_frame_period)
@@ -189,18 +228,18 @@ TEST(test_frame_period)
         CHECK_EQUAL(raw_head(k)->frame, raw_head(k - 1)->frame + 1);
         CHECK_NEAR(raw_head(k)->time_us - raw_head(k - 1)->time_us, 33333, 100);
     }
-    /* nothing is lost in the long run: slots are 100 us, periods are not */
+    /* no drift in the long run, although a period is not a whole number of slots */
     CHECK_NEAR((double)(raw_head(frames - 1)->time_us - raw_head(0)->time_us),
                33333.0 * (frames - 1), 100);
     CHECK_EQUAL(host_stats(&b.host, 0).deadlines_missed, 0);
-    /* one that is a whole number of slots is kept to the microsecond, from the first frame on */
+    /* a period of a whole number of slots is kept to the microsecond, from the first frame on */
     scan.frame_period_us = 30000;
     TAKEN(scan_with(scan));
     hear(200);
     for (uint32_t k = 1; k < host_count(&b.host, EITS_PACKET_RAW); ++k)
         CHECK_EQUAL(raw_head(k)->time_us - raw_head(k - 1)->time_us, 30000);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 5);
-    b.board.clock_cost_ns = 15000000; /* the solver, as it were */
+    b.board.clock_cost_ns = 15000000; /* in place of a slow solver */
     TARE(1);
     host_run(&b.host, 1000);
     CHECK(host_stats(&b.host, 0).deadlines_missed > 0);
@@ -210,19 +249,19 @@ TEST(test_frame_period)
     CHECK(host_fault(&b.host, EITS_FAULT_DEADLINE, false, 0) != NULL);
 }
 
-/* While the main loop is busy, one frame is filled, then the scan waits; no frame is half old and
- * half new. */
+/* While the main loop is busy, one frame is filled, and then the scan waits. No frame mixes two
+ * scans. */
 TEST(test_two_buffers)
 {
     bench_start(&b, &SKIN_ADJACENT);
     STREAM(EITS_STREAM_RAW, 1, 0);
-    b.board.write_cost_ns = 90000000; /* four frames' time */
+    b.board.write_cost_ns = 90000000; /* as long as four frames */
     host_run(&b.host, 2000);
     const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
     CHECK(frames >= 15 && frames <= 30);
     for (uint32_t k = 0; k < frames; ++k) {
         const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
-        /* scanned frames are all there */
+        /* no scanned frame is missing */
         CHECK(k == 0 || raw_head(k)->frame == raw_head(k - 1)->frame + 1);
         CHECK_EQUAL(raw_head(k)->scan_us, 20780);
         CHECK_NEAR(raw_volts(packet, 207), bench_volts(&b, 207), 0.5 * fake_lsb_v(&b.board));
@@ -238,18 +277,18 @@ TEST(test_stall)
     b.board.stalled = true;
     host_run(&b.host, 60);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 0) != NULL);
-    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 1) == NULL); /* said once */
+    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 1) == NULL); /* reported once */
     eits_command_tare tare = {.frames = 4};
     CHECK_EQUAL(host_command(&b.host, EITS_PACKET_TARE, &tare, sizeof tare).status,
                 EITS_REPLY_CORE);
-    CHECK_EQUAL(host_info(&b.host).tared, 1); /* by the last one */
+    CHECK_EQUAL(host_info(&b.host).tared, 1); /* by the tare before */
     b.board.stalled = false;
     hear(600);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, false, 0) != NULL);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) > 10);
-    /* the generator was not touched: its phase is the one that the tare knows */
+    /* the generator kept running, so the phase of the tare is still right */
     CHECK(raw_steps_off(host_last(&b.host, EITS_PACKET_RAW), 1) <= 0.5);
-    b.board.configure_status = FW_E_TIMEOUT; /* the converter does not even start */
+    b.board.configure_status = FW_E_TIMEOUT; /* now the converter does not even start */
     b.board.stalled = true;
     hear(2000);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 0) != NULL);
@@ -262,29 +301,37 @@ TEST(test_stall)
 
 TEST(test_slots)
 {
-    fw_scan_settings s = FW_SCAN_DEFAULT;
-    CHECK_EQUAL(fw_slot_us(&s), 100);
-    s.settle_us = 20;
-    CHECK_EQUAL(fw_slot_us(&s), 120); /* 103 to the next whole period */
-    s.samples = 20;
-    s.settle_us = 16;
-    CHECK_EQUAL(fw_slot_us(&s), 40);
-    s.excitation_millihz = 1000000; /* periods of 1 ms: too long to wait for */
-    CHECK_EQUAL(fw_slot_us(&s), 39);
+    const struct {
+        const char *name;
+        uint32_t excitation_millihz, samples, settle_us, slot_us;
+    } cases[] = {
+        {"as after a start", 50000000, 80, 16, 100},
+        {"103 us, to the next whole period", 50000000, 80, 20, 120},
+        {"a shorter burst", 50000000, 20, 16, 40},
+        {"periods of 1 ms, too long to wait for", 1000000, 20, 16, 39},
+    };
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        fw_scan_settings s = FW_SCAN_DEFAULT;
+        CASE(cases[k].name);
+        s.excitation_millihz = cases[k].excitation_millihz;
+        s.samples = cases[k].samples;
+        s.settle_us = cases[k].settle_us;
+        CHECK_EQUAL(fw_slot_us(&s), cases[k].slot_us);
+    }
 }
 
 int main(void)
 {
     run_tests();
-    test_order(&SKIN_ADJACENT, 208);
-    test_order(&SKIN_OPPOSITE, 192);
-    test_order(&SKIN_BY_SEVEN, 208);
-    test_voltages(&SKIN_ADJACENT);
-    test_voltages(&SKIN_OPPOSITE);
-    test_voltages(&SKIN_BY_SEVEN);
-    test_reciprocal(&SKIN_ADJACENT);
-    test_reciprocal(&SKIN_OPPOSITE);
-    test_reciprocal(&SKIN_BY_SEVEN);
+    const struct {
+        const skin_spec *spec;
+        uint32_t rows;
+    } skins[] = {{&SKIN_ADJACENT, 208}, {&SKIN_OPPOSITE, 192}, {&SKIN_BY_SEVEN, 208}};
+    for (size_t k = 0; k < COUNT_OF(skins); ++k) {
+        test_order(skins[k].spec, skins[k].rows);
+        test_voltages(skins[k].spec);
+        test_reciprocal(skins[k].spec);
+    }
     bench_stop(&b);
     return checks_report("scan");
 }

@@ -1,5 +1,5 @@
-/* The simulated board by itself: what it measures are the frames that it is shown, in their order,
- * on a clock that runs only for whoever wants frames. */
+/* The simulated board by itself: it measures the frames that it is shown, in order, on a clock that
+ * runs only while frames are wanted. */
 #include "app/link/scanning.h"
 #include "bench.h"
 #include "check.h"
@@ -100,7 +100,7 @@ static void show(rig *r, double rate_hz)
     sim_put(&r->sim, volts, 0, UNTOUCHED + FRAMES);
 }
 
-/* Which of the frames it was, by the scale that each has; -1: none of them. */
+/* The number of the frame that was measured, by its scale; -1: none of them. */
 static int shown(const rig *r)
 {
     const float step = 1e-6f * (float)r->sim.board.capture.reference_uv / 65536;
@@ -147,12 +147,13 @@ TEST(test_frames_in_order)
         CHECK_EQUAL(a.head.scan_us, 207 * 100 + 80);
     }
     CHECK(sim_scene_over(&a.sim));
-    CHECK_EQUAL(scan(&a), UNTOUCHED + FRAMES - 1); /* the last one is held */
+    CHECK_EQUAL(scan(&a), UNTOUCHED + FRAMES - 1); /* the last frame is repeated */
     CHECK_EQUAL(a.refused, 0);
     CHECK_EQUAL(a.replies, 2);
 }
 
-/* Nobody wants frames: time stands still. Off and on: it goes on, and the model is there. */
+/* Time stands still while no frames are wanted. After a restart it continues, and the model is
+ * still there. */
 TEST(test_time_and_restart)
 {
     stream(&a, 0, 0);
@@ -163,14 +164,13 @@ TEST(test_time_and_restart)
     const eits_command_plain reset = {.request = 500};
     send(&a, EITS_PACKET_RESET, &reset, sizeof reset);
     CHECK_EQUAL(a.sim.now_us, us);
-    CHECK(!a.sim.instrument.engine.tared && a.sim.instrument.engine.open);
+    CHECK(!a.sim.instrument.solve.engine.tared && a.sim.instrument.solve.engine.open);
     stream(&a, EITS_STREAM_RAW, 1);
     CHECK_EQUAL(scan(&a), UNTOUCHED + FRAMES - 1);
     CHECK(!sim_wants_frame(&a.sim));
 }
 
-/* As fast as it goes, frames of the scene come more than once; another board beside it has its own
- * scene. */
+/* If the scan is faster than the scene, its frames repeat. A second board has its own scene. */
 TEST(test_two_boards)
 {
     start(&a, 0);
@@ -188,8 +188,8 @@ TEST(test_two_boards)
     }
 }
 
-/* Frames that are put before the board one at a time give the same packets as all at once; where
- * one is missing time stands still. */
+/* Frames that are given one at a time lead to the same packets as all at once. Time stands still if
+ * one is missing. */
 TEST(test_frames_by_and_by)
 {
     start(&a, 50000);
@@ -216,8 +216,8 @@ TEST(test_frames_by_and_by)
     }
 }
 
-/* A frame that is put once is shown in the scan that it was made for, and in no other; the host
- * learns when that begins and when each row is measured. */
+/* A frame that is given once is shown only in the scan for which it was made. The host can ask when
+ * that scan begins, and when each row is measured. */
 TEST(test_frames_of_one_scan)
 {
     uint32_t delays_us[ROWS];
@@ -236,7 +236,7 @@ TEST(test_frames_of_one_scan)
     CHECK_EQUAL(scan(&a), UNTOUCHED);
     CHECK(!sim_scan_frame(&a.sim));
     CHECK(sim_wanted_s(&a.sim) == 0.05);
-    sim_put_once(&a.sim, volts + UNTOUCHED * ROWS, UNTOUCHED); /* not the frame that is wanted */
+    sim_put_once(&a.sim, volts + UNTOUCHED * ROWS, UNTOUCHED); /* not the wanted frame */
     CHECK(!sim_scan_frame(&a.sim));
     CHECK_EQUAL(sim_frame_wanted(&a.sim), UNTOUCHED + 1);
     eits_command_scan half = host_default_scan();
@@ -251,16 +251,16 @@ TEST(test_frames_of_one_scan)
     CHECK_EQUAL(measured, ROWS / 2);
 }
 
-/* Another instrument's numbers reach the host bit for bit; what is not finite is no voltage.
- * Nothing is said of a scan, and none can be set. Where frames stay away that is a fault, which
- * goes. */
+/* Another instrument's numbers reach the host with the same bits; values that are not finite become
+ * NaN. INFO has no settings of a scan, and none can be set. A fault is raised while no frames come.
+ */
 TEST(test_frames_given)
 {
     float given[2 * ROWS] = {0};
     start_given(&a, 20000, true);
-    CHECK_EQUAL(a.sim.instrument.engine.open, true);
-    /* nothing is known of a converter, so that its steps bound no noise from below */
-    CHECK(eits_get_options(a.sim.instrument.engine.ctx)->noise_floor_v == 0);
+    CHECK_EQUAL(a.sim.instrument.solve.engine.open, true);
+    /* no converter is known, so there is no lower bound of the noise */
+    CHECK(eits_get_options(a.sim.instrument.solve.engine.ctx)->noise_floor_v == 0);
     stream(&a, EITS_STREAM_RAW, 0);
     for (uint32_t i = 0; i < ROWS; ++i)
         given[2 * i] = 1e3f * volts[i] + 1e-7f;
@@ -270,14 +270,14 @@ TEST(test_frames_given)
     collect(&a);
     CHECK_EQUAL(a.raws, 2);
     CHECK_EQUAL(a.head.time_us, 44000);
-    CHECK_EQUAL(a.sim.instrument.settings.frame_period_us, 22000);
+    CHECK_EQUAL(a.sim.instrument.acquire.settings.frame_period_us, 22000);
     for (uint32_t i = 0; i < ROWS; ++i)
         CHECK(i == 3 ? isnan(a.raw[i]) : fabsf(a.raw[i]) == fabsf(given[2 * i]));
     const uint32_t stalled = 1u << EITS_FAULT_SCAN_STALLED;
     sim_let_pass(&a.sim, 1000000);
-    CHECK((a.sim.instrument.faults.raised & stalled) != 0);
+    CHECK((a.sim.instrument.safety.faults.raised & stalled) != 0);
     sim_give_frame(&a.sim, given, 20000, 22000);
-    CHECK((a.sim.instrument.faults.raised & stalled) == 0);
+    CHECK((a.sim.instrument.safety.faults.raised & stalled) == 0);
     const eits_command_scan scan = {.request = 900,
                                     .excitation_millihz = 50000000,
                                     .sample_rate_hz = 1000000,
@@ -285,14 +285,14 @@ TEST(test_frames_given)
                                     .settle_us = 16,
                                     .check_every = 1};
     send(&a, EITS_PACKET_SCAN, &scan, sizeof scan);
-    CHECK_EQUAL(a.sim.instrument.reply.status, EITS_REPLY_RANGE);
+    CHECK_EQUAL(a.sim.instrument.link.replies.reply.status, EITS_REPLY_RANGE);
     collect(&a);
     const uint32_t raws = a.raws;
     sim_give_frame(&a.sim, given, 20000, 22000);
     collect(&a);
     CHECK_EQUAL(a.raws, raws + 1);
-    fw_engine_close(&a.sim.instrument.engine); /* without a model there is nothing to give to */
-    fw_stop_scan(&a.sim.instrument);
+    fw_engine_close(&a.sim.instrument.solve.engine); /* without a model no frame is taken */
+    fw_acquire_stop(&a.sim.instrument.acquire);
     sim_give_frame(&a.sim, given, 20000, 22000);
     collect(&a);
     CHECK_EQUAL(a.raws, raws + 1);

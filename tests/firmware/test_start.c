@@ -1,7 +1,7 @@
 /* Starting: without a model, on another model than before, and how the main loop ends. */
 #include "steps.h"
 
-#include "app/main_loop.h"
+#include "app/instrument.h"
 
 TEST(test_no_model)
 {
@@ -36,8 +36,8 @@ TEST(test_no_model)
     skin_model_free(&model);
 }
 
-/* After a change of the model the new table is scanned, reciprocals and all, and the old tare is
- * gone. */
+/* After a change of the model the new table is scanned, also in reciprocal scans, and the old
+ * reference is gone. */
 TEST(test_model_change)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -78,20 +78,23 @@ TEST(test_model_change)
 TEST(test_starts_and_ends)
 {
     bench_start(&b, &SKIN_ADJACENT);
-    CHECK_EQUAL(b.host.packet[0].type, EITS_PACKET_INFO); /* said unasked, of request 0 */
+    CHECK_EQUAL(b.host.packet[0].type,
+                EITS_PACKET_INFO); /* sent without a request, so with number 0 */
     const eits_packet_info *info = (const void *)b.host.packet[0].payload;
     CHECK_EQUAL(info->request, 0);
     CHECK(strcmp(info->board, "fake") == 0);
     CHECK(memcmp(info->serial, "00112233445566778899AABB", 24) == 0);
     CHECK_EQUAL(info->excitation_millihz, 50000012);
     CHECK_EQUAL(info->volts_per_code_nv, 805664);
-    CHECK_NEAR(eits_get_options(b.host.instrument.engine.ctx)->noise_floor_v, 73.547e-6, 1e-9);
+    CHECK_NEAR(eits_get_options(b.host.instrument.solve.engine.ctx)->noise_floor_v, 73.547e-6,
+               1e-9);
     CHECK_EQUAL(info->slot_us, 100);
     fake_restart(&b.board);
     b.board.ended = true;
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &b.board.board), 0);
     eits_command_plain reset = {77};
-    for (int k = 0; k < 60; ++k) /* more than one piece: it ends once all is read */
+    for (int k = 0; k < 60;
+         ++k) /* more bytes than one read takes: the loop ends once all are read */
         host_send(&b.host, EITS_PACKET_GET_INFO, &reset, sizeof reset);
     host_send(&b.host, EITS_PACKET_RESET, &reset, sizeof reset);
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &b.board.board), 2);

@@ -12,7 +12,7 @@ static void test_bins(void)
     uint32_t last = 0;
     for (uint32_t us = 0; us < 3000000; us += us < 5000 ? 1 : us / 97) {
         const uint32_t bin = fw_stats_bin(us);
-        CHECK(bin == last || bin == last + 1); /* none is left out */
+        CHECK(bin == last || bin == last + 1); /* no bin is skipped */
         CHECK(us <= fw_stats_edge(bin));
         CHECK(bin == 0 || us > fw_stats_edge(bin - 1));
         /* an eighth of an octave's lowest eighth */
@@ -52,7 +52,7 @@ static void test_percentile(void)
         CHECK_EQUAL(got.worst_us, sorted[n - 1]);
         CHECK_EQUAL(got.p99_us, edge < sorted[n - 1] ? edge : sorted[n - 1]);
     }
-    CHECK_EQUAL(fw_stats_of(&stats, EITS_STAGE_SCAN).count, 0); /* stages are apart */
+    CHECK_EQUAL(fw_stats_of(&stats, EITS_STAGE_SCAN).count, 0); /* stages are independent */
     fw_stats_add(&stats, EITS_STAGE_SCAN, UINT32_MAX);
     CHECK_EQUAL(fw_stats_of(&stats, EITS_STAGE_SCAN).p99_us, UINT32_MAX);
     fw_stats_clear(&stats);

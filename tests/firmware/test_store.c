@@ -1,5 +1,5 @@
-/* Model banks: which one is opened, and uploads. Power cuts are the fuzzer's (tests/fuzz) and the
- * emulated board's (tests/python/emulator/test_power_cuts.py). */
+/* Model banks: which one is opened, and uploads. Power cuts are tested by the fuzzer (tests/fuzz)
+ * and on the emulated board (tests/python/emulator/test_power_cuts.py). */
 #include "steps.h"
 
 static skin_model adjacent, opposite;
@@ -20,15 +20,17 @@ static void start_with_adjacent(void)
 TEST(test_newest)
 {
     const struct {
-        uint32_t first, second, bank;
-    } cases[] = {{1, 2, 1},
-                 {2, 1, 0},
-                 {0xFFFFFFFFu, 0, 1},
-                 {0, 0xFFFFFFFFu, 0},
-                 {0x80000006u, 5, 1},
-                 {0x80000001u, 5, 0},
-                 {7, 7, 0}};
+        const char *name;
+        uint32_t first, second, bank; /* generations, and the newest bank */
+    } cases[] = {{"second is newer", 1, 2, 1},
+                 {"first is newer", 2, 1, 0},
+                 {"second is newer over the wrap", 0xFFFFFFFFu, 0, 1},
+                 {"first is newer over the wrap", 0, 0xFFFFFFFFu, 0},
+                 {"second is newer by 2^31 - 1", 0x80000006u, 5, 1},
+                 {"first is newer by 2^31 - 4", 0x80000001u, 5, 0},
+                 {"both are as new", 7, 7, 0}};
     for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
         bench_start(&b, NULL);
         fake_put_model(&b.board, 0, cases[k].first, adjacent.blob, adjacent.size);
         fake_put_model(&b.board, 1, cases[k].second, opposite.blob, opposite.size);
@@ -40,7 +42,7 @@ TEST(test_newest)
         bench_restart(&b);
         CHECK_EQUAL(host_info(&b.host).bank, 1 - cases[k].bank);
         CHECK_EQUAL(host_info(&b.host).faults, 0);
-        /* byte 6 is under no other checksum than the record's */
+        /* only the record's checksum covers byte 6 */
         b.board.bank[1 - cases[k].bank][k % 3 ? 5000 : 6] ^= 1;
         bench_restart(&b);
         CHECK_EQUAL(host_info(&b.host).n_rows, 0);
@@ -81,7 +83,7 @@ static void still_adjacent(int tared)
         CHECK_EQUAL(((const eits_packet_solved *)(const void *)image->payload)->status, 0);
 }
 
-/* What is wrong with an upload leaves the model, the tare and the stream as they were. */
+/* An upload that is refused leaves the model, the reference and the stream as they were. */
 TEST(test_refused)
 {
     start_with_adjacent();
@@ -92,14 +94,14 @@ TEST(test_refused)
     CHECK_EQUAL(reply.detail[0], FAKE_BANK - 32);
     CHECK_EQUAL(begin_with(63, 0).status, EITS_REPLY_RANGE);
     reply = host_model_data(&b.host, 0, adjacent.blob, 100);
-    CHECK_EQUAL(reply.status, EITS_REPLY_OFFSET); /* nothing has begun */
+    CHECK_EQUAL(reply.status, EITS_REPLY_OFFSET); /* no upload has begun */
     CHECK_EQUAL(reply.detail[0], -1);
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_MODEL_COMMIT).status, EITS_REPLY_OFFSET);
     still_adjacent(1);
     CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc + 1, 4096).status,
                 EITS_REPLY_MODEL_CRC);
     still_adjacent(1);
-    /* a model that is damaged, but announced so */
+    /* a damaged model whose CRC was announced correctly */
     static uint8_t damaged[FAKE_BANK];
     memcpy(damaged, opposite.blob, opposite.size);
     damaged[1000] ^= 4;
@@ -116,7 +118,7 @@ TEST(test_refused)
     CHECK_EQUAL(reply.detail[0], 17);
     CHECK_EQUAL(reply.detail[1], 16);
     still_adjacent(1);
-    fake_put_model(&b.board, 1, 7, bad.blob, bad.size); /* by a programmer: not opened */
+    fake_put_model(&b.board, 1, 7, bad.blob, bad.size); /* written by a programmer: not opened */
     bench_restart(&b);
     CHECK_EQUAL(host_info(&b.host).bank, 0);
     TARE(4);
@@ -129,7 +131,7 @@ TEST(test_refused)
     CHECK_EQUAL(reply.status, EITS_REPLY_SELF_TEST);
     CHECK(reply.detail[0] > 0);
     still_adjacent(1);
-    /* by a programmer: nothing tests it but its own command */
+    /* written by a programmer: only SELF_TEST tests it */
     fake_put_model(&b.board, 1, 9, bad.blob, bad.size);
     fake_restart(&b.board);
     host_start(&b.host, &b.board);
@@ -138,7 +140,8 @@ TEST(test_refused)
     skin_model_free(&bad);
 }
 
-/* More memory than the board has: refused at once, and at start-up the other bank is opened. */
+/* A model that needs more memory than the board has is refused at once; at start-up the other bank
+ * is opened. */
 TEST(test_memory)
 {
     start_with_adjacent();
@@ -153,17 +156,23 @@ TEST(test_memory)
     TAKEN(host_upload(&b.host, big.blob, big.size, big.crc, 4096));
     const size_t needs = fw_engine_needs(&model);
     CHECK(needs < FAKE_WORKSPACE);
-    TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096));
-    for (int fits = 1; fits >= 0; --fits) {
-        b.board.board.workspace_bytes = (needs + 15) / 16 * 16 - (fits ? 0 : 16);
+    const size_t enough = (needs + 15) / 16 * 16;
+    const struct {
+        const char *name;
+        size_t bytes;
+        uint16_t status;
+        uint32_t rank; /* of the open model afterwards */
+    } cases[] = {{"just enough memory", enough, EITS_REPLY_OK, 60},
+                 {"16 bytes too few", enough - 16, EITS_REPLY_MODEL_SIZE, 24}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        CASE(cases[k].name);
+        TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096));
+        b.board.board.workspace_bytes = cases[k].bytes;
         bench_restart(&b);
         const eits_packet_reply reply = host_upload(&b.host, big.blob, big.size, big.crc, 4096);
-        CHECK_EQUAL(reply.status, fits ? EITS_REPLY_OK : EITS_REPLY_MODEL_SIZE);
-        CHECK_EQUAL(host_info(&b.host).rank, fits ? 60 : 24);
-        if (fits)
-            TAKEN(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096));
-        else
-            CHECK_EQUAL(reply.detail[0], (long long)b.board.board.workspace_bytes);
+        CHECK_EQUAL(reply.status, cases[k].status);
+        CHECK_EQUAL(host_info(&b.host).rank, cases[k].rank);
+        CHECK(reply.status == EITS_REPLY_OK || reply.detail[0] == (long long)cases[k].bytes);
     }
     fake_put_model(&b.board, 0, 100, big.blob, big.size);
     fake_put_model(&b.board, 1, 99, adjacent.blob, adjacent.size);
@@ -189,7 +198,8 @@ TEST(test_offsets)
     reply = host_model_data(&b.host, 2000, opposite.blob + 2000, 1000);
     CHECK_EQUAL(reply.detail[0], 1000);
     reply = host_model_data(&b.host, 1000, opposite.blob + 1000, 1001);
-    CHECK_EQUAL(reply.status, EITS_REPLY_LENGTH); /* what would do */
+    CHECK_EQUAL(reply.status,
+                EITS_REPLY_LENGTH); /* the detail is a length that would be accepted */
     CHECK_EQUAL(reply.detail[0], sizeof(eits_command_model_data) + 1000);
     reply = host_plain(&b.host, EITS_PACKET_MODEL_COMMIT);
     CHECK_EQUAL(reply.status, EITS_REPLY_OFFSET);
@@ -198,12 +208,12 @@ TEST(test_offsets)
     reply = host_tare(&b.host, 1);
     CHECK_EQUAL(reply.status, EITS_REPLY_BUSY);
     CHECK_EQUAL(reply.detail[0], EITS_PACKET_MODEL_BEGIN);
-    /* left for ten seconds: the old model goes on; then the host comes back and goes on where it
-     * was */
+    /* after ten seconds without a command the old model is used again; then the host resumes the
+     * upload */
     host_run(&b.host, 9000);
-    CHECK_EQUAL(b.host.instrument.scan.running, 0);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.running, 0);
     host_run(&b.host, 1500);
-    CHECK_EQUAL(b.host.instrument.scan.running, 1);
+    CHECK_EQUAL(b.host.instrument.acquire.scan.running, 1);
     TARE(1);
     reply = begin_with(size, opposite.crc);
     TAKEN(reply);
@@ -227,13 +237,13 @@ TEST(test_offsets)
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
 }
 
-/* The last piece may be any number of bytes. */
+/* The last piece may have any number of bytes. */
 TEST(test_odd_end)
 {
     start_with_adjacent();
     static uint8_t longer[FAKE_BANK];
     memcpy(longer, opposite.blob, opposite.size);
-    memset(longer + opposite.size, 0x5A, 3); /* bytes behind the model are not its own */
+    memset(longer + opposite.size, 0x5A, 3); /* bytes behind the model are ignored */
     const size_t size = opposite.size + 3;
     TAKEN(host_upload(&b.host, longer, size, eits_crc32(0, longer, size), 4096));
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
@@ -260,7 +270,7 @@ TEST(test_flash_fails)
     CHECK_EQUAL(reply.detail[0], 400);
     still_adjacent(1);
     b.board.program_status = FW_OK;
-    /* the upload is over: it does not go on, and is not committed */
+    /* the upload has ended: it cannot be continued */
     const eits_packet_reply late = host_model_data(&b.host, 400, opposite.blob + 400, 400);
     CHECK_EQUAL(late.status, EITS_REPLY_OFFSET);
     CHECK_EQUAL(late.detail[0], -1);

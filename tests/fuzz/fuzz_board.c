@@ -10,8 +10,9 @@
  * self-test, and it answers. */
 #include "fuzz.h"
 
+#include "app/instrument.h"
 #include "app/link/tracks.h"
-#include "app/main_loop.h"
+#include "app/solve/tracker.h"
 #include "fake_board.h"
 #include "skin_model.h"
 #include "small_model.h"
@@ -197,7 +198,7 @@ static double volts(void *user, const uint8_t electrodes[4], uint64_t at_ns)
 
 static void check_board(void)
 {
-    const fw_scan_settings *s = &m.instrument.settings;
+    const fw_scan_settings *s = &m.instrument.acquire.settings;
     const uint32_t pins[] = {fake.spi_calls, fake.lines_calls, fake.bursts, fake.flash_steps,
                              fake.erases,    fake.feeds,       fake.resets, fake.leds};
     fuzz_note("pins", pins, sizeof pins);
@@ -208,10 +209,10 @@ static void check_board(void)
     MUST(s->excitation_millihz >= 3500000 && s->excitation_millihz <= 250000000);
     MUST(fw_whole_periods(s->excitation_millihz, s->sample_rate_hz, s->samples));
     MUST(fake.monitor.violation == NULL);
-    fake.monitor.needs_host = (m.instrument.kept.settings & EITS_SETTING_KEEP_DRIVE) == 0;
+    fake.monitor.needs_host = (m.instrument.safety.owner.settings & EITS_SETTING_KEEP_DRIVE) == 0;
     MUST(fake.rewrites == 0 || worn);
-    MUST(!m.instrument.upload.begun || !m.instrument.engine.open ||
-         m.instrument.upload.bank != m.instrument.bank);
+    MUST(!m.instrument.link.upload.begun || !m.instrument.solve.engine.open ||
+         m.instrument.link.upload.bank != m.instrument.solve.models.bank);
 }
 
 static void power_up(void)
@@ -227,26 +228,26 @@ static void power_up(void)
 static void check_lock(const fw_instrument *before)
 {
     const fw_instrument *now = &m.instrument;
-    if ((before->kept.settings & EITS_SETTING_LOCKED) == 0 || fake.button)
+    if ((before->safety.owner.settings & EITS_SETTING_LOCKED) == 0 || fake.button)
         return;
-    MUST(now->kept.settings == before->kept.settings);
-    MUST(now->kept.current_limit_ua_rms == before->kept.current_limit_ua_rms);
-    MUST(now->upload.begun <= before->upload.begun);
-    MUST(now->settings.excitation_millihz >= before->settings.excitation_millihz);
+    MUST(now->safety.owner.settings == before->safety.owner.settings);
+    MUST(now->safety.owner.current_limit_ua_rms == before->safety.owner.current_limit_ua_rms);
+    MUST(now->link.upload.begun <= before->link.upload.begun);
+    MUST(now->acquire.settings.excitation_millihz >= before->acquire.settings.excitation_millihz);
 }
 
 static void turn(void)
 {
     static fw_instrument before;
-    before.kept = m.instrument.kept;
-    before.upload = m.instrument.upload;
-    before.settings = m.instrument.settings;
+    before.safety.owner = m.instrument.safety.owner;
+    before.link.upload = m.instrument.link.upload;
+    before.acquire.settings = m.instrument.acquire.settings;
     if (!fw_instrument_step(&m.instrument))
         fake_wait(&fake);
     listen();
     check_board();
     check_lock(&before);
-    if (m.instrument.reset_wanted)
+    if (m.instrument.link.reset_wanted)
         power_up();
 }
 
@@ -285,7 +286,8 @@ static size_t usual(uint8_t type, uint8_t *payload)
 {
     switch (type) {
     case EITS_PACKET_STREAM:
-        USUAL(eits_command_stream, .what = fw_follow_possible(&m.instrument) ? 31 : 15, .every = 1);
+        USUAL(eits_command_stream, .what = fw_tracker_possible(&m.instrument.solve) ? 31 : 15,
+              .every = 1);
     case EITS_PACKET_TARE:
         USUAL(eits_command_tare, .frames = 4);
     case EITS_PACKET_SCAN:
@@ -464,7 +466,7 @@ static void break_something(fuzz_bytes *in)
         fake.configure_status = count & 1 ? FW_E_RANGE : FW_OK;
         break;
     case 9: /* flash wears out */
-        fake.bank[m.instrument.engine.open ? 1u - m.instrument.bank : what >> 7]
+        fake.bank[m.instrument.solve.engine.open ? 1u - m.instrument.solve.models.bank : what >> 7]
                  [count * 64u % FAKE_BANK] &= (uint8_t)~(1u << (what >> 4 & 7));
         worn = true;
         break;
@@ -603,21 +605,21 @@ static void check_end(void)
 {
     heal();
     m.volts = 1;
-    const bool open = m.instrument.engine.open;
+    const bool open = m.instrument.solve.engine.open;
     fake.current_ua = 0;
     /* the host falls silent; an upload that nobody ends */
     for (uint32_t k = 0; k < 14; ++k)
         pass_ms(k < 12 ? 90 : 11000);
-    MUST(m.instrument.engine.open == open);
-    MUST(!m.instrument.upload.active);
-    const bool kept = (m.instrument.kept.settings & EITS_SETTING_KEEP_DRIVE) != 0;
-    MUST(kept || !m.instrument.scan.running);
+    MUST(m.instrument.solve.engine.open == open);
+    MUST(!m.instrument.link.upload.active);
+    const bool kept = (m.instrument.safety.owner.settings & EITS_SETTING_KEEP_DRIVE) != 0;
+    MUST(kept || !m.instrument.acquire.scan.running);
     tell(EITS_PACKET_CLEAR_FAULTS); /* a limit of the current that tripped */
     tell(EITS_PACKET_STREAM);
     tell(EITS_PACKET_TARE);
     pass_ms(1);
-    MUST(m.instrument.scan.running == open);
-    const bool tare = m.instrument.tare.active; /* may end in the turn that answers */
+    MUST(m.instrument.acquire.scan.running == open);
+    const bool tare = m.instrument.solve.tare.active; /* may end in the turn that answers */
     tell(EITS_PACKET_SELF_TEST);
     MUST(last_reply.request == m.request);
     const uint16_t status = last_reply.status;
@@ -645,11 +647,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     worn = false;
     /* where the power goes, the rest of the input goes on after it */
     if (setjmp(fake.cut) != 0) {
-        const bool was_open = m.instrument.engine.open;
-        const bool locked = (m.instrument.kept.settings & EITS_SETTING_LOCKED) != 0 && !fake.button;
+        const bool was_open = m.instrument.solve.engine.open;
+        const bool locked =
+            (m.instrument.safety.owner.settings & EITS_SETTING_LOCKED) != 0 && !fake.button;
         power_up();
-        MUST(!locked || (m.instrument.kept.settings & EITS_SETTING_LOCKED) != 0);
-        MUST(m.instrument.engine.open || !was_open);
+        MUST(!locked || (m.instrument.safety.owner.settings & EITS_SETTING_LOCKED) != 0);
+        MUST(m.instrument.solve.engine.open || !was_open);
     }
     script(&in);
     check_end();

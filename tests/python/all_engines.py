@@ -19,7 +19,7 @@ class AllEngines(dict[str, Reconstructor]):
         **options: object,
     ) -> None:
         super().__init__({name: Reconstructor(model, engine=name, blob=blob) for name in engines})
-        self.with_options(**options)
+        self.set_options(**options)
 
     def __getattr__(self, name: str) -> Callable[..., dict[str, Any]]:
         return lambda *given, **named: {

@@ -27,6 +27,7 @@
 #define EITSKIN_CONTEXT_H
 
 #include "eitskin/options.h"
+#include "eitskin/sizes.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -54,62 +55,14 @@ typedef struct eits_reference_info {
  * reached by functions alone. */
 typedef struct eits_context eits_context;
 
-/* ---- Sizes, all constant expressions where their arguments are ---- */
-
-/* Columns of a panel: S in panels has that many columns side by side, row after row, so that a
- * product S'v fills vector registers without gathering. */
-#define EITS_PANEL 32u
-#define EITS_PANEL_COLUMNS(n_pixels) \
-    (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
-
-/* Columns of S that are kept unpacked as floats: more than a working set or a disc has. */
-#define EITS_MAX_CACHED 256u
-#define EITS_CACHED(n_pixels) \
-    ((size_t)((n_pixels) < EITS_MAX_CACHED ? (n_pixels) : EITS_MAX_CACHED))
-
-/* Bytes of a line of the processor's cache: panels start at a multiple, where no vector of theirs
- * lies across two lines. */
-#define EITS_LINE 64u
-
-/* Each array starts at a multiple of 16 bytes. */
-#define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
-#define EITS_REALS(count)   EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
-
-/* rank, rounded up to the eight lanes in which sums are made (base/vec.h). */
-#define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
-
-/* A list of pixels or of folded rows. */
-#define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
-
-/* Numbers of an upper triangle whose rows begin at multiples of eight columns. */
-#define EITS_PADDED_TRIANGLE(rank) (EITS_STRIDE(rank) * (EITS_STRIDE(rank) + 8u) / 2u)
-
-/* Bytes of the context itself, at the workspace's start; what is not arrays. Pointers and numbers
- * of whatever width; a little is left over. */
-#define EITS_CONTEXT_SIZE EITS_ALIGN16(732u + 63u * sizeof(void *) + 384u * sizeof(eits_real))
-
-/* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise
- * copies of S and of the working set (hosts), else 0. */
-#define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                   \
-    (EITS_CONTEXT_SIZE + 3 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) +                       \
-     2 * EITS_ALIGN16(n_folded) + 4 * EITS_REALS(n_folded) +                                       \
-     (91 + EITS_STRIDE(rank) + 2 * (size_t)(rank) + EITS_MAX_TOUCHES) *                            \
-         EITS_REALS(EITS_STRIDE(rank)) +                                                           \
-     5 * EITS_REALS(n_pixels) + EITS_REALS(EITS_LIST(n_pixels, n_folded)) +                        \
-     EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 4u) +    \
-     EITS_ALIGN16((size_t)(n_cells) * 2u) +                                                        \
-     EITS_ALIGN16(EITS_CACHED(n_pixels) * EITS_STRIDE(rank) * 4u) +                                \
-     EITS_ALIGN16((size_t)(n_pixels) * 2u) + EITS_ALIGN16(EITS_CACHED(n_pixels) * 2u) +            \
-     EITS_ALIGN16(EITS_CACHED(n_pixels)) + EITS_ALIGN16(EITS_CACHED(n_pixels) * 4u) +              \
-     ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) + EITS_LINE - 16u \
-                 : 0u))
-
-/* The same number for an open model, as a function. Returns 0 for a null model. */
+/* Bytes of workspace for an open model, as EITS_WORKSPACE_SIZE (sizes.h) counts them. `prepared` is
+ * 1 to keep S and the working set's columns in panels as well, which is faster on hosts, else 0.
+ * Returns 0 for a null model. */
 size_t eits_workspace_size(const eits_model *model, int prepared);
 
 /* Lay out a context in `workspace` (16-byte aligned, the caller's as long as the context is used;
  * so is `model`) and set the model's default options; *ctx then points into it. With room for it
- * (see `prepared` above) S is also copied into panels, which is faster where memory is plentiful
+ * for a prepared one S is also copied into panels, which is faster where memory is plentiful
  * and gives the same bits. Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE (smaller than
  * eits_workspace_size(model, 0), or not aligned); *ctx is untouched then. EITS_E_ARITHMETIC: the
  * library was compiled in a way that changes bits; what the context then gives is near, not equal.

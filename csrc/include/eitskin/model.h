@@ -110,7 +110,7 @@ typedef struct eits_defaults {
     float touch_radius_weight;
     uint32_t solver; /* eits_solver; files of format 1.0 have 0 here */
     /* bits of eits_touch_fit (options.h) that are not set by default, EITS_GAIN_DRIFT_KEPT and
-     * EITS_REFERENCE_FOLLOWS;
+     * EITS_TRACKS_REFERENCE;
      * files before 1.2 have 0 here */
     uint32_t touch_fit_left_out;
 } eits_defaults;
@@ -118,7 +118,7 @@ typedef struct eits_defaults {
  * what drifts. From format 1.5. */
 #define EITS_GAIN_DRIFT_KEPT   8u
 /* By default the reference follows the untouched skin (options.reference_frames). From 1.5. */
-#define EITS_REFERENCE_FOLLOWS 16u
+#define EITS_TRACKS_REFERENCE 16u
 
 /* The self-test inside a model: frames, and what a float32 solve with the defaults must give. A
  * board runs it before it believes an uploaded model. */

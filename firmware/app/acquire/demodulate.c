@@ -42,7 +42,7 @@ float fw_rounding_v(uint32_t volts_per_code_nv, uint32_t excitation_millihz, uin
     const uint64_t periods = (uint64_t)excitation_millihz * samples / ((uint64_t)rate_hz * 1000u);
     const float step_nv = (float)volts_per_code_nv,
                 phases = (float)(samples / greatest_divisor(samples, periods));
-    /* a code's variance is step^2 / 12, an amplitude's 2 / phases of that */
+    /* the variance of a code is step^2 / 12; that of an amplitude is 2 / phases times as large */
     return sqrtf(step_nv * step_nv / (6.0f * phases)) * 1e-9f;
 }
 
@@ -84,7 +84,8 @@ fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint
 
 bool fw_demodulate(const fw_demodulator *d, const uint16_t *samples, uint32_t start_us, fw_iq *out)
 {
-    const uint32_t inside = d->full_scale_code - 1u; /* so many codes are not at an end */
+    const uint32_t inside =
+        d->full_scale_code - 1u; /* number of codes that are not at an end of the range */
     int64_t in_phase = -d->bias[0], quadrature = -d->bias[1];
     uint32_t ends = 0;
     for (uint32_t k = 0; k < d->samples; ++k) {

@@ -1,26 +1,22 @@
-/* From a burst of converter codes to the amplitude and phase of the excitation in it.
+/* Amplitude and phase of the excitation in a burst of converter codes.
  *
- * A burst holds a whole number of excitation periods, so that sums with a cosine and a sine see
- * neither the bias nor their own image. The generator's frequency is the nearest that its tuning
- * word gives, not quite the nominal one: within a burst that is nothing, from burst to burst it
- * turns the phase. The generator's accumulator is therefore followed here, in the same wrapping
- * arithmetic that it uses itself, and taken off. */
+ * A burst holds a whole number of excitation periods. So neither the bias nor the image frequency
+ * adds to its sums with a cosine and a sine. The generator's frequency is the nearest one that its
+ * tuning word can express, and not exactly the nominal one. Within a burst the difference is
+ * negligible; from burst to burst it turns the phase. The demodulator therefore computes the phase
+ * of the generator's accumulator, in the same wrapping arithmetic, and subtracts it. */
 #ifndef FW_DEMODULATE_H
 #define FW_DEMODULATE_H
 
+#include "app/acquire/frame.h"
 #include "hal/hal.h"
-
-/* volts at the electrodes: amplitude times cosine and sine of the phase */
-typedef struct fw_iq {
-    float i, q;
-} fw_iq;
 
 typedef struct fw_demodulator {
     uint32_t samples;
     uint32_t full_scale_code;
     uint32_t turn_per_us; /* of the generator, in 2^-28 turns modulo 2^28 */
-    float scale;          /* volts at the electrodes for one unit of the sums below */
-    /* what a constant at mid-scale adds to them: 0 but for odd numbers of samples */
+    float scale;          /* volts at the electrodes per unit of the sums */
+    /* what a constant at mid-scale adds to the sums; 0 for even numbers of samples */
     int64_t bias[2];
     int16_t cosine[FW_MAX_SAMPLES], sine[FW_MAX_SAMPLES]; /* times 32767 */
 } fw_demodulator;
@@ -28,11 +24,11 @@ typedef struct fw_demodulator {
 /* Whether `samples` at `rate_hz` hold a whole number of periods of an excitation. */
 bool fw_whole_periods(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples);
 
-/* The number of samples nearest to `samples` that does, at least one such; it may be above
- * FW_MAX_SAMPLES. */
+/* The number of samples nearest to `samples` that holds a whole number of periods, at least one. It
+ * may exceed FW_MAX_SAMPLES. */
 uint32_t fw_nearest_integer(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples);
 
-/* Volts at the electrodes of one step of the converter, in nanovolts, rounded. */
+/* One step of the converter as a voltage at the electrodes, in nanovolts, rounded. */
 uint32_t fw_volts_per_code_nv(const fw_capture *capture);
 
 /* What rounding to whole codes alone does to an amplitude (rms, volts), of samples as above.

@@ -1,11 +1,7 @@
 #include "app/acquire/scan.h"
 
+#include "app/clock.h"
 #include "eitskin/link.h"
-
-static uint32_t now_us(const fw_scan *scan)
-{
-    return scan->board->system->time_us(scan->board->system_ctx);
-}
 
 void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *demodulator)
 {
@@ -44,13 +40,13 @@ uint32_t fw_scan_row_at(const fw_scan *scan, uint32_t position)
     return order == NULL ? position : order[position];
 }
 
-/* Select the row at `position`. A switch that failed is known by `switched`. */
+/* Select the row at `position`; `switched` says whether that worked. */
 static void switch_to(fw_scan *scan, uint32_t position)
 {
     const uint8_t *electrodes = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, position);
     scan->position = position;
     scan->switched = fw_adg1206_select(&scan->mux, electrodes) == FW_OK;
-    scan->switched_us = now_us(scan);
+    scan->switched_us = fw_now_us(scan->board);
 }
 
 static bool same_drive(const fw_scan *scan, uint32_t position, uint32_t other)
@@ -60,17 +56,18 @@ static bool same_drive(const fw_scan *scan, uint32_t position, uint32_t other)
     return a[0] == b[0] && a[1] == b[1];
 }
 
-/* The drive that ends with the row at `position` can be looked at. */
-static void tell_drive(fw_scan *scan, uint32_t position, uint32_t start_us, bool last)
+/* The drive that ends with the row at `position` has been measured. */
+static void report_drive(fw_scan *scan, uint32_t position, uint32_t start_us, bool last)
 {
     const uint32_t first = scan->drive_from, count = position + 1 - first;
-    const uint32_t told = atomic_load_explicit(&scan->drives, memory_order_relaxed);
+    const uint32_t reported = atomic_load_explicit(&scan->drives, memory_order_relaxed);
     scan->drive_from = last ? 0 : position + 1;
     if (scan->drive_done == NULL)
         return;
-    if (told - atomic_load_explicit(&scan->drives_taken, memory_order_acquire) < FW_SCAN_DRIVES) {
+    if (reported - atomic_load_explicit(&scan->drives_taken, memory_order_acquire) <
+        FW_SCAN_DRIVES) {
         const fw_frame *frame = scan->frame;
-        scan->drive[told % FW_SCAN_DRIVES] =
+        scan->drive[reported % FW_SCAN_DRIVES] =
             (fw_scan_drive){.frame = frame->number,
                             .first = first,
                             .count = count,
@@ -80,7 +77,7 @@ static void tell_drive(fw_scan *scan, uint32_t position, uint32_t start_us, bool
                             .z = frame->z,
                             .quality = frame->quality,
                             .last = last};
-        atomic_store_explicit(&scan->drives, told + 1, memory_order_release);
+        atomic_store_explicit(&scan->drives, reported + 1, memory_order_release);
     }
     scan->drive_done(scan->user);
 }
@@ -92,15 +89,15 @@ static void plan_frame(fw_scan *scan)
     scan->next_full = every != 0 && scan->next_number % every == 0;
 }
 
-/* The free frame begins with the burst that began at start_us; false: none is free, or it is not
- * due yet. */
+/* A free frame begins with the burst that began at start_us. Returns false if none is free, or if
+ * it is not due yet. */
 static bool begin_frame(fw_scan *scan, uint32_t start_us)
 {
     uint32_t filled = atomic_load_explicit(&scan->filled, memory_order_relaxed);
     if (filled - atomic_load_explicit(&scan->taken, memory_order_acquire) >= 2) {
         if (!scan->newest)
             return false;
-        /* the main loop has the other one, and has not looked at this one */
+        /* the main loop has taken the other one, and not this one */
         atomic_store_explicit(&scan->filled, --filled, memory_order_release);
     }
     const uint32_t period = scan->settings.frame_period_us;
@@ -138,9 +135,9 @@ static void end_frame(fw_scan *scan, uint32_t start_us)
 static void on_burst(void *user, const fw_burst *burst)
 {
     fw_scan *scan = user;
-    const uint32_t entered_us = now_us(scan);
+    const uint32_t entered_us = fw_now_us(scan->board);
     atomic_fetch_add_explicit(&scan->bursts, 1, memory_order_relaxed);
-    /* the clock was read after the switch and rounded down: one more microsecond makes it sure */
+    /* the clock is read after the switch and rounded down: hence >, not >= */
     const bool settled = scan->switched && (int32_t)(burst->start_us - scan->switched_us) >
                                                (int32_t)scan->settings.settle_us;
     const bool good = settled && !burst->lost;
@@ -176,9 +173,9 @@ static void on_burst(void *user, const fw_burst *burst)
         frame->z[row] = (fw_iq){0, 0};
         frame->quality[row] = EITS_QUALITY_UNSETTLED;
     }
-    frame->busy_us += now_us(scan) - entered_us;
+    frame->busy_us += fw_now_us(scan->board) - entered_us;
     if (drive_ends)
-        tell_drive(scan, position, burst->start_us, last);
+        report_drive(scan, position, burst->start_us, last);
     if (last)
         end_frame(scan, burst->start_us);
 }
@@ -212,7 +209,7 @@ fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const f
         return status;
     plan_frame(scan);
     switch_to(scan, 0);
-    scan->watched_us = now_us(scan);
+    scan->watched_us = fw_now_us(scan->board);
     scan->watched_bursts = atomic_load(&scan->bursts);
     status = scan->switched ? capture->ops->start(capture->ctx) : FW_E_BUS;
     scan->running = status == FW_OK;

@@ -1,7 +1,7 @@
 #include "app/acquire/sincos.h"
 
-/* Taylor's series within an eighth of a turn from the nearest quarter: the first term left out is
- * below 3e-8. */
+/* Taylor's series around the nearest quarter turn, at most an eighth of a turn away: the first
+ * omitted term is below 3e-8. */
 void fw_sincos(uint32_t turn, float *cosine, float *sine)
 {
     const uint32_t quarter = (turn + 0x20000000u) >> 30;

@@ -1,4 +1,4 @@
-/* What a command is answered. */
+/* The answer to a command. */
 #ifndef FW_ANSWER_H
 #define FW_ANSWER_H
 
@@ -9,7 +9,8 @@
 typedef struct fw_answer {
     eits_reply_status status;
     int32_t detail[2];
-    bool later; /* no answer now: it comes when the command is done, or is a packet of its own */
+    bool
+        later; /* no reply now: it comes when the command is done, or another packet is the reply */
 } fw_answer;
 
 static inline fw_answer fw_refuse(eits_reply_status why, int32_t a, int32_t b)

@@ -1,8 +1,17 @@
 #include "app/link/report.h"
 
+#include "app/acquire/acquire.h"
+#include "app/acquire/scan.h"
 #include "app/link/sha256.h"
-
-#include <string.h>
+#include "app/link/state.h"
+#include "app/safety/current_enable.h"
+#include "app/safety/faults.h"
+#include "app/safety/owner.h"
+#include "app/solve/models.h"
+#include "app/solve/solve.h"
+#include "app/solve/store.h"
+#include "app/solve/tare.h"
+#include "drivers/ad9833.h"
 
 static void copy_text(char *to, size_t room, const char *from)
 {
@@ -10,13 +19,15 @@ static void copy_text(char *to, size_t room, const char *from)
         to[k] = from[k];
 }
 
-static void report_model(const fw_instrument *instrument, eits_packet_info *info)
+static void report_model(const fw_host_link *link, eits_packet_info *info)
 {
-    const eits_model *model = &instrument->engine.model;
-    if (!instrument->engine.open)
+    const eits_model *model = fw_solve_model(link->solve);
+    if (model == NULL)
         return;
-    info->model_bytes = instrument->record.model_bytes;
-    info->model_crc = instrument->record.model_crc;
+    const fw_model_file file = fw_models_file(link->solve);
+    info->model_bytes = file.size;
+    info->model_crc = file.crc;
+    info->bank = file.bank;
     info->protocol_hash = model->protocol_hash;
     info->n_electrodes = model->n_electrodes;
     info->n_rows = model->n_rows;
@@ -26,71 +37,76 @@ static void report_model(const fw_instrument *instrument, eits_packet_info *info
     info->nx = model->nx;
     info->ny = model->ny;
     info->storage = (uint32_t)model->sensitivity.storage;
-    info->bank = instrument->bank;
-    info->tared = instrument->engine.tared;
+    info->tared = fw_solve_tared(link->solve);
 }
 
-void fw_send_info(fw_instrument *instrument, uint32_t request)
+static void report_scan(const fw_host_link *link, eits_packet_info *info)
 {
-    const fw_board *board = instrument->board;
-    const fw_scan_settings *s = &instrument->settings;
+    const fw_board *board = link->board;
+    const fw_scan_settings *s = fw_acquire_settings(link->acquire);
     const uint32_t tuning = fw_ad9833_tuning(board->mclk_hz, s->excitation_millihz);
+    info->check_every = (uint16_t)s->check_every;
+    info->frame_period_us = s->frame_period_us;
+    if (board->frames_given)
+        return;
+    info->excitation_millihz = (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning);
+    info->sample_rate_hz = s->sample_rate_hz;
+    info->samples = (uint16_t)s->samples;
+    info->settle_us = (uint16_t)s->settle_us;
+    info->slot_us = fw_slot_us(s);
+    info->volts_per_code_nv = fw_volts_per_code_nv(&board->capture);
+}
+
+void fw_send_info(fw_host_link *link, uint32_t request)
+{
+    const fw_board *board = link->board;
+    const fw_safety *safety = link->safety;
     eits_packet_info info = {.request = request,
                              .firmware = {FW_VERSION_MAJOR, FW_VERSION_MINOR, FW_VERSION_PATCH, 0},
                              .f_cpu_hz = board->f_cpu_hz,
                              .electrodes = FW_ELECTRODES,
                              .bank_bytes = fw_store_room(&board->store),
                              .data_bytes = FW_DATA_BYTES,
-                             .check_every = (uint16_t)s->check_every,
-                             .streaming = instrument->stream.what,
-                             .every = instrument->stream.every,
-                             .frame_period_us = s->frame_period_us,
-                             .faults = instrument->faults.raised,
-                             .drive = (uint16_t)instrument->drive.state,
-                             .settings = (uint16_t)instrument->kept.settings,
+                             .streaming = link->stream.what,
+                             .every = link->stream.every,
+                             .faults = fw_faults_raised(safety),
+                             .drive = (uint16_t)fw_current_state(safety),
+                             .settings = (uint16_t)fw_owner_settings(safety),
                              .source_ua_rms = board->source_ua_rms,
-                             .current_ua_rms = instrument->drive.current_ua,
-                             .current_limit_ua_rms =
-                                 fw_current_limit_ua(&instrument->kept, board->source_ua_rms)};
-    if (!board->frames_given) {
-        info.excitation_millihz = (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning);
-        info.sample_rate_hz = s->sample_rate_hz;
-        info.samples = (uint16_t)s->samples;
-        info.settle_us = (uint16_t)s->settle_us;
-        info.slot_us = fw_slot_us(s);
-        info.volts_per_code_nv = fw_volts_per_code_nv(&board->capture);
-    }
+                             .current_ua_rms = fw_current_ua(safety),
+                             .current_limit_ua_rms = fw_current_limit_ua(safety)};
+    report_scan(link, &info);
     copy_text(info.board, sizeof info.board - 1, board->name);
     copy_text(info.serial, sizeof info.serial, board->serial);
-    report_model(instrument, &info);
-    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_INFO, &info, sizeof info, NULL, 0);
+    report_model(link, &info);
+    (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_INFO, &info, sizeof info, NULL, 0);
 }
 
-void fw_send_hashes(fw_instrument *instrument, uint32_t request)
+void fw_send_hashes(fw_host_link *link, uint32_t request)
 {
-    const fw_board *board = instrument->board;
+    const fw_board *board = link->board;
     eits_packet_hashes hashes = {.request = request};
-    if (instrument->engine.open)
-        fw_sha256(board->store.ops->bank(board->store.ctx, instrument->bank),
-                  instrument->record.model_bytes, hashes.model);
+    if (fw_solve_model(link->solve) != NULL) {
+        const fw_model_file file = fw_models_file(link->solve);
+        fw_sha256(file.bytes, file.size, hashes.model);
+    }
     if (board->image != NULL)
         fw_sha256(board->image, board->image_bytes, hashes.firmware);
-    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_HASHES, &hashes, sizeof hashes, NULL,
-                           0);
+    (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_HASHES, &hashes, sizeof hashes, NULL, 0);
 }
 
-static void collect(fw_instrument *instrument, eits_packet_stats *stats)
+static void collect(const fw_host_link *link, eits_packet_stats *stats)
 {
-    const fw_board *board = instrument->board;
-    const eits_link_decoder *decoder = &instrument->decoder;
-    *stats = (eits_packet_stats){.uptime_ms = instrument->uptime_ms,
-                                 .frames_scanned = instrument->scan.frames_scanned,
-                                 .frames_solved = instrument->frames_solved,
-                                 .packets_sent = instrument->tx_queue.sent,
-                                 .packets_dropped = instrument->tx_queue.dropped,
-                                 .deadlines_missed = instrument->deadlines_missed,
-                                 .slots_repeated = instrument->scan.slots_repeated,
-                                 .outliers = instrument->outliers,
+    const fw_board *board = link->board;
+    const eits_link_decoder *decoder = &link->decoder;
+    *stats = (eits_packet_stats){.uptime_ms = link->uptime_ms,
+                                 .frames_scanned = fw_acquire_frames_scanned(link->acquire),
+                                 .frames_solved = fw_solve_frames_solved(link->solve),
+                                 .packets_sent = link->tx_queue.sent,
+                                 .packets_dropped = link->tx_queue.dropped,
+                                 .deadlines_missed = link->deadlines_missed,
+                                 .slots_repeated = fw_acquire_slots_repeated(link->acquire),
+                                 .outliers = fw_solve_outliers(link->solve),
                                  .link_packets = decoder->packets,
                                  .link_crc_errors = decoder->crc_errors,
                                  .link_framing_errors = decoder->framing_errors,
@@ -98,23 +114,24 @@ static void collect(fw_instrument *instrument, eits_packet_stats *stats)
                                  .stack_bytes = board->stack_bytes,
                                  .stack_used = board->system->stack_used(board->system_ctx),
                                  .workspace_bytes = (uint32_t)board->workspace_bytes,
-                                 .workspace_used = (uint32_t)instrument->engine.used_bytes};
+                                 .workspace_used = fw_solve_workspace_used(link->solve)};
     for (uint32_t k = 0; k < EITS_STAGES; ++k)
-        stats->stage[k] = fw_stats_of(&instrument->stats, (eits_stage)k);
+        stats->stage[k] = fw_stats_of(&link->stats, (eits_stage)k);
 }
 
-void fw_send_stats(fw_instrument *instrument, uint32_t request, bool reset)
+void fw_send_stats(fw_host_link *link, uint32_t request, bool reset)
 {
-    eits_packet_stats *stats = &instrument->last_stats;
-    /* a request sent again gets the same numbers */
-    if (!instrument->stats_reported || stats->request != request) {
-        collect(instrument, stats);
-        stats->request = request;
-        instrument->stats_reported = true;
+    fw_replies *replies = &link->replies;
+    /* a request that is sent again gets the same numbers */
+    if (!replies->stats_answered || replies->stats.request != request) {
+        collect(link, &replies->stats);
+        replies->stats.request = request;
+        replies->stats_answered = true;
         if (reset)
-            fw_stats_clear(&instrument->stats);
+            fw_stats_clear(&link->stats);
     }
-    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_STATS, stats, sizeof *stats, NULL, 0);
+    (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_STATS, &replies->stats,
+                           sizeof replies->stats, NULL, 0);
 }
 
 static eits_packet_reply make_reply(eits_packet_type command, uint32_t request, fw_answer answer)
@@ -125,19 +142,21 @@ static eits_packet_reply make_reply(eits_packet_type command, uint32_t request, 
                                .detail = {answer.detail[0], answer.detail[1]}};
 }
 
-void fw_send_reply(fw_instrument *instrument, eits_packet_type command, uint32_t request,
-                   fw_answer answer)
+static void send_reply(fw_host_link *link, const eits_packet_reply *reply)
 {
-    instrument->reply = make_reply(command, request, answer);
-    instrument->answered = true;
-    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_REPLY, &instrument->reply,
-                           sizeof instrument->reply, NULL, 0);
+    (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_REPLY, reply, sizeof *reply, NULL, 0);
 }
 
-void fw_send_tare_reply(fw_instrument *instrument, fw_answer answer)
+void fw_send_reply(fw_host_link *link, eits_packet_type command, uint32_t request, fw_answer answer)
 {
-    instrument->tare_reply = make_reply(EITS_PACKET_TARE, instrument->tare.request, answer);
-    instrument->tare_reported = true;
-    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_REPLY, &instrument->tare_reply,
-                           sizeof instrument->tare_reply, NULL, 0);
+    link->replies.reply = make_reply(command, request, answer);
+    link->replies.answered = true;
+    send_reply(link, &link->replies.reply);
+}
+
+void fw_send_tare_reply(fw_host_link *link, fw_answer answer)
+{
+    link->replies.tare = make_reply(EITS_PACKET_TARE, fw_tare_request(link->solve), answer);
+    link->replies.tare_answered = true;
+    send_reply(link, &link->replies.tare);
 }

@@ -1,19 +1,29 @@
-/* What the board says about itself, and answers to commands. */
+/* What the board says about itself, and replies to commands. */
 #ifndef FW_REPORT_H
 #define FW_REPORT_H
 
-#include "app/instrument.h"
 #include "app/link/answer.h"
 
-/* Each sends one packet, which goes to `request`; `reset` begins the statistics from zero. A reply
- * is kept, to be given again when its command is sent again. */
-void fw_send_info(fw_instrument *instrument, uint32_t request);
-/* SHA-256 of model and program; takes some 0.1 s of a board. */
-void fw_send_hashes(fw_instrument *instrument, uint32_t request);
+#include <stdint.h>
 
-void fw_send_stats(fw_instrument *instrument, uint32_t request, bool reset);
-void fw_send_reply(fw_instrument *instrument, eits_packet_type command, uint32_t request,
+typedef struct fw_host_link fw_host_link;
+
+#define FW_VERSION_MAJOR 0u
+#define FW_VERSION_MINOR 1u
+#define FW_VERSION_PATCH 0u
+
+/* Each sends one packet with this request number. */
+void fw_send_info(fw_host_link *link, uint32_t request);
+
+/* SHA-256 of model and program; takes a board about 0.1 s. */
+void fw_send_hashes(fw_host_link *link, uint32_t request);
+
+/* `reset`: the statistics begin again afterwards. */
+void fw_send_stats(fw_host_link *link, uint32_t request, bool reset);
+
+/* Replies are kept, to be given again when their command is sent again. */
+void fw_send_reply(fw_host_link *link, eits_packet_type command, uint32_t request,
                    fw_answer answer);
-void fw_send_tare_reply(fw_instrument *instrument, fw_answer answer);
+void fw_send_tare_reply(fw_host_link *link, fw_answer answer);
 
 #endif

@@ -1,83 +1,57 @@
 #include "app/link/scanning.h"
 
+#include "app/acquire/acquire.h"
 #include "app/link/report.h"
+#include "app/link/state.h"
 #include "app/link/tracks.h"
+#include "app/safety/current_enable.h"
+#include "app/safety/faults.h"
+#include "app/solve/solve.h"
+#include "app/solve/tare.h"
 
-fw_status fw_stop_scan(fw_instrument *instrument)
+/* A tare that cannot go on is answered. */
+static void fail_tare(fw_host_link *link)
 {
-    return fw_scan_stop(&instrument->scan);
+    const int32_t why = EITS_E_REFERENCE_SHORT;
+    if (fw_tare_abort(link->solve))
+        fw_send_tare_reply(link, (fw_answer){.status = EITS_REPLY_CORE, .detail = {why}});
 }
 
-float fw_noise_floor_v(const fw_instrument *instrument)
+static bool measurable(const fw_host_link *link)
 {
-    const fw_scan_settings *s = &instrument->settings;
-    if (instrument->board->frames_given)
-        return 0;
-    return fw_rounding_v(fw_volts_per_code_nv(&instrument->board->capture), s->excitation_millihz,
-                         s->sample_rate_hz, s->samples);
+    return fw_solve_model(link->solve) != NULL && !link->upload.active;
 }
 
-/* The generator at the tuning word that the settings ask for; it is left alone where it has it
- * already, for its phase. */
-static fw_status start_generator(fw_instrument *instrument)
+void fw_scanning_restart(fw_host_link *link)
 {
-    fw_ad9833 *generator = &instrument->generator;
-    const uint32_t tuning =
-        fw_ad9833_tuning(instrument->board->mclk_hz, instrument->settings.excitation_millihz);
-    if (generator->state == FW_AD9833_RUNNING && generator->tuning == tuning)
-        return FW_OK;
-    instrument->engine.phase_known = false; /* it begins with the write that starts it */
-    return fw_ad9833_start(generator, tuning, 0, FW_SINE);
+    const fw_status stopped = fw_acquire_stop(link->acquire);
+    fw_tracks_restart(link);
+    const fw_scan_table table = fw_solve_table(link->solve);
+    const fw_started started = fw_acquire_start(
+        link->acquire, stopped, measurable(link) ? &table : NULL, fw_solve_frames(link->solve));
+    if (started.status != FW_OK)
+        fail_tare(link);
+    if (started.new_phase)
+        fw_solve_phase_changed(link->solve);
 }
 
-static fw_status stop_generator(fw_instrument *instrument)
+void fw_scanning_watch(fw_host_link *link)
 {
-    fw_ad9833 *generator = &instrument->generator;
-    return generator->state == FW_AD9833_RESET ? FW_OK : fw_ad9833_stop(generator);
-}
-
-bool fw_scan_wanted(const fw_instrument *instrument)
-{
-    return instrument->drive.state == EITS_DRIVE_ON && instrument->engine.open &&
-           !instrument->upload.active;
-}
-
-void fw_start_scan(fw_instrument *instrument)
-{
-    const fw_board *board = instrument->board;
-    const fw_scan_settings *s = &instrument->settings;
-    /* Where the multiplexers do not open, nothing may drive: the generator goes into reset, and
-     * what is wanted is tried again. */
-    const fw_status stopped = fw_stop_scan(instrument);
-    fw_follow_forget(instrument);
-    instrument->tried_us = fw_now_us(instrument);
-    const fw_fault_detail detail = {.frame = instrument->last_frame};
-    const bool wanted = stopped == FW_OK && fw_scan_wanted(instrument);
-    fw_status status = wanted ? start_generator(instrument) : stop_generator(instrument);
-    if (stopped != FW_OK)
-        status = stopped;
-    bool bus = status != FW_OK;
-    if (status == FW_OK && wanted) {
-        const fw_scan_table table = fw_engine_table(&instrument->engine);
-        status = fw_demodulate_setup(&instrument->demodulator, &board->capture, board->mclk_hz,
-                                     instrument->generator.tuning, s->excitation_millihz,
-                                     s->sample_rate_hz, s->samples);
-        if (status == FW_OK)
-            status = fw_scan_start(&instrument->scan, s, &table, instrument->engine.frames);
-        bus = status == FW_E_BUS;
+    if (fw_acquire_stalled(link->acquire)) {
+        fw_fault_set(link->safety, EITS_FAULT_SCAN_STALLED, true, (fw_fault_detail){0});
+        fail_tare(link);
+        fw_scanning_restart(link);
+    } else if (fw_acquire_retry_due(link->acquire) && measurable(link)) {
+        fw_scanning_restart(link);
     }
-    fw_fault_set(&instrument->faults, EITS_FAULT_BUS, bus, detail);
-    if (status != FW_OK && !bus) /* a frame takes the fault back */
-        fw_fault_set(&instrument->faults, EITS_FAULT_SCAN_STALLED, true, detail);
-    if (status != FW_OK)
-        fw_fail_tare(instrument, EITS_E_REFERENCE_SHORT);
 }
 
-void fw_fail_tare(fw_instrument *instrument, eits_status why)
+void fw_scanning_current_changed(void *link)
 {
-    if (!instrument->tare.active)
-        return;
-    fw_tare_abort(&instrument->tare, &instrument->engine);
-    fw_send_tare_reply(instrument,
-                       (fw_answer){.status = EITS_REPLY_CORE, .detail = {(int32_t)why}});
+    fw_host_link *self = link;
+    if (!fw_current_allowed(self->safety)) {
+        self->stream.what = 0;
+        fail_tare(self);
+    }
+    fw_scanning_restart(self);
 }

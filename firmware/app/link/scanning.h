@@ -1,22 +1,21 @@
-/* Starting and stopping the generator and the scan. */
-#ifndef FW_SCAN_CONTROL_H
-#define FW_SCAN_CONTROL_H
+/* Starts the scan where it is wanted, and stops it where it is not, with all that hangs on it: a
+ * tare under way, the tracker, the phase. */
+#ifndef FW_SCANNING_H
+#define FW_SCANNING_H
 
-#include "app/instrument.h"
+#include "eitskin/link.h"
 
-/* Start generator and scan where they are wanted, else stop both; what cannot be started
- * is tried again. */
-void fw_start_scan(fw_instrument *instrument);
-/* Open the multiplexers and let go of the converter; what the lines say where they do not open. */
-fw_status fw_stop_scan(fw_instrument *instrument);
-/* Whether there should be one: the drive is on, a model is open, no upload is under way. */
-bool fw_scan_wanted(const fw_instrument *instrument);
+typedef struct fw_host_link fw_host_link;
 
-/* What the converter's steps alone make of noise with the scan's settings; 0 where the frames are
- * another instrument's. */
-float fw_noise_floor_v(const fw_instrument *instrument);
+/* Stop, and start again if current is allowed, a model is open, and no upload is under way. A start
+ * that fails is tried again later. */
+void fw_scanning_restart(fw_host_link *link);
 
-/* A tare that cannot go on is answered, and the last reference put back. */
-void fw_fail_tare(fw_instrument *instrument, eits_status why);
+/* Call once per turn of the main loop: starts a scan again that has stalled, or that could not be
+ * started. */
+void fw_scanning_watch(fw_host_link *link);
+
+/* For fw_safety_hooks; `link` is a fw_host_link. */
+void fw_scanning_current_changed(void *link);
 
 #endif

@@ -1,5 +1,5 @@
-/* How long each stage takes: last, worst, and the 99th percentile from bins an eighth of an octave
- * wide. */
+/* How long each stage takes: last, worst, and the 99th percentile, from bins that are an eighth of
+ * an octave wide. */
 #ifndef FW_STATS_H
 #define FW_STATS_H
 
@@ -7,7 +7,7 @@
 
 #include <stdbool.h>
 
-enum { FW_STATS_BINS = 8 + 8 * 24 }; /* up to 2^27 us; the last bin takes all above */
+enum { FW_STATS_BINS = 8 + 8 * 24 }; /* up to 2^27 us; the last bin counts all longer times */
 
 typedef struct fw_stage {
     uint32_t count, last_us, worst_us;
@@ -18,14 +18,15 @@ typedef struct fw_stats {
     fw_stage stage[EITS_STAGES];
 } fw_stats;
 
-/* The bin of a time (0 to 7 us have their own), and the greatest time in a bin. */
+/* The bin of a time (each of 0 to 7 us has its own), and the longest time of a bin. */
 uint32_t fw_stats_bin(uint32_t us);
 uint32_t fw_stats_edge(uint32_t bin);
 
 void fw_stats_clear(fw_stats *stats);
 void fw_stats_add(fw_stats *stats, eits_stage stage, uint32_t us);
 
-/* p99: the least bin edge that at least 99 % of the times do not exceed; never above the worst. */
+/* p99: the lowest edge of a bin that at least 99 % of the times do not exceed, and at most the
+ * worst time. */
 eits_stage_stats fw_stats_of(const fw_stats *stats, eits_stage stage);
 
 #endif

@@ -1,10 +1,15 @@
-/* What becomes of a frame: checked, given to the tare or to the solver, and sent. */
+/* The path of a frame from the scan to the host. */
 #ifndef FW_STREAM_H
 #define FW_STREAM_H
 
-#include "app/instrument.h"
+#include "app/acquire/frame.h"
 
-/* Judge a frame, give it to the tare or the solver, and send what is streamed. */
-void fw_process_frame(fw_instrument *instrument, fw_frame *frame);
+typedef struct fw_host_link fw_host_link;
+
+/* Check a frame, give it to the tare or the solver, and send what is streamed. */
+void fw_stream_frame(fw_host_link *link, fw_frame *frame);
+
+/* Stream nothing, as after a start. */
+void fw_stream_reset(fw_host_link *link);
 
 #endif

@@ -1,24 +1,53 @@
-/* Whether current may flow: off from power-up until a host asks for frames, and off again where no
- * packet of it has come for a second, where the current is above its limit, or where it says that
- * it goes. Off means: all multiplexers open, generator in reset. */
-#ifndef FW_DRIVE_H
-#define FW_DRIVE_H
+/* Whether current may flow. It may not from power-up until a host asks for frames. It may no longer
+ * once the host has sent no packet for a second, has said that it leaves, or the measured current
+ * exceeds its limit. While it may not, all multiplexers are open and the generator is in reset. */
+#ifndef FW_CURRENT_ENABLE_H
+#define FW_CURRENT_ENABLE_H
 
-#include "app/instrument.h"
+#include "eitskin/link.h"
 
-#define FW_SILENT_US 900000u /* without a packet; the main loop may take the rest of a second */
-#define FW_SENSE_US  50000u  /* from one measurement of the current to the next */
+#include <stdbool.h>
+#include <stdint.h>
 
-/* A host asks for frames; false: the current was above its limit, and nobody has looked since. */
-bool fw_drive_on(fw_instrument *instrument);
+typedef struct fw_safety fw_safety;
 
-/* The current stops, and with it the stream and a tare under way; the reference stays. */
-void fw_drive_off(fw_instrument *instrument, eits_drive why);
+/* The promise is one second; the rest of it is left for a slow turn of the main loop. */
+#define FW_SILENT_US 900000u
+#define FW_SENSE_US  50000u /* between two measurements of the current */
+
+/* A host asks for frames. Returns false after a trip: the current exceeded its limit, and nobody
+ * has cleared the faults since. */
+bool fw_current_on(fw_safety *safety);
+
+/* Withdraw the permission; the current has stopped when this returns. */
+void fw_current_off(fw_safety *safety, eits_drive why);
 
 /* A packet has come from the host. */
-void fw_drive_heard(fw_instrument *instrument);
+void fw_current_heard(fw_safety *safety);
 
-/* Once a turn of the main loop: is the host heard, is the current within its limit? */
-void fw_drive_check(fw_instrument *instrument);
+/* Call once per turn of the main loop. Withdraws the permission if the host is silent, or, while
+ * the scan runs, if the measured current exceeds its limit. */
+void fw_current_check(fw_safety *safety, bool scanning);
+
+/* Somebody has cleared the faults: after a trip, current may be asked for again. */
+void fw_current_clear_trip(fw_safety *safety);
+
+bool fw_current_allowed(const fw_safety *safety);
+eits_drive fw_current_state(const fw_safety *safety);
+
+/* As measured last, rms; 0 if it was not measured. */
+uint32_t fw_current_ua(const fw_safety *safety);
+
+/* The owner's limit, or else 1.25 times what the board's source gives, rms; 0: no limit. */
+uint32_t fw_current_limit_ua(const fw_safety *safety);
+
+/* The lowest excitation at which the current of the board's source is safe. */
+uint32_t fw_current_min_millihz(const fw_safety *safety);
+
+/* Whether frames are still dropped because the current was switched on only just now. */
+bool fw_current_settling(const fw_safety *safety);
+
+/* Take one frame: returns whether it must be dropped for that reason. */
+bool fw_current_drops_frame(fw_safety *safety);
 
 #endif

@@ -1,37 +1,37 @@
-/* Faults: each is reported once when it rises and once when it has gone. Those of an electrode
- * (ELECTRODE_OPEN, BRIDGED, ELECTRODE_NOISY) count for each electrode, detail.index, below 32. */
+/* Faults: each is reported once when it is raised and once when it is cleared. The faults of an
+ * electrode (ELECTRODE_OPEN, BRIDGED, ELECTRODE_NOISY) are counted for each electrode by itself;
+ * its number is detail.index, below 32. */
 #ifndef FW_FAULTS_H
 #define FW_FAULTS_H
 
-#include "app/link/tx_queue.h"
+#include "eitskin/link.h"
 
-typedef struct fw_faults {
-    fw_tx_queue *tx_queue;
-    uint32_t raised;             /* bit k: fault number k */
-    uint32_t there[EITS_FAULTS]; /* of an electrode's: bit e; of others: bit 0 */
-    /* frames in a row without what is there, or with what is not, by the same bits */
-    uint8_t run[EITS_FAULTS][32];
-} fw_faults;
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct fw_safety fw_safety;
 
 typedef struct fw_fault_detail {
-    uint32_t frame;
     int32_t index, value;
     const uint32_t *words; /* 5, or NULL */
 } fw_fault_detail;
 
-void fw_faults_init(fw_faults *faults, fw_tx_queue *tx_queue);
+/* The frame that is processed from now on: reports of faults name it. */
+void fw_faults_at_frame(fw_safety *safety, uint32_t frame);
 
-/* The fault is there, or is not: a packet goes out where that changed. */
-void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detail detail);
+/* The fault is there, or is not; reported if that is a change. */
+void fw_fault_set(fw_safety *safety, eits_fault code, bool there, fw_fault_detail detail);
 
-/* A frame shows the fault, or does not: it rises at once, from ELECTRODE_NOISY on with the
- * EITS_FAULT_RAISE_FRAMES-th in a row, and goes with the EITS_FAULT_CLEAR_FRAMES-th that does not,
- * so that what comes and goes with the noise does not fill the line. */
-void fw_fault_observe(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail);
+/* A frame shows the fault, or does not. The fault is raised at once; from ELECTRODE_NOISY on only
+ * by the EITS_FAULT_RAISE_FRAMES-th consecutive frame that shows it. It is cleared by the
+ * EITS_FAULT_CLEAR_FRAMES-th consecutive frame that does not. So a fault that flickers with the
+ * noise does not fill the link. */
+void fw_fault_observe(fw_safety *safety, eits_fault code, bool shown, fw_fault_detail detail);
 
-bool fw_fault_is(const fw_faults *faults, eits_fault code);
+/* Bit k: fault number k is raised. */
+uint32_t fw_faults_raised(const fw_safety *safety);
 
-/* All are taken to be gone; those that are still there will rise again. */
-void fw_faults_clear(fw_faults *faults, uint32_t frame);
+/* Clear all of them; those that are still there are raised again. */
+void fw_faults_clear(fw_safety *safety);
 
 #endif

@@ -1,22 +1,26 @@
-/* What the core, or before a tare the board, found wrong with a frame: reported as faults by name,
- * and in the head of its packets. */
+/* What the core, or before a tare the board, found wrong with a frame: reported as faults, and in
+ * the head of its packets. */
 #ifndef FW_DIAGNOSTICS_H
 #define FW_DIAGNOSTICS_H
 
-#include "app/safety/faults.h"
 #include "app/solve/quality.h"
 
+typedef struct fw_safety fw_safety;
+
 /* Open electrodes, bit e: electrode e. */
-void fw_diagnostics_open(fw_faults *faults, uint32_t frame, uint64_t open);
+void fw_diagnostics_open(fw_safety *safety, uint64_t open);
 
-/* Bridged and noisy electrodes, mismatch. */
-void fw_diagnostics_skin(fw_faults *faults, uint32_t frame, const eits_info *info);
+/* Bridged and noisy electrodes, model mismatch. */
+void fw_diagnostics_skin(fw_safety *safety, const eits_info *info);
 
-/* A stale reference: only frames that were solved tell. */
-void fw_diagnostics_reference(fw_faults *faults, uint32_t frame, const eits_info *info);
+/* A stale reference; only frames that were solved show it. */
+void fw_diagnostics_reference(fw_safety *safety, const eits_info *info);
 
-/* The head's fields for what was found. The converter knows saturated rows, and the core gets them
- * as no numbers: they are added where `options` names them. */
+/* A new reference is neither stale nor unlike the model. */
+void fw_diagnostics_new_reference(fw_safety *safety);
+
+/* The head's fields. The core gets saturated rows as NaN, so that only the converter knows them;
+ * they are added if `options` asks for this diagnostic. */
 void fw_diagnostics_head(eits_packet_solved *head, const eits_info *info, const fw_quality *quality,
                          const eits_options *options);
 

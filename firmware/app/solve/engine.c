@@ -7,8 +7,7 @@ void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes)
     *engine = (fw_engine){.workspace = workspace, .workspace_bytes = workspace_bytes, .cosine = 1};
 }
 
-/* From the workspace's start: the core's part. From its end: what is kept while another model is
- * tried. Between: the rest. */
+/* The workspace begins with the core's part and ends with what is saved; the rest is between. */
 static size_t frame_bytes(const eits_model *model)
 {
     return EITS_ALIGN16(model->n_rows * sizeof(fw_iq)) +
@@ -30,7 +29,7 @@ static void *take(uint8_t **next, size_t bytes)
     return taken;
 }
 
-/* What follows touches drive by drive, where there is room for it beside all the rest. */
+/* The tracker of touches after each drive, if there is room for it beside all the rest. */
 static void start_fast(fw_engine *engine, uint8_t *next)
 {
     const size_t bytes = EITS_ALIGN16(eits_fast_size(&engine->model));
@@ -69,12 +68,12 @@ static void lay_out(fw_engine *engine)
     engine->unique = take(&next, rows * sizeof(uint16_t));
     engine->flags = take(&next, rows);
     uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
-    /* not cleared: it may hold what is to be restored */
+    /* not cleared: it may hold what will be restored */
     engine->saved.core = end - eits_saved_size(&engine->model);
     start_fast(engine, next);
 }
 
-/* Rows that no fold names as a second one, as they are measured. Rows that no fold names at all are
+/* Rows that are not the second row of a fold, in the order of measurement. Rows without a fold are
  * among them. */
 static void list_unique(fw_engine *engine)
 {
@@ -92,7 +91,7 @@ static void list_unique(fw_engine *engine)
     }
 }
 
-/* Frames follow one another here, so that touches are followed in time. */
+/* Frames come in sequence, so touches are tracked over time. */
 static eits_status start_core(fw_engine *engine)
 {
     const eits_status status = eits_init(engine->workspace, eits_workspace_size(&engine->model, 0),

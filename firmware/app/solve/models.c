@@ -1,63 +1,126 @@
 #include "app/solve/models.h"
 
-fw_answer fw_model_fits(const fw_instrument *instrument, const eits_model *model)
+#include "app/acquire/acquire.h"
+#include "app/safety/faults.h"
+#include "app/solve/solve.h"
+#include "app/solve/state.h"
+#include "drivers/adg1206.h"
+
+static eits_reply_status refuse(eits_reply_status why, size_t a, size_t b, int32_t detail[2])
+{
+    detail[0] = (int32_t)a;
+    detail[1] = (int32_t)b;
+    return why;
+}
+
+/* Whether a model can be scanned here, and whether its packets and its memory fit. */
+static eits_reply_status fits(const fw_engine *engine, const eits_model *model, int32_t detail[2])
 {
     const size_t raw = sizeof(eits_packet_raw) + 5 * (size_t)model->n_rows;
     const size_t image = sizeof(eits_packet_solved) + 4 * (size_t)model->n_pixels;
-    const size_t memory = instrument->engine.workspace_bytes;
+    const size_t memory = engine->workspace_bytes, needs = fw_engine_needs(model);
     if (model->n_electrodes > FW_ELECTRODES)
-        return fw_refuse(EITS_REPLY_MODEL_SCAN, (int32_t)model->n_electrodes,
-                         (int32_t)FW_ELECTRODES);
+        return refuse(EITS_REPLY_MODEL_SCAN, model->n_electrodes, FW_ELECTRODES, detail);
     if (raw > EITS_LINK_MAX_PAYLOAD || image > EITS_LINK_MAX_PAYLOAD)
-        return fw_refuse(EITS_REPLY_MODEL_SIZE, (int32_t)EITS_LINK_MAX_PAYLOAD,
-                         (int32_t)(raw > image ? raw : image));
-    if (fw_engine_needs(model) > memory)
-        return fw_refuse(EITS_REPLY_MODEL_SIZE, (int32_t)memory, (int32_t)fw_engine_needs(model));
-    return (fw_answer){0};
+        return refuse(EITS_REPLY_MODEL_SIZE, EITS_LINK_MAX_PAYLOAD, raw > image ? raw : image,
+                      detail);
+    if (needs > memory)
+        return refuse(EITS_REPLY_MODEL_SIZE, memory, needs, detail);
+    return EITS_REPLY_OK;
 }
 
-void fw_report_no_model(fw_instrument *instrument)
+void fw_models_report(fw_solve *solve)
 {
-    fw_fault_set(&instrument->faults, EITS_FAULT_NO_MODEL, !instrument->engine.open,
-                 (fw_fault_detail){.frame = instrument->last_frame,
-                                   .value = (int32_t)instrument->no_model_why});
+    fw_fault_set(solve->safety, EITS_FAULT_NO_MODEL, !solve->engine.open,
+                 (fw_fault_detail){.value = (int32_t)solve->models.why_none});
 }
 
-static eits_status open_bank(fw_instrument *instrument, uint32_t bank)
+static eits_status open_bank(fw_solve *solve, uint32_t bank)
 {
-    const fw_store *store = &instrument->board->store;
+    const fw_store *store = &solve->board->store;
+    fw_record *record = &solve->models.record;
     eits_model model;
-    if (!fw_store_record(store, bank, &instrument->record))
+    int32_t detail[2];
+    if (!fw_store_record(store, bank, record))
         return EITS_E_MODEL_MAGIC;
-    eits_status status = fw_store_open(store, bank, &instrument->record, &model);
+    eits_status status = fw_store_open(store, bank, record, &model);
     if (status == EITS_OK) {
-        const eits_reply_status fits = fw_model_fits(instrument, &model).status;
-        if (fits != EITS_REPLY_OK)
-            status = fits == EITS_REPLY_MODEL_SCAN ? EITS_E_MODEL_VALUE : EITS_E_WORKSPACE;
+        const eits_reply_status fit = fits(&solve->engine, &model, detail);
+        if (fit != EITS_REPLY_OK)
+            status = fit == EITS_REPLY_MODEL_SCAN ? EITS_E_MODEL_VALUE : EITS_E_WORKSPACE;
     }
     if (status == EITS_OK)
-        status = fw_engine_open(&instrument->engine, &model);
-    instrument->bank = bank;
+        status = fw_engine_open(&solve->engine, &model);
+    solve->models.bank = bank;
     return status;
 }
 
-void fw_open_newest(fw_instrument *instrument)
+void fw_models_open_newest(fw_solve *solve)
 {
     uint32_t banks[FW_BANKS];
-    const uint32_t count = fw_store_newest(&instrument->board->store, banks);
-    instrument->stream = (fw_stream){.every = 1};
-    instrument->no_model_why = EITS_E_MODEL_MAGIC;
-    fw_engine_close(&instrument->engine);
-    for (uint32_t k = 0; k < count && !instrument->engine.open; ++k) {
-        const eits_status status = open_bank(instrument, banks[k]);
+    const uint32_t count = fw_store_newest(&solve->board->store, banks);
+    solve->models.why_none = EITS_E_MODEL_MAGIC;
+    fw_engine_close(&solve->engine);
+    for (uint32_t k = 0; k < count && !solve->engine.open; ++k) {
+        const eits_status status = open_bank(solve, banks[k]);
         if (k == 0)
-            instrument->no_model_why = status;
+            solve->models.why_none = status;
     }
-    const fw_scan_table table = fw_engine_table(&instrument->engine);
-    const uint64_t min_us =
-        (uint64_t)fw_scan_rows(&instrument->settings, &table) * fw_slot_us(&instrument->settings);
-    if (instrument->engine.open && !instrument->board->frames_given &&
-        instrument->settings.frame_period_us < min_us)
-        instrument->settings.frame_period_us = 0; /* it was for a shorter table */
-    fw_report_no_model(instrument);
+    const fw_scan_table table = fw_engine_table(&solve->engine);
+    if (solve->engine.open) /* the period may have been for a shorter table */
+        fw_acquire_fit_period(solve->acquire, &table);
+    fw_models_report(solve);
+}
+
+fw_model_file fw_models_file(const fw_solve *solve)
+{
+    const fw_store *store = &solve->board->store;
+    const fw_models *models = &solve->models;
+    return (fw_model_file){.bytes = store->ops->bank(store->ctx, models->bank),
+                           .size = models->record.model_bytes,
+                           .crc = models->record.model_crc,
+                           .bank = models->bank};
+}
+
+uint32_t fw_models_spare_bank(const fw_solve *solve)
+{
+    fw_record record;
+    if (solve->engine.open)
+        return 1u - solve->models.bank;
+    return fw_store_record(&solve->board->store, 0, &record) ? 1u : 0u;
+}
+
+eits_reply_status fw_models_try(fw_solve *solve, uint32_t bank, uint32_t size, uint32_t crc,
+                                int32_t detail[2])
+{
+    const fw_store *store = &solve->board->store;
+    const uint8_t *bytes = store->ops->bank(store->ctx, bank);
+    eits_model model;
+    if (eits_crc32(0, bytes, size) != crc)
+        return EITS_REPLY_MODEL_CRC;
+    eits_status status = eits_model_open(&model, bytes, size);
+    if (status != EITS_OK) {
+        detail[0] = (int32_t)status;
+        return EITS_REPLY_MODEL_INVALID;
+    }
+    const eits_reply_status fit = fits(&solve->engine, &model, detail);
+    if (fit != EITS_REPLY_OK)
+        return fit;
+    float difference;
+    status = fw_engine_self_test(&solve->engine, &model, &difference);
+    if (status != EITS_OK) {
+        detail[0] = (int32_t)status;
+        return EITS_REPLY_CORE;
+    }
+    detail[0] = fw_billionths(difference);
+    return difference == 0 ? EITS_REPLY_OK : EITS_REPLY_SELF_TEST;
+}
+
+fw_status fw_models_commit(fw_solve *solve, uint32_t bank, uint32_t size, uint32_t crc)
+{
+    const fw_store *store = &solve->board->store;
+    fw_record other;
+    const uint32_t generation =
+        fw_store_record(store, 1u - bank, &other) ? other.generation + 1u : 1u;
+    return fw_store_commit(store, bank, generation, size, crc);
 }

@@ -12,7 +12,7 @@ static float turned(const fw_engine *engine, fw_iq z)
     return z.i * engine->cosine + z.q * engine->sine;
 }
 
-/* Correlation with the model's reference, not scaled. */
+/* Scalar product with the model's reference. */
 static float along_model(const fw_engine *engine, const fw_frame *frame)
 {
     float sum = 0;
@@ -40,8 +40,7 @@ void fw_phase_learn(fw_engine *engine, const fw_frame *frame)
     const float size = sqrtf(re * re + im * im);
     if (!(size > 0))
         return;
-    /* half the argument by half-angle formulas, from the greater of cosine and sine so that nothing
-     * cancels */
+    /* half-angle formulas; the larger of cosine and sine comes first, so that nothing cancels */
     const float c = re / size, s = im / size;
     if (c >= 0) {
         engine->cosine = sqrtf(0.5f * (1 + c));

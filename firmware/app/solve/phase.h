@@ -1,19 +1,19 @@
 /* The phase of the voltages, and voltages from amplitudes and phases.
  *
- * What the demodulator leaves is one angle for all rows: where the generator's phase began, cables,
- * and what the skin adds. Voltages lie on a line through zero in the complex plane: its direction
- * is half the argument of the sum of z^2. Which of the line's two ends is positive follows from the
- * model: folded voltages correlate positively with its reference. */
+ * After demodulation one angle is left, which all rows share: it comes from the generator's initial
+ * phase, the cables and the skin. So the voltages lie on a line through zero in the complex plane,
+ * and its direction is half the argument of the sum of z^2. The model decides which end of the line
+ * is positive: folded voltages correlate positively with its reference. */
 #ifndef FW_PHASE_H
 #define FW_PHASE_H
 
 #include "app/solve/engine.h"
 
-/* Learn the angle from the frame's measured rows without a fault; with nothing to learn from, it
+/* Learn the angle from the frame's measured rows without a fault. If there are none, the angle
  * stays. */
 void fw_phase_learn(fw_engine *engine, const fw_frame *frame);
 
-/* Volts of each measured row. */
+/* Compute the volts of each measured row. */
 void fw_phase_apply(const fw_engine *engine, fw_frame *frame);
 
 #endif

@@ -1,5 +1,7 @@
 #include "app/solve/quality.h"
 
+#include "drivers/adg1206.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -8,7 +10,7 @@ enum {
     UNUSABLE = FAILED | EITS_QUALITY_OPEN | EITS_QUALITY_MASKED
 };
 
-/* Of the voltages that the model expects, over all rows that have a fold. */
+/* rms of the voltages that the model expects, over all rows that have a fold. */
 static float rms_expected(const eits_model *model)
 {
     float sum = 0;
@@ -50,10 +52,10 @@ void fw_quality_prepare(fw_engine *engine, fw_frame *frame)
 
 typedef struct evidence {
     uint32_t significant[FW_ELECTRODES]; /* rows */
-    uint32_t alive;                      /* bit e: a row of electrode e is */
+    uint32_t alive;                      /* bit e: a row of electrode e is not dead */
 } evidence;
 
-/* What one row says of its electrodes, given the square of the magnitude below which it is dead. */
+/* Count one row for its electrodes; limit2: the squared magnitude below which it is dead. */
 static void weigh(const fw_engine *engine, const fw_frame *frame, uint32_t row, float limit2,
                   evidence *so_far)
 {
@@ -127,7 +129,7 @@ static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_quali
     quality->worst_permille = (uint32_t)(1000 * (worst < 1000 ? worst : 1000) + 0.5f);
 }
 
-/* Second rows get what their first ones measured. */
+/* The second row of a fold gets the value of the first. */
 static void copy_reciprocals(const fw_engine *engine, fw_frame *frame)
 {
     for (uint32_t k = 0; k < engine->model.n_folded; ++k) {

@@ -1,5 +1,5 @@
-/* What is wrong with a frame's rows, and until there is a reference with its electrodes, before the
- * solver sees it. */
+/* Checks the rows of a frame before it is solved and, while there is no reference, the electrodes.
+ */
 #ifndef FW_QUALITY_H
 #define FW_QUALITY_H
 
@@ -8,27 +8,27 @@
 #include "eitskin/link.h"
 
 typedef struct fw_quality {
-    uint32_t saturated, first_saturated; /* rows, masked ones apart */
-    /* bit e: electrode e is open, as far as the model tells */
+    uint32_t saturated, first_saturated; /* rows that are not masked */
+    /* bit e: electrode e is open, compared with the model */
     uint32_t open;
     bool checked;                       /* reciprocity could be checked */
     uint32_t worst_row, worst_permille; /* of the frame's rms */
 } fw_quality;
 
-/* Before all else: notes which rows the frame measured, and clears what the others hold from
- * earlier frames. */
+/* Call this first: marks the rows that the frame has measured, and clears the others, which hold
+ * values of earlier frames. */
 void fw_quality_prepare(fw_engine *engine, fw_frame *frame);
 
-/* Judge and finish a prepared frame whose measured rows have volts and the scan's quality bits:
- * sets the remaining bits, copies reciprocals where they are not to be used as measured, and makes
- * rows that must not be used NaN.
+/* Check a prepared frame whose measured rows have volts and the scan's quality bits. Sets the
+ * remaining bits, copies reciprocal rows unless both are used as measured, and sets rows to NaN
+ * that must not be used.
  *
- * Against a reference the core finds open electrodes (diagnostics.h). Without one, and in the
- * frames of a tare, which must not be learned with an electrode off, `by_model` asks for them here:
- * an electrode is open where every significant row that uses it is dead or saturated, and there are
- * at least three of them. The model tells shares only, the frame itself gives the scale: the limit
- * is 0.6 % of the rms voltage, and noise above a third of that hides an open electrode until there
- * is a tare. */
+ * With a reference the core finds open electrodes (diagnostics.h). Without one, `by_model` looks
+ * for them here, and also in the frames of a tare, so that no reference is learned with an
+ * electrode off. An electrode is open if at least three significant rows use it and each of them is
+ * dead or saturated. The model gives the proportions between rows, and the frame gives the scale. A
+ * row is dead below 0.6 % of the rms voltage; noise above a third of that hides an open electrode
+ * until there is a reference. */
 void fw_quality_check(fw_engine *engine, fw_frame *frame, bool by_model, fw_quality *quality);
 
 #endif

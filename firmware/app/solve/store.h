@@ -1,7 +1,8 @@
-/* Two model banks in flash, each ended by a record that says whether and how new it is.
+/* Two model banks in flash. Each ends with a record that says how new its model is; without a valid
+ * record a bank holds no model.
  *
- * A model is programmed into the bank that is not in use; its record comes last, and only then is
- * the bank one to start from. Cut at any byte, the old bank stays the newest good one. */
+ * A model is programmed into the bank that is not in use, and its record last. So after a power cut
+ * at any byte the old bank is still the newest valid one. */
 #ifndef FW_STORE_H
 #define FW_STORE_H
 
@@ -23,19 +24,19 @@ typedef struct fw_record {
 /* Most bytes of a model. */
 uint32_t fw_store_room(const fw_store *store);
 
-/* The record of a bank; false if it holds none that is whole. The model is not looked at. */
+/* The record of a bank; false if it is not valid. The model is not checked. */
 bool fw_store_record(const fw_store *store, uint32_t bank, fw_record *record);
 
-/* Open the model of a bank by its record. Errors: EITS_E_MODEL_CRC (it is not what the record
- * says), EITS_E_MODEL_*. */
+/* Open the model of a bank. Errors: EITS_E_MODEL_CRC if it does not match the record,
+ * EITS_E_MODEL_*. */
 eits_status fw_store_open(const fw_store *store, uint32_t bank, const fw_record *record,
                           eits_model *model);
 
-/* Banks with a whole record, the newest first; returns their number. */
+/* Banks with a valid record, the newest first; returns their number. */
 uint32_t fw_store_newest(const fw_store *store, uint32_t banks[FW_BANKS]);
 
-/* Make a bank valid: the last step. Errors: those of programming; FW_E_FLASH if it does not read
- * back. */
+/* Make a bank valid, as the last step. Errors: those of programming; FW_E_FLASH if the record does
+ * not read back. */
 fw_status fw_store_commit(const fw_store *store, uint32_t bank, uint32_t generation,
                           uint32_t model_bytes, uint32_t model_crc);
 

@@ -1,30 +1,45 @@
 #include "app/solve/tare.h"
 
-void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t frames,
-                   uint32_t now_us)
+#include "app/clock.h"
+#include "app/solve/state.h"
+
+void fw_tare_begin(fw_solve *solve, uint32_t request, uint32_t frames)
 {
-    fw_engine_save(engine);
-    *tare = (fw_tare){.active = true, .request = request, .wanted = frames, .since_us = now_us};
+    fw_engine_save(&solve->engine);
+    solve->tare = (fw_tare){
+        .active = true, .request = request, .wanted = frames, .since_us = fw_now_us(solve->board)};
 }
 
-bool fw_tare_wants(const fw_tare *tare, const fw_frame *frame)
+bool fw_tare_active(const fw_solve *solve)
 {
-    return tare->active && (int32_t)(frame->time_us - tare->since_us) >= 0;
+    return solve->tare.active;
 }
 
-bool fw_tare_first(const fw_tare *tare)
+uint32_t fw_tare_request(const fw_solve *solve)
 {
-    return tare->taken == 0;
+    return solve->tare.request;
 }
 
-void fw_tare_abort(fw_tare *tare, fw_engine *engine)
+bool fw_tare_wants(const fw_solve *solve, const fw_frame *frame)
 {
-    if (tare->active)
-        fw_engine_restore(engine);
-    tare->active = false;
+    return solve->tare.active && (int32_t)(frame->time_us - solve->tare.since_us) >= 0;
 }
 
-static eits_status add(fw_tare *tare, fw_engine *engine, const fw_frame *frame)
+bool fw_tare_first(const fw_solve *solve)
+{
+    return solve->tare.taken == 0;
+}
+
+bool fw_tare_abort(fw_solve *solve)
+{
+    const bool active = solve->tare.active;
+    if (active)
+        fw_engine_restore(&solve->engine);
+    solve->tare.active = false;
+    return active;
+}
+
+static eits_status add(const fw_tare *tare, fw_engine *engine, const fw_frame *frame)
 {
     eits_context *ctx = engine->ctx;
     const uint32_t rows = engine->model.n_rows;
@@ -38,14 +53,15 @@ static eits_status add(fw_tare *tare, fw_engine *engine, const fw_frame *frame)
     return status;
 }
 
-fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame,
-                         eits_status *status)
+fw_tare_step fw_tare_add(fw_solve *solve, const fw_frame *frame, eits_status *status)
 {
-    if (!fw_tare_wants(tare, frame))
+    fw_tare *tare = &solve->tare;
+    fw_engine *engine = &solve->engine;
+    if (!fw_tare_wants(solve, frame))
         return FW_TARE_NOT_YET;
     *status = add(tare, engine, frame);
     if (*status != EITS_OK && ++tare->refused > FW_TARE_REFUSED) {
-        fw_tare_abort(tare, engine);
+        (void)fw_tare_abort(solve);
         return FW_TARE_FAILED;
     }
     if (*status != EITS_OK)

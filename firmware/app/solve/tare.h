@@ -1,19 +1,16 @@
-/* Learning the reference from reference frames. Until it is done, the last reference stays; should
- * it fail, it comes back. */
+/* Learning the reference from untouched frames. Until a tare is done, the last reference stays; if
+ * the tare fails, it comes back. */
 #ifndef FW_TARE_H
 #define FW_TARE_H
 
-#include "app/solve/engine.h"
+#include "app/acquire/frame.h"
+#include "eitskin/eitskin.h"
 
-#define FW_TARE_MAX 1024u
-#define FW_TARE_REFUSED \
-    16u /* reference frames that may be refused (a saturated row...) before the tare fails */
+typedef struct fw_solve fw_solve;
 
-typedef struct fw_tare {
-    bool active;
-    uint32_t request, wanted, taken, refused;
-    uint32_t since_us; /* frames whose scan began earlier are not untouched ones */
-} fw_tare;
+#define FW_TARE_MAX     1024u
+/* The tare fails if the core rejects more frames than this, for instance for a saturated row. */
+#define FW_TARE_REFUSED 16u
 
 typedef enum fw_tare_step {
     FW_TARE_NOT_YET, /* the frame is older than the command */
@@ -23,19 +20,20 @@ typedef enum fw_tare_step {
     FW_TARE_FAILED /* status says why; the last reference is back */
 } fw_tare_step;
 
-/* 1 frame, or 4 to FW_TARE_MAX. */
-void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t frames,
-                   uint32_t now_us);
+/* `frames`: 1, or 4 to FW_TARE_MAX. */
+void fw_tare_begin(fw_solve *solve, uint32_t request, uint32_t frames);
 
-/* Whether the frame belongs to the tare; the first such must give the angle (fw_tare_first). */
-bool fw_tare_wants(const fw_tare *tare, const fw_frame *frame);
-bool fw_tare_first(const fw_tare *tare);
+bool fw_tare_active(const fw_solve *solve);
+uint32_t fw_tare_request(const fw_solve *solve); /* of the last one that was begun */
+
+/* Whether the frame belongs to the tare, and whether no frame has been taken for it yet. */
+bool fw_tare_wants(const fw_solve *solve, const fw_frame *frame);
+bool fw_tare_first(const fw_solve *solve);
 
 /* Take a checked frame. */
-fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame,
-                         eits_status *status);
+fw_tare_step fw_tare_add(fw_solve *solve, const fw_frame *frame, eits_status *status);
 
-/* Give up: the last reference is back. */
-void fw_tare_abort(fw_tare *tare, fw_engine *engine);
+/* Give up: the last reference is back. Returns whether a tare was active. */
+bool fw_tare_abort(fw_solve *solve);
 
 #endif

@@ -13,8 +13,8 @@ enum {
     BLINKS = 16
 };
 
-/* No 8 MHz: nothing that follows would be right. The red light blinks, from the 16 MHz oscillator,
- * for a few seconds, with all pins to multiplexers and generator floating. */
+/* Without the 8 MHz clock every frequency would be wrong. The red light blinks for a few seconds,
+ * timed by the 16 MHz oscillator; all pins to multiplexers and generator float. */
 __attribute__((noreturn)) static void no_clock(void)
 {
     RCC_AHB1ENR |= RCC_AHB1ENR_GPIOBEN;
@@ -25,7 +25,7 @@ __attribute__((noreturn)) static void no_clock(void)
         for (volatile uint32_t k = 0; k < 500000; ++k)
             ;
     }
-    nucleo_restart(NULL); /* it may have come back */
+    nucleo_restart(NULL); /* the clock may be back */
 }
 
 int main(void)

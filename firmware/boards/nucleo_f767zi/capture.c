@@ -59,13 +59,14 @@ void nucleo_capture_start(void)
     nucleo_interrupt(IRQ_ADC, NUCLEO_URGENCY_CAPTURE);
 }
 
-/* No slot begins any more, nothing converts, no flag stays. */
+/* No slot begins, nothing converts, and no flag is set afterwards. */
 static void halt(void)
 {
-    TIM_SMCR(TIM3_BASE) &= ~(7u << TIM_SMCR_SMS_POS); /* or TIM5's next match would start it */
+    TIM_SMCR(TIM3_BASE) &=
+        ~(7u << TIM_SMCR_SMS_POS); /* otherwise TIM5's next match would start it */
     TIM_CR1(TIM3_BASE) = 0;
     TIM_CR1(TIM2_BASE) = 0;
-    ADC_CR2(ADC1_BASE) = 0; /* a conversion under way is given up */
+    ADC_CR2(ADC1_BASE) = 0; /* aborts a conversion that is under way */
     DMA_CR(DMA2_BASE, STREAM) &= ~DMA_CR_EN;
     while ((DMA_CR(DMA2_BASE, STREAM) & DMA_CR_EN) != 0)
         ; /* until the transfer under way is over, some bus cycles (RM0410 8.3.18) */
@@ -73,8 +74,8 @@ static void halt(void)
     ADC_SR(ADC1_BASE) = 0;
 }
 
-/* From halt: everything ready for a first slot at `start_us`, which must not be past when TIM5's
- * compare is written. */
+/* After halt: prepare everything for a first slot at `start_us`, which must still be in the future
+ * when TIM5's compare is written. */
 static void arm(uint32_t start_us)
 {
     capture.start_us = start_us;
@@ -90,7 +91,7 @@ static void arm(uint32_t start_us)
                                 (1u << DMA_CR_MSIZE_POS) | (1u << DMA_CR_PSIZE_POS) | DMA_CR_MINC |
                                 DMA_CR_CIRC | DMA_CR_TCIE | DMA_CR_TEIE | DMA_CR_DMEIE;
     DMA_CR(DMA2_BASE, STREAM) |= DMA_CR_EN;
-    /* On again, it needs 3 us to settle: less than until the first slot. */
+    /* It needs 3 us to settle; the first slot starts later. */
     ADC_CR2(ADC1_BASE) = ADC_CR2_ADON | ADC_CR2_DMA | ADC_CR2_DDS | (1u << ADC_CR2_EXTEN_POS) |
                          ((uint32_t)ADC_EXTSEL_TIM2_TRGO << ADC_CR2_EXTSEL_POS);
 
@@ -139,7 +140,7 @@ static fw_status start(void *ctx)
     if (capture.done == NULL || capture.running)
         return FW_E_ARGUMENT;
     halt();
-    /* arming is a few microseconds; an interrupt could make it more than the lead */
+    /* arming takes a few microseconds; with an interrupt it could take longer than the lead */
     const uint32_t state = nucleo_lock(ctx);
     capture.running = true;
     arm(nucleo_time_us(ctx) + LEAD_US);
@@ -155,8 +156,7 @@ static void stop(void *ctx)
     nucleo_unlock(ctx, state);
 }
 
-/* The burst that was due now is reported, and the next one is due. */
-static void send_fault(uint32_t start_us, uint32_t buffer, uint32_t next_start_us, bool lost)
+static void report_burst(uint32_t start_us, uint32_t buffer, uint32_t next_start_us, bool lost)
 {
     const fw_burst burst = {.samples = buffers[buffer],
                             .start_us = start_us,
@@ -165,18 +165,18 @@ static void send_fault(uint32_t start_us, uint32_t buffer, uint32_t next_start_u
     capture.done(capture.user, &burst);
 }
 
+/* Report the burst that was due; the next one is due then. */
 static void next_burst(bool lost)
 {
     const uint32_t start_us = capture.start_us, buffer = capture.buffer;
     capture.start_us += capture.slot_us;
     capture.buffer ^= 1u;
-    send_fault(start_us, buffer, capture.start_us, lost);
+    report_burst(start_us, buffer, capture.start_us, lost);
 }
 
-/* The buffer that DMA fills now is `filling`: the other one's burst is the last that ended. If this
- * interrupt came a whole slot late or more, the bursts between have been overwritten, or soon will
- * be: the clock says how many, the buffer's parity settles it where the clock stands at the edge.
- */
+/* DMA now fills the buffer `filling`, so the last burst that has ended is in the other one. If this
+ * interrupt is late by a slot or more, the bursts in between have been overwritten, or soon will
+ * be. The clock says how many; near the edge of a slot the buffer's parity decides. */
 static void bursts_ended(uint32_t filling)
 {
     const uint32_t late_us = nucleo_time_us(NULL) - capture.start_us - capture.burst_us;
@@ -190,7 +190,7 @@ static void bursts_ended(uint32_t filling)
         next_burst(false);
 }
 
-/* Stop, and go on in the first slot of the same grid that can be reached. */
+/* Stop, and continue in the first slot of the same grid that can be reached. */
 static void burst_failed(void)
 {
     const uint32_t lost_us = capture.start_us;
@@ -198,14 +198,13 @@ static void burst_failed(void)
     const uint32_t now = nucleo_time_us(NULL),
                    slots = (now + LEAD_US - lost_us) / capture.slot_us + 1u;
     arm(lost_us + slots * capture.slot_us);
-    send_fault(lost_us, 0, capture.start_us, true);
+    report_burst(lost_us, 0, capture.start_us, true);
 }
 
 void nucleo_dma2_stream0_irq(void)
 {
     uint32_t flags = 0, filling;
-    /* a burst that ends meanwhile counts too: which buffer is being filled must fit the flags
-     * that were cleared */
+    /* read again if a burst ends meanwhile, so that `filling` belongs to the cleared flags */
     do {
         flags |= DMA_LISR(DMA2_BASE);
         DMA_LIFCR(DMA2_BASE) = STREAM_FLAGS;
@@ -220,7 +219,7 @@ void nucleo_dma2_stream0_irq(void)
         bursts_ended(filling);
 }
 
-/* Overrun: DMA did not fetch a sample in time, and fetches none any more (RM0410 15.9.1). */
+/* Overrun: DMA did not fetch a sample in time, and has stopped (RM0410 15.9.1). */
 void nucleo_adc_irq(void)
 {
     const bool overrun = (ADC_SR(ADC1_BASE) & ADC_SR_OVR) != 0;

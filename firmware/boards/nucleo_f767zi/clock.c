@@ -1,5 +1,5 @@
-/* 8 MHz from the ST-LINK to 216 MHz, and out again on PA8 for the generator: everything that tells
- * time shares one source. */
+/* 216 MHz from the 8 MHz of the ST-LINK, which also go out on PA8 for the generator: all clocks
+ * have one source. */
 #include "nucleo.h"
 
 enum { MAX_TRIES = 1000000 }; /* of a read at 16 MHz: about 0.5 s */
@@ -15,7 +15,7 @@ static bool becomes(volatile uint32_t *reg, uint32_t mask, uint32_t value)
 bool nucleo_clock_start(void)
 {
     RCC_APB1ENR |= RCC_APB1ENR_PWREN;
-    /* two cycles until the clock is there (RM0410 5.2.14): a read waits for them */
+    /* the clock needs two cycles (RM0410 5.2.14), and a read takes as long */
     (void)RCC_APB1ENR;
     PWR_CR1 |= 3u << PWR_CR1_VOS_POS; /* scale 1, for above 180 MHz */
 
@@ -62,7 +62,7 @@ bool nucleo_clock_start(void)
     RCC_APB2ENR |= RCC_APB2ENR_ADC1EN | RCC_APB2ENR_ADC2EN;
     (void)RCC_APB2ENR;
     nucleo_pin(GPIOA_BASE, 8, PIN_ALTERNATE, 0, 2, 0); /* MCO1 */
-    RCC_CR |= RCC_CR_CSSON;                            /* should the 8 MHz fail, NMI comes */
+    RCC_CR |= RCC_CR_CSSON;                            /* an NMI if the 8 MHz fail */
     return true;
 }
 

@@ -1,5 +1,5 @@
-/* A processor fault, or an interrupt that nobody asked for: what is known is kept over a reset, and
- * reported after it. */
+/* A processor fault or an unexpected interrupt: its record survives the reset, and is reported
+ * after it. */
 #include "nucleo.h"
 
 #define CRASH_MAGIC 0xC0A57ED5u
@@ -35,7 +35,7 @@ __attribute__((noreturn)) static void restart_for(enum reset_cause cause)
 
 __attribute__((used, noreturn)) void nucleo_crash(const uint32_t *frame);
 
-/* The stack may be what failed: take its address, and begin a new one. */
+/* The stack itself may have failed: take its address, and begin a new one. */
 __attribute__((naked)) void nucleo_fault_irq(void)
 {
     __asm volatile("mov r0, sp\n"
@@ -46,7 +46,7 @@ __attribute__((naked)) void nucleo_fault_irq(void)
 
 void nucleo_crash(const uint32_t *frame)
 {
-    nucleo_multiplexers_off(); /* first: whoever touches the skin has no part in this */
+    nucleo_multiplexers_off(); /* first, for whoever touches the skin */
     const uint32_t cfsr = SCB_CFSR;
     /* Nothing was stacked, or nothing can be read, if stacking failed; r0 to r3, r12, lr, pc, xpsr
      * otherwise. */
@@ -67,8 +67,8 @@ void nucleo_crash(const uint32_t *frame)
     restart_for(CAUSE_CRASH);
 }
 
-/* The 8 MHz have failed: the generator stands still, and the processor runs from 16 MHz. After the
- * restart the board waits for them. */
+/* The 8 MHz have failed: the generator has stopped, and the processor runs from 16 MHz. After the
+ * restart the board waits for the 8 MHz. */
 void nucleo_clock_irq(void)
 {
     nucleo_multiplexers_off();
@@ -78,7 +78,7 @@ void nucleo_clock_irq(void)
     restart_for(CAUSE_CLOCK);
 }
 
-/* The supply falls below 2.9 V: off at once, and on again when it is back. */
+/* The supply falls below 2.9 V: current off at once; the board restarts when the supply is back. */
 void nucleo_supply_irq(void)
 {
     nucleo_multiplexers_off();

@@ -15,11 +15,11 @@ void nucleo_generator_start(void)
     /* SCLK idles high and the AD9833 takes data on its falling edge (AD9833 data sheet, figure 3):
      * mode 2. */
     const uint32_t mode = SPI_CR1_CPOL;
-    /* 54 MHz / 16 = 3.4 MHz: wires of some length are no trouble */
+    /* 54 MHz / 16 = 3.4 MHz, slow enough for long wires */
     const uint32_t prescaler = 3u << SPI_CR1_BR_POS;
     SPI_CR2(SPI3_BASE) = 15u << SPI_CR2_DS_POS; /* 16 bits */
     SPI_CR1(SPI3_BASE) = mode | prescaler | SPI_CR1_MSTR | SPI_CR1_SSM | SPI_CR1_SSI;
-    SPI_CR1(SPI3_BASE) |= SPI_CR1_SPE; /* the levels are there before the pins are */
+    SPI_CR1(SPI3_BASE) |= SPI_CR1_SPE; /* levels are defined before the pins are connected */
     nucleo_pin(GPIOC_BASE, 10, PIN_ALTERNATE, 6, 1, 0);
     nucleo_pin(GPIOC_BASE, 12, PIN_ALTERNATE, 6, 1, 0);
 }

@@ -16,7 +16,7 @@ NUCLEO_DTCM static uint8_t tx_ring[TX_BYTES], rx_ring[RX_BYTES];
 static struct {
     uint32_t written;          /* by the program */
     volatile uint32_t sent;    /* by DMA */
-    volatile uint32_t sending; /* bytes that it has in hand; 0: idle */
+    volatile uint32_t sending; /* bytes of its present transfer; 0: idle */
 } tx;
 static struct {
     volatile uint32_t laps; /* of DMA around the ring */
@@ -26,8 +26,9 @@ static struct {
 void nucleo_link_start(void)
 {
     nucleo_pin(GPIOD_BASE, 8, PIN_ALTERNATE, 7, 1, 0);
-    nucleo_pin(GPIOD_BASE, 9, PIN_ALTERNATE, 7, 1, 1); /* pulled up: no cable is an idle line */
-    USART_BRR(USART3_BASE) = NUCLEO_APB1_HZ / BAUD;    /* 54, exactly */
+    nucleo_pin(GPIOD_BASE, 9, PIN_ALTERNATE, 7, 1,
+               1); /* pulled up: without a cable the line is idle */
+    USART_BRR(USART3_BASE) = NUCLEO_APB1_HZ / BAUD; /* 54, exactly */
     USART_CR3(USART3_BASE) = USART_CR3_DMAT | USART_CR3_DMAR | USART_CR3_EIE;
 
     DMA_PAR(DMA1_BASE, RX) = (uint32_t)&USART_RDR(USART3_BASE);
@@ -44,7 +45,7 @@ void nucleo_link_start(void)
     USART_CR1(USART3_BASE) = USART_CR1_TE | USART_CR1_RE | USART_CR1_IDLEIE | USART_CR1_UE;
 }
 
-/* The next piece without a wrap, with this stream idle and its interrupt held off. */
+/* Send the next piece up to a wrap. This stream is idle, and its interrupt is disabled. */
 static void send_piece(void)
 {
     const uint32_t at = tx.sent % TX_BYTES, waiting = tx.written - tx.sent;
@@ -75,8 +76,8 @@ static bool write_bytes(void *ctx, const uint8_t *bytes, size_t size)
     return true;
 }
 
-/* A transfer error ends the stream too: its bytes count as sent, the host sees a gap, and the link
- * goes on. */
+/* A transfer error ends the stream, too. Its bytes count as sent; the host sees a gap, and the link
+ * continues. */
 void nucleo_dma1_stream3_irq(void)
 {
     const uint32_t flags = DMA_LISR(DMA1_BASE);
@@ -86,7 +87,7 @@ void nucleo_dma1_stream3_irq(void)
         tx.sent += tx.sending;
         send_piece();
     }
-    DSB(); /* the flag is down before the interrupt is left */
+    DSB(); /* the flag is cleared before the interrupt returns */
 }
 
 static uint32_t bytes_received(void)
@@ -104,10 +105,10 @@ static size_t read_bytes(void *ctx, uint8_t *bytes, size_t room)
     (void)ctx;
     const uint32_t received = bytes_received();
     uint32_t waiting = received - rx.taken;
-    /* less than nothing: DMA has wrapped, and its interrupt has not been yet */
+    /* negative: DMA has wrapped, and its interrupt has not run yet */
     if ((int32_t)waiting <= 0)
         return 0;
-    /* overrun: what was there is gone, and the checksum of a packet will tell */
+    /* overrun: bytes are lost, and a packet's checksum will be wrong */
     if (waiting > RX_BYTES) {
         rx.taken = received;
         return 0;
@@ -131,8 +132,8 @@ void nucleo_dma1_stream1_irq(void)
     DSB();
 }
 
-/* A message has ended, or a byte was bad: bad bytes are not stored (RM0410 34.5.15), and an overrun
- * not cleared stops it all. */
+/* A message has ended, or a byte was bad. Bad bytes are not stored (RM0410 34.5.15). An overrun
+ * that is not cleared would stop reception. */
 void nucleo_usart3_irq(void)
 {
     USART_ICR(USART3_BASE) = USART_ICR_IDLECF | USART_ICR_ORECF | USART_ICR_NCF | USART_ICR_FECF;

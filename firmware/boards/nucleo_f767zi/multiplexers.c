@@ -15,7 +15,7 @@ static volatile bool is_barred;
 
 void nucleo_multiplexers_bar(bool barred)
 {
-    is_barred = barred; /* before they open: a burst's interrupt may come between */
+    is_barred = barred; /* before they open, because a burst's interrupt may come in between */
     if (barred)
         nucleo_multiplexers_off();
 }

@@ -1,4 +1,4 @@
-/* What the files of this board need of one another. Memory and pins: docs/guide/hardware.md. */
+/* Shared by the files of this board. Memory and pins: docs/guide/hardware.md. */
 #ifndef NUCLEO_H
 #define NUCLEO_H
 
@@ -16,8 +16,8 @@
 #define NUCLEO_STACK_PAINT       0x57AC57ACu
 #define NUCLEO_STACK_GUARD_BYTES 256u
 
-/* Zero at start, in memory that is not cached and that DMA reaches: for whatever DMA reads or
- * writes. */
+/* For all that DMA reads or writes: memory that DMA reaches and that is not cached; zero at start.
+ */
 #define NUCLEO_DTCM   __attribute__((section(".dtcm")))
 /* Not touched by the start-up code. */
 #define NUCLEO_NOINIT __attribute__((section(".noinit")))
@@ -36,7 +36,7 @@ enum { NUCLEO_URGENCY_CAPTURE = 0x10, NUCLEO_URGENCY_LINK = 0x40, NUCLEO_URGENCY
 
 bool nucleo_clock_start(void); /* false: no 8 MHz from the ST-LINK */
 void nucleo_cache_start(void);
-/* of read-only memory that was written behind the cache's back */
+/* of read-only memory that was written without the cache */
 void nucleo_cache_forget(const void *start, size_t size);
 void nucleo_interrupt(uint32_t irq, uint32_t urgency);
 
@@ -62,11 +62,11 @@ fw_last_reset nucleo_last_reset(void);
 void nucleo_generator_start(void);
 void nucleo_multiplexers_start(void);
 void nucleo_multiplexers_off(void); /* no current reaches the skin; from any interrupt */
-/* The same, and nothing switches them on again until the main loop is alive. */
+/* The same; they stay off until the main loop is alive. */
 void nucleo_multiplexers_bar(bool barred);
 void nucleo_sense_start(void);
 uint32_t nucleo_measure_ua_rms(void *ctx);
-/* While the processor may stand still for seconds; else it must live every half second. */
+/* Between these two the processor may stand still for seconds; otherwise for half a second. */
 void nucleo_watchdog_patient(bool patient);
 __attribute__((noreturn)) void nucleo_restart(void *ctx);
 void nucleo_capture_start(void);

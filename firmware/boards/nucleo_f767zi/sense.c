@@ -37,8 +37,8 @@ static bool convert(uint32_t *code)
     return true;
 }
 
-/* Of all samples in the window, about their mean: the bias is not known exactly. A converter that
- * does not answer reads as any current, so that the limit trips. */
+/* The rms about the mean of all samples in the window, because the bias is not known exactly. If
+ * the converter does not answer, this returns a current so large that the limit trips. */
 uint32_t nucleo_measure_ua_rms(void *ctx)
 {
     uint64_t sum = 0, squares = 0, count = 0;
@@ -57,7 +57,7 @@ uint32_t nucleo_measure_ua_rms(void *ctx)
     ADC_CR2(ADC2_BASE) = 0;
     if (count == 0)
         return UINT32_MAX >> 1;
-    /* thousandths of a step, so that a step of 0.8 uA is no loss */
+    /* thousandths of a step: a whole step is 0.8 uA */
     const uint64_t variance = (count * squares - sum * sum) * 1000000u / (count * count);
     return (uint32_t)((uint64_t)root(variance) * SENSE_UV / SENSE_CODES / SENSE_OHM / 1000u);
 }

@@ -7,8 +7,7 @@ extern uint32_t data_start[], data_end[], data_load[], bss_start[], bss_end[], d
 void nucleo_reset(void);
 void nucleo_start(void);
 
-/* RM0410 table 46. What is not used is a fault: an interrupt that nobody asked for is a bug to hear
- * of. */
+/* RM0410 table 46. An interrupt that is not used counts as a fault, because it is a bug. */
 #define CORE_VECTORS 16
 __attribute__((section(".vectors"),
                used)) static void (*const vectors[CORE_VECTORS + IRQ_COUNT])(void) = {
@@ -60,7 +59,7 @@ __attribute__((used, noreturn)) void nucleo_start(void)
     SCB_CPACR |= 0xFu << 20; /* full access to CP10 and CP11, the FPU (PM0253 4.6.1) */
     DSB();
     ISB();
-    /* on after reset; a debugger may have left it otherwise */
+    /* on after a reset, but a debugger may have changed it */
     RCC_AHB1ENR |= RCC_AHB1ENR_DTCMRAMEN;
     const uint32_t *from = data_load;
     for (uint32_t *to = data_start; to < data_end; ++to)

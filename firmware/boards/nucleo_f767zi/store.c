@@ -1,9 +1,9 @@
 /* Two banks for models and two pages for settings in the program's own flash: 0x08040000 (sectors 5
  * and 6) and 0x080C0000 (7 and 8), 512 KB each; 0x08140000 (9) and 0x08180000 (10), 256 KB each.
  *
- * The flash is one bank (nDBANK set, as delivered): while it erases or programs, whoever reads it
- * waits, the processor too (RM0410 3.3.6). A sector of 256 KB takes 1 s, at most 4 (data sheet,
- * table 52); bytes that the host sends meanwhile are kept by DMA. */
+ * The flash is one bank (nDBANK set, as delivered): while it erases or programs, every read of
+ * it waits, also the processor's (RM0410 3.3.6). A sector of 256 KB takes 1 s, at most 4 (data
+ * sheet, table 52); DMA stores bytes that the host sends meanwhile. */
 #include "nucleo.h"
 
 #include <string.h>
@@ -46,7 +46,7 @@ static fw_status open_flash(void)
         FLASH_KEYR = FLASH_KEY2;
     }
     const fw_status status = finished(WORD_US);
-    FLASH_SR = ERRORS | FLASH_SR_EOP; /* of the past */
+    FLASH_SR = ERRORS | FLASH_SR_EOP; /* earlier ones */
     return status == FW_E_TIMEOUT ? status : FW_OK;
 }
 

@@ -1,10 +1,10 @@
-/* Time, sleep, interrupts, the watchdog, lights, and who this processor is. */
+/* Time, sleep, interrupts, the watchdog, lights, and the processor's serial number. */
 #include "boards/parts/later.h"
 #include "nucleo.h"
 
 enum { LED_GREEN = 0, LED_BLUE = 7, LED_RED = 14 }; /* of port B: LD1, LD2, LD3 (UM1974 6.5) */
 
-/* Of the main loop: without a turn for so long the multiplexers open, or the board restarts. */
+/* If the main loop makes no turn for so long, the multiplexers open, or the board restarts. */
 enum { STALLED_MS = 900, HUNG_MS = 8000, BUTTON = 13 };
 /* Reload values at 32 kHz (17 to 47 by the data sheet): 0.5 s (at most 0.94) by a divider of 4, 8 s
  * by 64, more than the longest erase of a sector (4 s), during which the program stands still. */
@@ -21,9 +21,10 @@ void nucleo_interrupt(uint32_t irq, uint32_t urgency)
     NVIC_ISER(irq / 32u) = 1u << (irq % 32u);
 }
 
-/* Brown-out reset at its highest level (0 in BOR_LEV: below 2.7 V at the latest), where it is not:
- * a supply that falls faster than the detector's interrupt runs leaves no processor that drives.
- * Once in a board's life; not while the supply is low, and the other option bytes as they are. */
+/* Set the brown-out reset to its highest level (0 in BOR_LEV: below 2.7 V at the latest) if it is
+ * not. Then the processor is in reset, and drives nothing, even if the supply falls faster than the
+ * detector's interrupt runs. This happens once in a board's life, and not while the supply is low;
+ * the other option bytes stay. */
 static void set_brown_out(void)
 {
     const uint32_t options = FLASH_OPTCR, level = 3u << FLASH_OPTCR_BOR_POS;
@@ -94,8 +95,8 @@ void nucleo_wake(void)
     woken = true;
 }
 
-/* It feeds the watchdog as long as the main loop lives, so that the watchdog itself can be quick:
- * that one is for a processor that takes no interrupt any more. */
+/* The tick feeds the watchdog while the main loop is alive. So the watchdog can be quick, for a
+ * processor that no longer takes interrupts. */
 void nucleo_tick_irq(void)
 {
     nucleo_wake();
@@ -123,8 +124,8 @@ uint32_t nucleo_time_us(void *ctx)
     return TIM_CNT(TIM5_BASE);
 }
 
-/* An interrupt that is pending ends WFI even while interrupts are off: none can slip in between the
- * look and the sleep. */
+/* A pending interrupt ends WFI even while interrupts are off. So none is missed between the test
+ * and the sleep. */
 static void sleep_until_interrupt(void *ctx)
 {
     (void)ctx;
@@ -176,7 +177,7 @@ void nucleo_restart(void *ctx)
 static uint32_t stack_used(void *ctx)
 {
     (void)ctx;
-    /* below, a look is a fault */
+    /* reading below it is a fault */
     const uint32_t *word = stack_bottom + NUCLEO_STACK_GUARD_BYTES / sizeof *word;
     while (word < stack_top && *word == NUCLEO_STACK_PAINT)
         ++word;

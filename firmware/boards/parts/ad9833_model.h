@@ -1,6 +1,6 @@
-/* The generator as boards without hardware have it: what the words that are written to an AD9833
- * make of its registers (data sheet, Rev. G, tables 6 to 9). Frequency register 1, phase register 1
- * and writes of single halves are not modelled. */
+/* Model of the generator for boards without hardware: the registers of an AD9833 after the words
+ * that were written to it (data sheet, Rev. G, tables 6 to 9). Frequency register 1, phase register
+ * 1 and writes of single halves are not modelled. */
 #ifndef AD9833_MODEL_H
 #define AD9833_MODEL_H
 

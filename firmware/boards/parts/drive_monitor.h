@@ -1,7 +1,7 @@
-/* Watches what the drivers write to multiplexers and generator, on boards without hardware: never
- * current without a host that asked within the last second, never an address that changes before
- * the part is open, never both ends of a pair on one electrode, never a generator that changes
- * while it drives. The first violation stays, in words. */
+/* Checks what the drivers write to multiplexers and generator, on boards without hardware. These
+ * are violations: current although no host was heard within the last second; an address that
+ * changes before the multiplexer is open; both ends of a pair on one electrode; a generator that
+ * changes while current flows. The first violation is kept as a sentence. */
 #ifndef DRIVE_MONITOR_H
 #define DRIVE_MONITOR_H
 
@@ -28,7 +28,7 @@ static inline void drive_monitor_note(drive_monitor *m, bool wrong, const char *
         m->violation = what;
 }
 
-/* At any time, and before each write. */
+/* Call before each write; may be called at any time. */
 static inline void drive_monitor_look(drive_monitor *m, uint64_t now_ns)
 {
     const bool drives = m->runs && (m->lines & DRIVE_MONITOR_ENABLES) != 0;
@@ -68,7 +68,7 @@ static inline void drive_monitor_lines(drive_monitor *m, uint32_t mask, uint32_t
     drive_monitor_look(m, now_ns);
 }
 
-/* After a word to the generator, `part` as it is now. */
+/* After a word to the generator, with its present state. */
 static inline void drive_monitor_word(drive_monitor *m, const ad9833_model *part, uint16_t word,
                                       uint64_t now_ns)
 {

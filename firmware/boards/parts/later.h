@@ -1,4 +1,4 @@
-/* Work that waits until no interrupt is under way: PendSV, which the board gives the lowest
+/* Work that runs when no other interrupt is active: by PendSV, to which the board gives the lowest
  * priority. */
 #ifndef LATER_H
 #define LATER_H

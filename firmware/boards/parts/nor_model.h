@@ -1,5 +1,5 @@
-/* Flash banks as boards without hardware have them: erasing sets all bits, programming clears some
- * and sets none. */
+/* Model of flash for boards without hardware: erasing sets all bits; programming only clears bits.
+ */
 #ifndef NOR_MODEL_H
 #define NOR_MODEL_H
 

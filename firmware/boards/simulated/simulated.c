@@ -2,8 +2,9 @@
 
 #include "app/acquire/sincos.h"
 #include "app/link/scanning.h"
-#include "app/main_loop.h"
 #include "app/safety/current_enable.h"
+#include "app/solve/models.h"
+#include "app/solve/tare.h"
 #include "boards/parts/nor_model.h"
 
 #include <math.h>
@@ -13,7 +14,7 @@ enum {
     FULL_SCALE_CODE = 65535,
     MCLK_HZ = 8000000,
     LEAD_US = 20,  /* from the start of a capture to its first slot */
-    IDLE_US = 1000 /* that pass where nothing is scanned */
+    IDLE_US = 1000 /* per turn while nothing is scanned */
 };
 #define RANGE_MARGIN 1.05f /* the converter's range over the largest voltage that is shown */
 #define MAX_RANGE_UV 4000000000u
@@ -64,10 +65,10 @@ static uint32_t frame_number(const sim_scene *scene, uint64_t at_us)
     return number < (double)scene->frames ? (uint32_t)number : scene->frames;
 }
 
-/* When the next scan begins, if none is under way: bursts before it are due are dropped. */
+/* When the next scan begins if none is under way. Earlier bursts are dropped. */
 static uint64_t next_scan_us(const sim_board *sim)
 {
-    const fw_scan *scan = &sim->instrument.scan;
+    const fw_scan *scan = &sim->instrument.acquire.scan;
     const sim_converter *converter = &sim->converter;
     const int32_t early_us = (int32_t)(scan->next_due_us - (uint32_t)converter->slot_us);
     const uint32_t slot_us = converter->setup.slot_us;
@@ -89,12 +90,13 @@ void sim_begin_scene(sim_board *sim)
     sim->scene.begins_with_scan = true;
 }
 
-/* A scan may begin at at_us: its voltages; false where they have not been put before the board. */
+/* Choose the voltages of a scan that may begin at at_us. Returns false if they were not given yet.
+ */
 static bool choose_frame(sim_board *sim, uint64_t at_us)
 {
     sim_scene *scene = &sim->scene;
-    const fw_tare *tare = &sim->instrument.tare;
-    if (tare->active && fw_tare_first(tare))
+    const fw_solve *solve = &sim->instrument.solve;
+    if (fw_tare_active(solve) && fw_tare_first(solve))
         scene->untouched_shown = 0;
     if (scene->begins_with_scan)
         scene->began_us = at_us;
@@ -108,7 +110,7 @@ static bool choose_frame(sim_board *sim, uint64_t at_us)
     if (frame < scene->first || frame - scene->first >= scene->count ||
         (scene->once && scene->put_us != at_us))
         return false;
-    const size_t place = (size_t)(frame - scene->first) * sim->instrument.engine.model.n_rows;
+    const size_t place = (size_t)(frame - scene->first) * sim->instrument.solve.engine.model.n_rows;
     scene->shown = scene->volts + place;
     return true;
 }
@@ -119,10 +121,10 @@ static void scan_has_begun(sim_board *sim)
     ++sim->scene.untouched_shown;
 }
 
-/* Between V+ and V-, amplitude; 0 where the electrodes that are merged are no row of the table. */
+/* Amplitude between V+ and V-; 0 if the connected electrodes are not a row of the table. */
 static float volts_now(sim_board *sim)
 {
-    const eits_model *model = &sim->instrument.engine.model;
+    const eits_model *model = &sim->instrument.solve.engine.model;
     uint8_t joined[4];
     if ((sim->monitor.lines & FW_MUX_ENABLES) != FW_MUX_ENABLES ||
         !ad9833_model_runs(&sim->generator))
@@ -186,11 +188,11 @@ static void convert(sim_board *sim, float volts)
     }
 }
 
-/* Time passes only while the host reads: it is there, and would say so. */
+/* Time passes only while the host reads, so it is present. */
 static void listen(sim_board *sim)
 {
     drive_monitor_heard(&sim->monitor, now_ns(sim));
-    fw_drive_heard(&sim->instrument);
+    fw_current_heard(&sim->instrument.safety);
 }
 
 static void run_later(sim_board *sim)
@@ -210,10 +212,11 @@ static void later(void *ctx, void (*work)(void *user), void *user)
         run_later(sim);
 }
 
-/* To the end of the next burst, which the application gets; false where its frame is missing. */
+/* Run to the end of the next burst, which the application gets. Returns false if its frame is
+ * missing. */
 static bool next_burst(sim_board *sim)
 {
-    const fw_scan *scan = &sim->instrument.scan;
+    const fw_scan *scan = &sim->instrument.acquire.scan;
     sim_converter *converter = &sim->converter;
     const fw_capture_setup *setup = &converter->setup;
     converter->slot_us = next_scan_us(sim);
@@ -382,13 +385,13 @@ void sim_start(sim_board *sim)
     sim->to_board_bytes = 0;
     fw_instrument_init(&sim->instrument, &sim->board);
     sim->monitor.needs_host =
-        !sim->board.frames_given && sim->instrument.drive.state == EITS_DRIVE_OFF;
+        !sim->board.frames_given && sim->instrument.safety.current.state == EITS_DRIVE_OFF;
 }
 
 static void step(sim_board *sim)
 {
     (void)fw_instrument_step(&sim->instrument);
-    if (sim->instrument.reset_wanted)
+    if (fw_link_reset_wanted(&sim->instrument.link))
         sim_start(sim);
 }
 
@@ -404,21 +407,22 @@ void sim_write(sim_board *sim, const uint8_t *bytes, size_t size)
 bool sim_wants_frame(const sim_board *sim)
 {
     const fw_instrument *instrument = &sim->instrument;
-    return instrument->engine.open && !instrument->upload.active &&
-           (instrument->tare.active || instrument->stream.what != 0);
+    return fw_solve_model(&instrument->solve) != NULL && !instrument->link.upload.active &&
+           (fw_tare_active(&instrument->solve) || instrument->link.stream.what != 0);
 }
 
 bool sim_tares(const sim_board *sim)
 {
-    return sim->instrument.tare.active;
+    return fw_tare_active(&sim->instrument.solve);
 }
 
 const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc)
 {
-    const fw_instrument *instrument = &sim->instrument;
-    *bytes = instrument->record.model_bytes;
-    *crc = instrument->record.model_crc;
-    return instrument->engine.open ? sim->bank[instrument->bank] : NULL;
+    const fw_solve *solve = &sim->instrument.solve;
+    const fw_model_file file = fw_models_file(solve);
+    *bytes = file.size;
+    *crc = file.crc;
+    return fw_solve_model(solve) != NULL ? file.bytes : NULL;
 }
 
 void sim_show(sim_board *sim, float largest_v, uint32_t untouched, uint32_t frames, double rate_hz)
@@ -430,7 +434,7 @@ void sim_show(sim_board *sim, float largest_v, uint32_t untouched, uint32_t fram
     const float range_uv = 2e6f * RANGE_MARGIN * largest_v;
     sim->board.capture.reference_uv =
         range_uv < (float)MAX_RANGE_UV ? 1u + (uint32_t)range_uv : MAX_RANGE_UV;
-    fw_start_scan(&sim->instrument);
+    fw_scanning_restart(&sim->instrument.link);
 }
 
 void sim_put(sim_board *sim, const float *volts, uint32_t first, uint32_t count)
@@ -456,8 +460,8 @@ double sim_wanted_s(const sim_board *sim)
 
 void sim_row_delays(const sim_board *sim, uint32_t *delays_us)
 {
-    const fw_scan *scan = &sim->instrument.scan;
-    memset(delays_us, 0, sim->instrument.engine.model.n_rows * sizeof *delays_us);
+    const fw_scan *scan = &sim->instrument.acquire.scan;
+    memset(delays_us, 0, sim->instrument.solve.engine.model.n_rows * sizeof *delays_us);
     for (uint32_t position = 0; position < fw_scan_next_rows(scan); ++position)
         delays_us[fw_scan_row_at(scan, position)] = position * scan->slot_us;
 }
@@ -469,8 +473,8 @@ uint32_t sim_frame_wanted(const sim_board *sim)
 
 bool sim_scan_frame(sim_board *sim)
 {
-    const uint32_t frames = sim->instrument.scan.frames_scanned;
-    while (sim->instrument.scan.frames_scanned == frames && sim_wants_frame(sim)) {
+    const uint32_t frames = sim->instrument.acquire.scan.frames_scanned;
+    while (sim->instrument.acquire.scan.frames_scanned == frames && sim_wants_frame(sim)) {
         if (!sim->converter.running)
             wait_idle(sim);
         else if (!next_burst(sim))
@@ -483,9 +487,9 @@ bool sim_scan_frame(sim_board *sim)
 void sim_give_frame(sim_board *sim, const float *iq, uint32_t passed_us, uint32_t period_us)
 {
     fw_instrument *instrument = &sim->instrument;
-    fw_scan *scan = &instrument->scan;
+    fw_scan *scan = &instrument->acquire.scan;
     sim->now_us += passed_us;
-    instrument->settings.frame_period_us = sim->board.frame_period_us = period_us;
+    instrument->acquire.settings.frame_period_us = sim->board.frame_period_us = period_us;
     if (!scan->running) {
         step(sim); /* an upload, or no model */
         return;
@@ -497,7 +501,7 @@ void sim_give_frame(sim_board *sim, const float *iq, uint32_t passed_us, uint32_
                         .z = frame->z,
                         .volts = frame->volts,
                         .quality = frame->quality};
-    for (uint32_t i = 0; i < instrument->engine.model.n_rows; ++i) {
+    for (uint32_t i = 0; i < instrument->solve.engine.model.n_rows; ++i) {
         const bool usable = isfinite(iq[2 * i]) && isfinite(iq[2 * i + 1]);
         frame->z[i] = usable ? (fw_iq){iq[2 * i], iq[2 * i + 1]} : (fw_iq){0, 0};
         frame->quality[i] = usable ? 0 : EITS_QUALITY_UNSETTLED;

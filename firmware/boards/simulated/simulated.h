@@ -1,15 +1,13 @@
-/* The board behind `sim:SCENE`: the firmware's own application before parts that are made of
- * memory.
+/* The board behind `sim:SCENE`: the firmware's own application, with simulated parts.
  *
- * The generator and the multiplexers are decoded from what the drivers write to them, just far
- * enough: which electrodes are merged, at which frequency. The converter has 16 bits and no noise;
- * its range is that of the frames that are shown, and 1 uV until then. What it measures are frames
- * that the host has simulated: a frame is one scan, and which one it is is decided when a scan
- * begins.
+ * From what the drivers write to the generator and the multiplexers, this decodes which electrodes
+ * are connected, and at which frequency. The converter has 16 bits and no noise; its range is that
+ * of the frames that are shown, and 1 uV until then. It measures frames that the host has
+ * simulated. A frame is one scan, and it is chosen when the scan begins.
  *
- * Time is counted, not waited for: it passes only in sim_scan_frame, and nothing that the processor
- * does takes any. All is in the caller's memory, so that one process can have many boards.
- * A board may also be given the frames of another instrument, whole: see sim_give_frame. */
+ * Time is counted, not waited for: it passes only in sim_scan_frame, and the processor's work takes
+ * none. Everything is in the caller's memory, so one process can have many boards. A board may also
+ * be given whole frames of another instrument: see sim_give_frame. */
 #ifndef SIMULATED_H
 #define SIMULATED_H
 
@@ -18,8 +16,7 @@
 
 #define SIM_PAGE_BYTES 1024u
 
-/* Frames of the untouched skin, then those of the scene; the host puts them before the board by
- * and by. */
+/* Frames of the untouched skin, then those of the scene. The host gives them a few at a time. */
 typedef struct sim_scene {
     const float *volts; /* count x n_rows, amplitudes in V: frames first, first + 1, ... */
     uint32_t first, count;
@@ -69,9 +66,9 @@ typedef struct sim_board {
     fw_instrument instrument;
 } sim_board;
 
-/* The caller's memory is used as long as the board is. */
+/* The caller's memory must live as long as the board. */
 typedef struct sim_setup {
-    const char *name; /* at most 15 characters; used as long as the board is, as serial */
+    const char *name; /* at most 15 characters; must live as long as the board, as serial must */
     const char *serial;
     bool frames_given;        /* by sim_give_frame, not by sim_show */
     uint32_t frame_period_us; /* of the first scan */
@@ -90,23 +87,23 @@ void sim_init(sim_board *sim, const sim_setup *setup);
 /* Off and on again: time goes on, banks and skin stay. */
 void sim_start(sim_board *sim);
 
-/* Give the board bytes from the host; the commands in them are carried out. */
+/* Give the board bytes from the host; it runs the commands in them. */
 void sim_write(sim_board *sim, const uint8_t *bytes, size_t size);
 
 /* Take what the board has sent, at most `room` bytes; returns how many. */
 size_t sim_read(sim_board *sim, uint8_t *bytes, size_t room);
 
-/* What the drivers did that they must never do, in words; NULL: nothing. */
+/* The first violation of the drivers (drive_monitor.h), as a sentence; NULL: none. */
 const char *sim_violation(const sim_board *sim);
 
-/* The owner holds the blue button, or lets go of it. */
+/* The owner holds the blue button, or releases it. */
 void sim_press(sim_board *sim, bool held);
 
 /* Whether the board scans for someone: a stream or a tare waits for frames. */
 bool sim_wants_frame(const sim_board *sim);
 bool sim_tares(const sim_board *sim); /* a tare does */
 
-/* The model that is open, its length and CRC-32; NULL where there is none. */
+/* The open model, its length and its CRC-32; NULL if there is none. */
 const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc);
 
 /* Put a skin before the board that has a model: first `untouched` frames (at least 1), then
@@ -121,29 +118,31 @@ void sim_put(sim_board *sim, const float *volts, uint32_t first, uint32_t count)
 /* One frame, first, that is shown only in the scan that begins when sim_wanted_s says. */
 void sim_put_once(sim_board *sim, const float *volts, uint32_t first);
 
-/* Which frame sim_scan_frame misses; when its scan begins, in s after the scene's time 0 (before
- * that 0); and how long after that each row is measured, n_rows us, 0 for those left out. */
+/* The frame that sim_scan_frame needs; when its scan begins, in s after the scene's time 0 (0
+ * before that); and how long after that each row is measured: n_rows us, 0 for rows that are not
+ * measured.
+ */
 uint32_t sim_frame_wanted(const sim_board *sim);
 double sim_wanted_s(const sim_board *sim);
 void sim_row_delays(const sim_board *sim, uint32_t *delays_us);
 
-/* Let the scene begin with the next scan. Until then the untouched frames are shown over and over,
- * from the first on when a tare begins; then the frame of the scene that is nearest to the
- * beginning of the scan, and at last the last one. */
+/* Let the scene begin with the next scan. Until then the untouched frames are shown in a loop,
+ * which a tare begins again. From then on each scan shows the frame of the scene that is nearest to
+ * its beginning, and after the end of the scene the last frame. */
 void sim_begin_scene(sim_board *sim);
 bool sim_scene_over(const sim_board *sim);
 
-/* Where frames are wanted: scan until the application has had one more. False where the frame that
- * a scan would show has not been put before the board: put it, and call again. */
+/* If frames are wanted: scan until the application has had one more. Returns false if the frame
+ * that a scan would show has not been given: give it, and call again. */
 bool sim_scan_frame(sim_board *sim);
 
-/* Where frames are given: the application gets one, 2 n_rows volts in and out of phase of the
- * model's protocol, as they are but for rows that are not finite, which it cannot use. The frame
- * began passed_us after the last one, and frames come about period_us apart. Nothing where there is
- * no model. */
+/* On a board with frames_given: give the application one frame, 2 n_rows volts in and out of phase,
+ * in the order of the model's protocol. Rows that are not finite are marked as unusable. The frame
+ * began passed_us after the last one, and frames come about period_us apart. Without a model the
+ * frame is ignored. */
 void sim_give_frame(sim_board *sim, const float *iq, uint32_t passed_us, uint32_t period_us);
 
-/* Where frames are given: none has come for passed_us more, and the application may miss them. */
+/* On a board with frames_given: passed_us have passed without a frame. */
 void sim_let_pass(sim_board *sim, uint32_t passed_us);
 
 #endif

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from eitskin.device.bank import bank_bytes
+from eitskin.device.transport import Capabilities, SimulatedScene, Transport
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
@@ -14,7 +15,9 @@ from eitskin_emulator.board import EmulatedBoard
 from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin_emulator.image import image_bytes
 from eitskin_emulator.scene_skin import skin_of
+from eitskin_emulator.serial_line import BAUD
 
+CLOCK_TIMER, TIMER_COUNT = 5, 0x24  # the firmware's microsecond clock
 GATHER_TICKS = 200 * TICKS_PER_US  # bytes that follow within this time are read together
 START_TICKS = (
     TICKS_PER_S  # that a board may take until it speaks: a command that comes earlier is lost
@@ -23,21 +26,24 @@ START_TICKS = (
 MAX_WALL_S = 120.0
 
 
-class EmulatedTransport:
+class EmulatedTransport(Transport):
     """The host's end of the emulated board's serial line. ``board`` may be looked at, and
-    disturbed. ``loop``: the scene begins again at its end; ``looking_on`` is called every second of
-    this computer's, with the board's own time in seconds."""
-
-    synchronous = True
-    replays = False
-    ended = False  # the scene's last frame is held; the board goes on
+    disturbed. ``loop``: the scene begins again at its end. Its last frame is held; the board goes
+    on."""
 
     def __init__(self, name: str, board: EmulatedBoard, *, loop: bool = False) -> None:
         self.url = self.name = f"emu:{name}"
         self.board, self._loop = board, loop
-        self.looking_on: Callable[[float], None] | None = None
-        self._told = time.monotonic()
+        self._capabilities = Capabilities(
+            own_clock=True, slow=True, baud=BAUD, scene=SimulatedScene(name, held=True, loop=loop)
+        )
+        self._progress: Callable[[float], None] | None = None
+        self._reported = time.monotonic()
         self._closed = False
+
+    @property
+    def capabilities(self) -> Capabilities:
+        return self._capabilities
 
     @property
     def board_s(self) -> float:
@@ -60,9 +66,9 @@ class EmulatedTransport:
 
         def enough() -> bool:
             now = time.monotonic()
-            if self.looking_on is not None and now > self._told + 1.0:
-                self._told = now
-                self.looking_on(board.clock.now / TICKS_PER_S)
+            if self._progress is not None and now > self._reported + 1.0:
+                self._reported = now
+                self._progress(board.clock.now / TICKS_PER_S)
             if now > give_up:
                 raise DeviceError(
                     f"{self.name}: the emulated board said nothing in {MAX_WALL_S:.0f} s; its"
@@ -87,9 +93,13 @@ class EmulatedTransport:
     def reopen(self) -> bool:
         return not self._closed
 
-    def begin_scene(self) -> None:
-        """Let the scene's time 0 be now."""
+    def begin_scene(self) -> int:
+        """Let the scene's time 0 be now, by the board's microsecond clock."""
         self.board.skin.begin(self.board.clock.now)
+        return int(self.board.timers[CLOCK_TIMER].read(TIMER_COUNT, 4))
+
+    def watch(self, progress: Callable[[float], None] | None) -> None:
+        self._progress = progress
 
     def close(self) -> None:
         self._closed = True

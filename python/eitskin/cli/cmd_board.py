@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     with open_named(options) as device:
         if options.clear_faults:
             device.clear_faults()
-        info = device.board if device.transport.replays else device.info()
+        info = device.board if device.replays else device.info()
         wanted = Setting(info.settings)
         for name, *_ in SETTINGS:
             named = getattr(options, name)

@@ -14,14 +14,13 @@ from eitskin.calibration.weights import load_weights
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.printing import answer
 from eitskin.core.results import force_text
-from eitskin.device.recordings.raw_frames import finite_only
-from eitskin.device.recordings.recording import frames_of
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import Frames, load_frames
 from eitskin.model.eitm import save_model
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.session.checks.raw_frames import finite_only, frames_of
 from eitskin.solve.reconstructor import Reconstructor
 
 
@@ -63,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.output)
     model, blob, name = load_or_prebuilt(options.model)
     reconstructor = Reconstructor(model, blob=blob)
-    reconstructor.with_options(sign=options.sign)
+    reconstructor.set_options(sign=options.sign)
     parts, unseen = [], []
     for recording, list_of_weights in zip(options.recordings, options.weights, strict=True):
         weights = load_weights(list_of_weights)

@@ -18,7 +18,6 @@ from eitskin.cli.import_options import (
     write_layout,
 )
 from eitskin.cli.printing import say
-from eitskin.device.diagnose_board import board_findings, board_subject, measure
 from eitskin.device.known_model import find_model
 from eitskin.errors import UsageError
 from eitskin.frames.doctor.case import Case
@@ -27,6 +26,7 @@ from eitskin.frames.doctor.report import DoctorReport
 from eitskin.frames.doctor.subject import Subject, subject_from_source
 from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import resistor_ring
+from eitskin.session.checks.diagnose_board import board_findings, board_subject, measure
 from eitskin.skin.skin import Skin
 from eitskin.view.doctor_picture import draw_report
 from eitskin.view.panels import check_picture
@@ -110,7 +110,7 @@ def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
     skin."""
     with open_named(options) as device:
         known = find_model(device.board, options.model, device.transport.name)
-        simulated = device.transport.synchronous
+        simulated = device.transport.capabilities.own_clock
 
         def before_touches() -> None:
             if not simulated:

@@ -23,7 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     with open_named(options) as device:
         info, url = device.board, device.transport.url
-        replays = device.transport.replays
+        replays = device.replays
         stats = None if replays else device.stats(reset=options.reset_statistics)
         hashes = device.hashes().as_dict()
     counted = None if stats is None else stats.as_dict()

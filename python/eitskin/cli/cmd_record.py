@@ -10,10 +10,9 @@ from tqdm import tqdm
 from eitskin.cli.arguments import Output, above, option
 from eitskin.cli.device_options import add_device, add_scan, add_stream, read_mode, session_settings
 from eitskin.cli.printing import answer, say, say_progress
-from eitskin.device.events import Events
-from eitskin.device.live_frames import Item, LiveDrive, LiveFrame, LiveSummary
-from eitskin.device.wire.packets import Fault
-from eitskin.live.session import Session
+from eitskin.session.frame import Frame, Message, Notice
+from eitskin.session.session import Session
+from eitskin.truth import observe_scene
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -34,14 +33,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     settings = session_settings(options, read_mode(options.mode), record=options.output)
-    with Session(options.device, settings, say=say, progress=say_progress) as session:
-        items = session.items()
+    with Session(
+        options.device, settings, say=say, progress=say_progress, observe=observe_scene
+    ) as session:
+        messages = session.messages()
         try:
-            _count(_until(items, options.seconds), session.summary, settings.frames)
+            _show_progress(_until(messages, options.seconds), settings.frames)
         except KeyboardInterrupt:
             say("stopped")
         finally:
-            items.close()
+            messages.close()
         summary, recorder = session.finish(), session.recorder
     assert recorder is not None
     facts = {"recording": str(options.output), "packets": recorder.packets, "bytes": recorder.bytes}
@@ -49,24 +50,18 @@ def run(options: argparse.Namespace) -> int:
     return answer(options, facts | summary.as_dict(), *summary.lines(), written)
 
 
-def _until(items: Iterator[Item], seconds: float | None) -> Iterator[Item]:
-    for item in items:
-        yield item
-        if seconds is not None and isinstance(item, LiveFrame) and item.time_us >= 1e6 * seconds:
+def _until(messages: Iterator[Message], seconds: float | None) -> Iterator[Message]:
+    for message in messages:
+        yield message
+        if isinstance(message, Frame) and seconds is not None and message.time_s >= seconds:
             return
 
 
-def _count(items: Iterable[Item], summary: LiveSummary, frames: int) -> None:
-    events = Events()
+def _show_progress(messages: Iterable[Message], frames: int) -> None:
     with tqdm(
         desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()
     ) as bar:
-        for item in items:
-            for text in events.lines(item):
-                bar.write(f"eitskin: {text}", file=sys.stderr)
-            if isinstance(item, LiveFrame):
-                summary.add(item)
-                bar.update()
-            else:
-                summary.drives += isinstance(item, LiveDrive)
-                summary.faults += isinstance(item, Fault) and item.raised
+        for message in messages:
+            if isinstance(message, Notice):
+                bar.write(f"eitskin: {message.text}", file=sys.stderr)
+            bar.update(isinstance(message, Frame))

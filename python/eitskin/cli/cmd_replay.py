@@ -8,14 +8,14 @@ from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import add_verbose, add_zones, read_mode, read_zones
 from eitskin.cli.live_output import check_drawn, show
 from eitskin.cli.printing import answer, say
-from eitskin.device.recordings.host_check import check_recording
-from eitskin.device.recordings.raw_frames import finite_only
-from eitskin.device.recordings.recording import frames_of
 from eitskin.errors import FrameError, UsageError, VerificationError
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import save_frames
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.checks.host_check import check_recording
+from eitskin.session.checks.raw_frames import finite_only, frames_of
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
+from eitskin.truth import observe_scene
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +68,8 @@ def _show(options: argparse.Namespace) -> None:
         model_for="a picture" if options.picture or options.film else "",
         zones=read_zones(options.zones),
     )
-    with Session(f"file:{options.recording}", settings, say=say) as session:
+    recording = f"file:{options.recording}"
+    with Session(recording, settings, say=say, observe=observe_scene) as session:
         show(options, session)
 
 

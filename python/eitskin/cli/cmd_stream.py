@@ -11,14 +11,15 @@ from eitskin.cli.device_options import (
     add_stream,
     add_verbose,
     add_zones,
-    opened_outputs,
+    named_outputs,
     read_mode,
     session_settings,
 )
 from eitskin.cli.live_output import check_drawn, show
 from eitskin.cli.printing import say, say_progress
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.session import Session
+from eitskin.session.session import Session
+from eitskin.truth import observe_scene
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -49,8 +50,10 @@ def run(options: argparse.Namespace) -> int:
     settings = session_settings(options, mode, record=options.record, model_for=needs)
     check_drawn(options, mode)
     with (
-        Session(options.device, settings, say=say, progress=say_progress) as session,
-        opened_outputs(options, session) as outputs,
+        Session(
+            options.device, settings, say=say, progress=say_progress, observe=observe_scene
+        ) as session,
+        named_outputs(options, session) as outputs,
     ):
         session.start()
         show(options, session, outputs)

@@ -22,7 +22,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     check_tare_frames(options.frames)
     with open_named(options) as device:
-        if not device.transport.synchronous:
+        if not device.transport.capabilities.own_clock:
             say(f"leave the skin untouched: taking the reference from {options.frames} frames")
         device.tare(options.frames)
         url = device.transport.url

@@ -16,12 +16,11 @@ from eitskin.cli.device_options import (
     add_report,
     add_scan,
     add_zones,
-    opened_outputs,
+    named_outputs,
     read_mode,
     session_settings,
 )
 from eitskin.cli.printing import say
-from eitskin.device.timing import TIMED
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import read_bytes, refuse_unwritable
 from eitskin.page.server import MIN_TOKEN, PageServer, listen, load_server
@@ -88,9 +87,8 @@ def run(options: argparse.Namespace) -> int:
     if not options.folder.is_dir():
         raise FileError(f"--folder {options.folder}: no such folder; make it, or name another")
     options.frames = None
-    timed = options.device.partition(":")[0] in TIMED
-    usual = "raw,image,touches" if timed else "image,touches"
-    mode = read_mode(options.mode or (usual if options.teach is None else "raw,touches"))
+    named = options.mode or ("raw,touches" if options.teach is not None else None)
+    mode = None if named is None else read_mode(named)  # None: what the kind of device can send
     settings = replace(session_settings(options, mode), quiet_frames=True)
     token = options.token or secrets.token_urlsafe(16)
     server = PageServer(
@@ -102,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         remote=remote,
         folder=options.folder,
         say=say,
-        outputs=partial(opened_outputs, options) if options.to else None,
+        outputs=partial(named_outputs, options) if options.to else None,
         teacher=_teacher(options),
     )
     address = f"{server.address}#token={token}"

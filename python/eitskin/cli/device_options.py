@@ -1,6 +1,7 @@
 """The options that commands for boards share, and what they are turned into."""
 
 import argparse
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,10 @@ from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings, kinds_of
-from eitskin.live.zones import load_zones
-from eitskin.sinks.outputs import Outputs
-from eitskin.sinks.sink import TouchSource
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings, kinds_of
+from eitskin.session.zones import load_zones
+from eitskin.sinks.outputs import Outputs, attached_outputs
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in), serial:/dev/ttyACM0, text:PORT?layout=FILE (another"
@@ -50,7 +50,9 @@ def add_device(parser: argparse.ArgumentParser, *, model: bool = True, json: boo
 
 def add_scan(parser: argparse.ArgumentParser) -> None:
     """How frames are scanned and solved, and how the reference is taken."""
-    scan = parser.add_argument_group("scan; what is not named stays as the board has it")
+    scan = parser.add_argument_group(
+        "scan; settings that are not given stay as they are on the board"
+    )
     option(scan, "--excitation-hz HZ", "of the generator", float, within=(1, 250_000))
     option(scan, "--sample-rate-hz HZ", "of the converter", within=(1000, 5_000_000))
     option(scan, "--samples N", "of a measurement: a whole number of periods", within=(4, 1024))
@@ -173,11 +175,10 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def opened_outputs(options: argparse.Namespace, session: Session) -> Outputs:
-    transport, board = session.device.transport, session.device.board
-    model = None if session.known is None else session.known.model
-    source = TouchSource(transport.url, board.board, model, getattr(options, "overwrite", False))
-    return Outputs(options.to or (), source, patient=session.patient, say=say)
+def named_outputs(options: argparse.Namespace, session: Session) -> AbstractContextManager[Outputs]:
+    """The sinks of ``--to``."""
+    overwrite = getattr(options, "overwrite", False)
+    return attached_outputs(session, options.to or (), overwrite=overwrite, say=say)
 
 
 def add_zones(parser: argparse.ArgumentParser) -> None:
@@ -254,7 +255,11 @@ def open_named(options: argparse.Namespace) -> Device:
 
 
 def session_settings(
-    options: argparse.Namespace, mode: Stream, *, record: Path | None = None, model_for: str = ""
+    options: argparse.Namespace,
+    mode: Stream | None,
+    *,
+    record: Path | None = None,
+    model_for: str = "",
 ) -> SessionSettings:
     """What ``add_device``, ``add_stream`` and ``add_scan`` name, checked before a device is opened.
 

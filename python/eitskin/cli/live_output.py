@@ -3,16 +3,16 @@
 import argparse
 from typing import Any
 
+from eitskin.cli.frame_line import line
 from eitskin.cli.printing import say
 from eitskin.cli.progress import bar
 from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import EitskinError, UsageError
 from eitskin.fileio import refuse_unwritable
-from eitskin.live.frame import Frame, Notice, Report
-from eitskin.live.message import encoded, summary_message
-from eitskin.live.session import Session
-from eitskin.scoring.stream_check import line
+from eitskin.session.frame import DriveReport, Frame, Notice
+from eitskin.session.message import encoded, summary_message
+from eitskin.session.session import Session
 from eitskin.sinks.outputs import Outputs
 from eitskin.view.film import check_film
 from eitskin.view.panels import check_picture
@@ -48,16 +48,18 @@ class Rows:
     def __init__(self, verbose: bool, scored: bool) -> None:
         self._verbose, self._scored, self._begun = verbose, scored, False
 
-    def lines(self, frame: Frame) -> list[str]:
-        """Of the next frame."""
-        return [*self._frame(frame), *_happened(frame)]
+    def lines(self, message: Frame | DriveReport) -> list[str]:
+        """Of the next frame, or of touches after a drive."""
+        if isinstance(message, DriveReport):
+            return self.moving(message)
+        return [*self._frame(message), *_happened(message)]
 
     def _frame(self, frame: Frame) -> list[str]:
-        live = frame.live
-        if live.solved is None and live.raw is None:
+        if frame.info is None and frame.raw is None:
             return []
-        if self._verbose or live.touches is None or live.image is not None or live.raw is not None:
-            return [line(frame.compared, solver=self._verbose)]
+        more = frame.image is not None or frame.raw is not None
+        if self._verbose or more or not frame.has_touches:
+            return [line(frame, solver=self._verbose)]
         rows = [] if self._begun else [HEADER + (SCORED if self._scored else "")]
         self._begun = True
         if frame.refused:
@@ -73,17 +75,17 @@ class Rows:
             )
         return rows
 
-    def moving(self, report: Report) -> list[str]:
+    def moving(self, report: DriveReport) -> list[str]:
         """Of touches after a drive: where they are, and how fast they go."""
         time = f"{report.time_s:8.4f}"
         return [
-            f"{time}  drive {report.live.followed.head.drive:2d}: touch {one.id} at {one.x_mm:.1f},"
+            f"{time}  drive {report.drive:2d}: touch {one.id} at {one.x_mm:.1f},"
             f" {one.y_mm:.1f} mm, {one.vx_mm_per_s:+.0f}, {one.vy_mm_per_s:+.0f} mm/s"
             for one in report.touches
         ] or [f"{time}  no touch"]
 
     def _off(self, frame: Frame, number: int) -> str:
-        errors = frame.compared.errors_mm
+        errors = frame.errors_mm
         if errors is None:
             return ""
         return f" {errors[number]:7.2f}" if number in errors else "   false"
@@ -95,25 +97,20 @@ def _happened(frame: Frame) -> list[str]:
 
 
 def show(options: argparse.Namespace, session: Session, outputs: Outputs | None = None) -> None:
-    """Print every frame and all news of ``session``, give them to ``outputs``, draw ``--picture``
-    and ``--film``, print the summary; Ctrl-C ends it in good order."""
+    """Print every message of ``session``, draw ``--picture`` and ``--film``, print the summary with
+    the counts of ``outputs``; Ctrl-C ends it in good order."""
     album, broken = Album(), None
-    rows = Rows(options.verbose, session.truth is not None)
-    frames = session.frames()
+    rows = Rows(options.verbose, session.observer is not None)
+    messages = session.messages()
     try:
-        for item in frames:
-            if outputs is not None:
-                outputs.put(item)
-            if isinstance(item, Notice):
-                say(item.text)
+        for message in messages:
+            if isinstance(message, Notice):
+                say(message.text)
                 continue
-            if isinstance(item, Report):
-                for text in [encoded(item.message())] if options.json else rows.moving(item):
-                    print(text, flush=True)
-                continue
-            if options.picture is not None or options.film is not None:
-                album.add(item.compared)
-            for text in [encoded(item.message())] if options.json else rows.lines(item):
+            if isinstance(message, Frame) and (options.picture or options.film):
+                album.add(message)
+            lines = [encoded(message.message())] if options.json else rows.lines(message)
+            for text in lines:
                 print(text, flush=True)
     except KeyboardInterrupt:
         say("stopped")
@@ -121,7 +118,7 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
         broken = error
         session.summary.link = session.device.counters.as_dict()
     finally:
-        frames.close()  # the board gets its stop before it is asked what it counted
+        messages.close()  # the board gets its stop before it is asked what it counted
     if broken is None:
         session.finish()
     if album.count and session.known is not None:
@@ -137,10 +134,10 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
 
 
 def _print_summary(options: argparse.Namespace, session: Session, outputs: Outputs | None) -> None:
-    summary, score = session.summary, session.score
+    summary, observer = session.summary, session.observer
     drawn = str(options.picture) if options.picture is not None and summary.frames else None
     facts: dict[str, Any] = summary.as_dict()
-    facts["truth"] = score.as_dict() if score.frames else None
+    facts["truth"] = None if observer is None else observer.facts()
     if drawn is not None:
         facts["picture"] = drawn
     if outputs is not None:
@@ -151,8 +148,7 @@ def _print_summary(options: argparse.Namespace, session: Session, outputs: Outpu
         print(encoded(summary_message(facts)))
         return
     lines = summary.lines() + ([] if outputs is None else outputs.lines)
-    if score.frames:
-        lines.append(score.text())
+    lines += [] if observer is None else observer.lines()
     if drawn is not None:
         lines.append(f"picture: {drawn}")
     print("\n".join(lines))

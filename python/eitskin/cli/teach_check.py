@@ -15,10 +15,10 @@ from eitskin.cli.printing import answer
 from eitskin.cli.teach_record import raw_session
 from eitskin.device.client import TARE_FRAMES
 from eitskin.device.known_model import scanned_protocol
-from eitskin.device.live_frames import LiveFrame
 from eitskin.errors import DeviceError
 from eitskin.frames.frames import load_frames
 from eitskin.model.eitm import load_model
+from eitskin.session.frame import Frame
 from eitskin.skin.protocol import Protocol
 from eitskin.teaching.presses import load_presses
 from eitskin.teaching.still import still_fits
@@ -87,9 +87,9 @@ def _of_board(options: argparse.Namespace) -> tuple[np.ndarray, Protocol]:
     with raw_session(options, options.model, TARE_FRAMES) as session:
         protocol = scanned_protocol(session.device.board, session.known, session.name)
         frames = [
-            item.raw.voltage_v
-            for item in session.items()
-            if isinstance(item, LiveFrame) and item.raw is not None
+            message.raw.voltage_v
+            for message in session.messages()
+            if isinstance(message, Frame) and message.raw is not None
         ]
     if not frames:
         raise DeviceError(f"{options.device}: no frame came; look at it with  eitskin info")

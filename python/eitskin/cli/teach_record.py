@@ -17,19 +17,20 @@ from eitskin.cli.device_options import add_device
 from eitskin.cli.printing import say
 from eitskin.config import first_few
 from eitskin.device.known_model import scanned_protocol
-from eitskin.device.live_frames import LiveFrame
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FrameError, ProtocolError
 from eitskin.fileio import read_bytes, refuse_unwritable
 from eitskin.frames.frames import Frames, load_frames
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.frame import Frame
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin, load_skin
 from eitskin.teaching.guide import GuideEvent, PressGuide, guide_presses, scan_of_presses
 from eitskin.teaching.plan import PressPlan, load_plan
 from eitskin.teaching.practice import plan_of_scene
 from eitskin.teaching.press_file import PressFile
+from eitskin.truth import observe_scene
 
 TimedFrames = Iterator[tuple[np.ndarray, float]]
 
@@ -130,16 +131,16 @@ def raw_session(
     settings = SessionSettings(
         mode=Stream.RAW, every=1, frames=frames, model=model, firmware=options.firmware
     )
-    with Session(options.device, settings, say=say) as session:
+    with Session(options.device, settings, say=say, observe=observe_scene) as session:
         scan = scan_of_presses(session.device.board, session.replays)
         session.settings = replace(settings, scan=scan)
         yield session
 
 
 def _live(session: Session) -> TimedFrames:
-    for item in session.items():
-        if isinstance(item, LiveFrame) and item.raw is not None and not item.raw.quiet:
-            yield item.raw.voltage_v, item.time_us / 1e6
+    for message in session.messages():
+        if isinstance(message, Frame) and message.raw is not None and not message.untouched:
+            yield message.raw.voltage_v, message.time_s
 
 
 def _guide(

@@ -8,19 +8,21 @@ from typing import Any
 from eitskin.core.diagnostics_table import Touch
 from eitskin.device.bandwidth import carried_every
 from eitskin.device.known_model import need_model
-from eitskin.device.link import LinkEvent
-from eitskin.device.live_frames import LiveFrame, LiveSummary, follow
 from eitskin.device.open import open_device
-from eitskin.device.recordings.host_check import HostCheck, HostTwin
-from eitskin.device.recordings.packet_log import PacketLog
-from eitskin.device.set_up import begin_scene, set_up, take_reference
 from eitskin.device.settings import ScanSettings, SolverSettings
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import DeviceError
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.matching import Matching
 from eitskin.scoring.scene_truth import truth_of
+from eitskin.session.assemble import read_frames
+from eitskin.session.checks.host_check import HostCheck, HostTwin
+from eitskin.session.checks.packet_log import PacketLog
+from eitskin.session.frame import Frame, Notice
+from eitskin.session.set_up import begin_scene, set_up, take_reference
+from eitskin.session.summary import Summary
 
 TARE_FRAMES = 8
 FRAMES = 3
@@ -34,13 +36,13 @@ class BoardDemo:
 
     url: str
     info: BoardInfo
-    frame: LiveFrame
+    frame: Frame
     board: tuple[Touch, ...]
     host: tuple[Touch, ...]
     true: tuple[TrueTouch, ...]
     matching: Matching
     check: HostCheck
-    summary: LiveSummary
+    summary: Summary
     seconds: float
 
 
@@ -52,9 +54,11 @@ def run_board_demo(url: str) -> BoardDemo:
         MissingExtraError: the emulator is not installed.
     """
     start = perf_counter()
-    truth, summary, host = truth_of(url), LiveSummary(), None
-    assert truth is not None
+    summary, host = Summary(), None
     with open_device(url) as device:
+        scene = device.transport.capabilities.scene
+        assert scene is not None
+        truth = truth_of(scene)
         known = need_model(device.board, None, device.transport.name, "the comparison")
         options = set_up(device, ScanSettings(), SolverSettings(), known)
         assert options is not None
@@ -64,22 +68,22 @@ def run_board_demo(url: str) -> BoardDemo:
         if began_us is not None:
             truth.began_us = began_us
         every = carried_every(device, EVERYTHING)
-        for item in follow(device, EVERYTHING, every=every, frames=FRAMES):
-            if isinstance(item, LiveFrame):
-                summary.add(item)
+        for message in read_frames(device, EVERYTHING, every=every, frames=FRAMES):
+            if isinstance(message, Frame):
+                summary.add(message)
         log.stop()
         info = device.board
     twin, last = HostTwin(known, options), None
-    for item in log.frames(EVERYTHING):
-        if isinstance(item, LiveFrame):
-            result = twin.take(item)
+    for message in log.frames(EVERYTHING):
+        if isinstance(message, Frame):
+            result = twin.take(message)
             if result is not None:
-                last, host = item, result
-        elif isinstance(item, LinkEvent):
+                last, host = message, result
+        elif isinstance(message, Notice) and isinstance(message.cause, LinkEvent):
             twin.lost()
-    if last is None or host is None or last.touches is None:
+    if last is None or host is None or not last.has_touches:
         raise DeviceError(f"{url}: the board solved no frame")
-    true, found = truth.touches(last.board_us), last.touches.touches
+    true, found = truth.touches(last.board_us), last.touches
     matching = truth.matching(true, [(t.x_mm, t.y_mm) for t in found])
     touches = (found, host.touches, true)
     seconds = perf_counter() - start

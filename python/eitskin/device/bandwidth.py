@@ -3,7 +3,6 @@
 from math import ceil
 
 from eitskin.device.client import Device
-from eitskin.device.ports import BAUD
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo
 
@@ -38,8 +37,7 @@ def least_every(info: BoardInfo, what: Stream, baud: int) -> int:
 
 
 def carried_every(device: Device, what: Stream) -> int:
-    """As ``least_every``, of the line to ``device``; 1 where there is none (simulated boards,
+    """As ``least_every``, of the line to ``device``; 1 where no line limits it (simulated boards,
     recordings)."""
-    if device.transport.url.partition(":")[0] not in ("serial", "emu"):
-        return 1
-    return least_every(device.board, what, int(getattr(device.transport, "baud", BAUD)))
+    baud = device.transport.capabilities.baud
+    return 1 if baud is None else least_every(device.board, what, baud)

@@ -57,7 +57,7 @@ def no_answer(link: Link, before: LinkCounters, what: str, waited_s: float) -> s
             " reset it, or plug it in again"
         )
     if counters.bytes:
-        baud = getattr(link.transport, "baud", None)
+        baud = link.transport.capabilities.baud
         at = f" at {baud} baud" if baud else ""
         return (
             f"{name}: {counters.bytes} bytes arrive but no packet decodes{at}: the baud rate is"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from eitskin.core.options_table import CHOICES
 from eitskin.core.results import Options, check_options
-from eitskin.device.exchange import ANSWER_S, CommandExchange, Streamed
-from eitskin.device.link import Noted
-from eitskin.device.streaming import stream
+from eitskin.device.exchange import ANSWER_S, CommandExchange
+from eitskin.device.link import Streamed
+from eitskin.device.streaming import packet_stream
 from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import Setting, Stream
@@ -21,22 +21,22 @@ TARE_FRAMES = 16
 
 def _asked_millihz(info: BoardInfo) -> int:
     """The excitation that the board was asked for: a whole number of its periods fills a burst.
-    INFO tells what the generator makes of it, which is not quite the same."""
+    INFO reports what the generator makes of it, which is not quite the same."""
     rate_millihz = 1000 * info.sample_rate_hz
     periods = round(info.excitation_millihz * info.samples / rate_millihz)
     return periods * rate_millihz // info.samples
 
 
 def check_tare_frames(frames: int) -> int:
-    """``frames`` if a board can take its reference from so many; UsageError else."""
+    """``frames`` if a board can take its reference from so many frames, else UsageError."""
     if frames != 1 and not 4 <= frames <= 1024:
         raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to 1024")
     return frames
 
 
 class Device(CommandExchange):
-    """All that a board can be told and asked; ``open_device`` makes one from a URL. Raises as
-    ``CommandExchange``."""
+    """All commands and questions that a board takes; ``open_device`` makes one from a URL. Raises
+    as ``CommandExchange``."""
 
     # ---- commands ----
 
@@ -57,10 +57,10 @@ class Device(CommandExchange):
         self.command(commands.Tare(check_tare_frames(frames)), wait_s)
         self.board = replace(self.board, tared=1)
 
-    def start_scene(self) -> None:
+    def start_scene(self) -> int | None:
         """Begin what is to be touched, on a simulated or emulated board; call it after ``tare``.
-        Nothing on a real one."""
-        self.transport.begin_scene()
+        Nothing on a real one. Returns as ``Transport.begin_scene``."""
+        return self.transport.begin_scene()
 
     def scan(
         self,
@@ -133,8 +133,9 @@ class Device(CommandExchange):
     def hashes(self) -> BoardHashes:
         """SHA-256 of the model in use and of the program, as the board's flash has them; of a
         recording as they were."""
-        if isinstance(self.transport, Noted):
-            return self.transport.hashes
+        noted = self.transport.known_hashes
+        if noted is not None:
+            return noted
         answer = self.ask(commands.GetHashes(), 2 * ANSWER_S)
         assert isinstance(answer, BoardHashes)
         return answer
@@ -159,11 +160,11 @@ class Device(CommandExchange):
     def reset(self) -> BoardInfo:
         """Restart the board and wait until it answers; its reference is gone."""
         self.command(commands.Reset(), ANSWER_S)
-        self._connected = False  # what it says first is no news
+        self.link.connected = False  # that it restarts was asked for
         try:
             return self.info()
         finally:
-            self._connected = True
+            self.link.connected = True
 
     def upload_model(
         self, model: str | Path | bytes, progress: Callable[[int, int], None] | None = None
@@ -195,4 +196,14 @@ class Device(CommandExchange):
             raise UsageError(
                 f"stream: what = {int(what)}, every = {every}, frames = {frames} cannot be"
             )
-        return stream(self, what, every, frames)
+        return self._streamed(what, every, frames)
+
+    def _streamed(self, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
+        packets = packet_stream(self, what, every, frames)
+        try:
+            while not packets.over:
+                item = packets.next(None)
+                if item is not None:
+                    yield item
+        finally:
+            packets.stop()

@@ -1,109 +1,74 @@
 """One command and its answer at a time, sent again where it was lost; what a board streams between
-is kept."""
+stays in the link's queue."""
 
 import random
-import time
-from collections import deque
+import threading
 from contextlib import suppress
 from dataclasses import replace
 from typing import TypeVar
 
 from eitskin.device.check import check_board, no_answer
-from eitskin.device.link import Link, LinkEvent, PumpedLink, Reconnect, Tap, ThreadedLink
+from eitskin.device.link import (
+    ROOM,
+    Answer,
+    Link,
+    PumpedLink,
+    Reconnect,
+    Streamed,
+    Tap,
+    ThreadedLink,
+)
 from eitskin.device.transport import Transport
-from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.explain import command_name, reply_text
 from eitskin.device.wire.layout import Command
 from eitskin.device.wire.link_table import GetInfo, Keepalive, PacketType, ReplyStatus
-from eitskin.device.wire.packets import (
-    BoardHashes,
-    BoardInfo,
-    BoardStats,
-    Fault,
-    FollowedTouches,
-    FrameEvents,
-    RawFrame,
-    Reply,
-    SolvedImage,
-    SolvedTouches,
-)
-from eitskin.device.wire.payloads import MalformedPacket, parse
+from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats, Reply
 from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError, EitskinError, UsageError
 
-Answer = Reply | BoardInfo | BoardStats | BoardHashes
 ANSWERED_BY: dict[int, type] = {
     PacketType.GET_INFO: BoardInfo,
     PacketType.GET_STATS: BoardStats,
     PacketType.GET_HASHES: BoardHashes,
 }
-Streamed = (
-    RawFrame
-    | SolvedImage
-    | SolvedTouches
-    | FollowedTouches
-    | FrameEvents
-    | Fault
-    | BoardStats
-    | LinkEvent
-)
 
 Self = TypeVar("Self", bound="CommandExchange")
 
 TRIES = 3
 ANSWER_S = 1.0
-AWAY_S = 0.2
-INBOX = 1024
-
-
-class Deadline:
-    """Counts down ``timeout_s`` by the host's clock; where the board runs only while it is asked,
-    by what it sends: no packet takes less than a millisecond there, so that a board that talks
-    without answering is given up too.
-    """
-
-    def __init__(self, synchronous: bool, timeout_s: float) -> None:
-        self._end = None if synchronous else time.monotonic() + timeout_s
-        self._rest_s = timeout_s
-
-    def rest_s(self) -> float:
-        """Seconds left; call it once for each packet."""
-        if self._end is not None:
-            return self._end - time.monotonic()
-        self._rest_s -= 1e-3
-        return self._rest_s
+AWAY_S = 120.0  # that a command waits for a port that is gone
 
 
 class CommandExchange:
-    """A board that was found, whose version fits and that answers. ``board`` is what INFO last
-    said.
+    """A board that was found, whose version fits and that answers. ``board`` is the last
+    INFO.
 
     Commands are sent again with the same request number where no answer comes, so that one lost
-    packet is not noticed; after ``TRIES`` the board is taken to be dead.
+    packet does no harm. A board that does not answer ``TRIES`` times has fallen silent.
 
     Raises:
         DeviceError: no answer, or another version.
     """
 
     def __init__(
-        self, transport: Transport, *, room: int = 1024, reconnect: Reconnect | None = None
+        self, transport: Transport, *, room: int = ROOM, reconnect: Reconnect | None = None
     ) -> None:
         self.link: Link
-        if transport.synchronous:
-            self.link = PumpedLink(transport)
+        pumped = transport.capabilities.own_clock
+        if pumped:
+            self.link = PumpedLink(transport, room)
         else:
-            self.link = ThreadedLink(transport, room=room, reconnect=reconnect)
+            self.link = ThreadedLink(transport, room, reconnect=reconnect)
         # a board remembers the last request; the numbers of two runs of the host must not meet
-        self._request = 0 if transport.synchronous else random.randrange(1, 2**31)
-        self._inbox: deque[Streamed] = deque()
-        self._connected = False
+        self._request = 0 if pumped else random.randrange(1, 2**31)
+        self._asking = threading.RLock()
         self._tap: Tap | None = None
         try:
             self.board = self.info()
         except BaseException:
             self.close()
             raise
-        self._connected = True
+        self.link.connected = True
 
     def __enter__(self: Self) -> Self:
         return self
@@ -116,6 +81,11 @@ class CommandExchange:
         return self.link.transport
 
     @property
+    def replays(self) -> bool:
+        """It is a recording: nothing can be asked of it."""
+        return self.transport.capabilities.replays
+
+    @property
     def counters(self) -> LinkCounters:
         """What came over the link so far, gaps and refused packets included."""
         return self.link.counters
@@ -123,10 +93,10 @@ class CommandExchange:
     def close(self) -> None:
         """Let go of the port, after a word to the board, whose current stops; may be called
         twice."""
-        if self._connected and not self.transport.replays and not self.link.away:
+        if self.link.connected and not self.replays and not self.link.away:
             with suppress(EitskinError):
                 self.link.send(PacketType.KEEPALIVE, Keepalive(0).payload(0))
-        self._connected = False
+        self.link.connected = False
         self.link.close()
 
     def record(self, tap: Tap | None) -> None:
@@ -144,7 +114,7 @@ class CommandExchange:
         Raises:
             DeviceError: no answer, or another version.
         """
-        if self.transport.replays:
+        if self.replays:
             info = self._recorded_info()
         else:
             answer = self.ask(GetInfo(), ANSWER_S)
@@ -155,71 +125,18 @@ class CommandExchange:
         return info
 
     def next_item(self, timeout_s: float) -> Streamed | None:
-        """What comes next, kept back or from the link; None if nothing does within ``timeout_s``.
-        Replies are passed over."""
-        if self._inbox:
-            return self._inbox.popleft()
-        for _ in range(10_000):
-            item = self.link.next(timeout_s)
-            if item is None:
-                return None
-            self._keep(item)
-            if self._inbox:
-                return self._inbox.popleft()
-        raise DeviceError(
-            f"{self.transport.name}: ten thousand packets and none of use; is it an eitskin board?"
-        )
-
-    @property
-    def keeps(self) -> bool:
-        """Something came while a command waited for its answer, and was not fetched yet."""
-        return bool(self._inbox)
-
-    def drop_kept(self) -> None:
-        """Forget the frames that came while commands waited for their answers; faults and events
-        stay."""
-        self._inbox = deque(item for item in self._inbox if isinstance(item, Fault | LinkEvent))
-
-    def _keep(self, item: Packet | LinkEvent) -> Answer | None:
-        """Keep what is for a stream's reader; return answers to commands."""
-        if isinstance(item, LinkEvent):
-            self._put(item)
-            return None
-        if item.lost:
-            why = "lost on the way, or dropped by the board for lack of room"
-            self._put(LinkEvent("gap", item.lost, why))
-        try:
-            content = parse(item.type, item.payload)
-        except MalformedPacket:
-            self.counters.malformed += 1
-            return None
-        if isinstance(content, BoardInfo) and content.request == 0:
-            if self._connected:
-                self._put(LinkEvent("restarted", text="the board restarted"))
-            return None
-        if isinstance(content, Answer):
-            return content
-        if content is not None:
-            self._put(content)
-        return None
-
-    def _put(self, item: Streamed) -> None:
-        if len(self._inbox) >= INBOX:
-            self._inbox.popleft()
-            self.counters.dropped += 1
-        self._inbox.append(item)
+        """What the board streamed next; None if nothing comes within ``timeout_s``."""
+        return self.link.next(timeout_s)
 
     def _recorded_info(self) -> BoardInfo:
-        while (item := self.link.next(0.0)) is not None:
-            if isinstance(item, Packet) and item.type == PacketType.INFO:
-                content = parse(item.type, item.payload)
-                assert isinstance(content, BoardInfo)
-                return content
-            self._keep(item)
-        raise DeviceError(
-            f"{self.transport.name}: the recording holds no INFO of its board; it was cut before it"
-            " began"
-        )
+        found = self.link.answer(lambda one: isinstance(one, BoardInfo), float("inf"))
+        if found is None:
+            raise DeviceError(
+                f"{self.transport.name}: the recording holds no INFO of its board; it was cut"
+                " before it began"
+            )
+        assert isinstance(found, BoardInfo)
+        return found
 
     def command(self, command: Command, timeout_s: float) -> Reply:
         """One command that the board must take.
@@ -248,10 +165,14 @@ class CommandExchange:
             DeviceError: no answer, or, with ``refuse``, the board refuses.
             UsageError: a number does not fit its field.
         """
-        if self.transport.replays:
+        if self.replays:
             raise DeviceError(
                 f"{self.transport.name} is a recording: {command_name(command.TYPE)} needs a board"
             )
+        with self._asking:  # one command at a time; other threads wait for their turn
+            return self._ask(command, timeout_s, refuse)
+
+    def _ask(self, command: Command, timeout_s: float, refuse: bool) -> Answer:
         self._request = self._request % (2**32 - 1) + 1
         try:
             payload = command.payload(self._request)
@@ -262,11 +183,16 @@ class CommandExchange:
         before = replace(self.counters)
         left = TRIES
         while left:
-            self._await_port()
+            self.link.await_port(AWAY_S)
+            if self.link.away:
+                raise DeviceError(
+                    f"{self.transport.name}: the port is gone, and did not come back within"
+                    f" {AWAY_S:g} s: plug it in and try again"
+                )
             if left == 1:
                 self.link.decoder.forget_sequence()
             self.link.send(command.TYPE, payload)
-            answer = self._await_answer(command, timeout_s)
+            answer = self.link.answer(lambda one: self._fits(one, command), timeout_s)
             if answer is not None:
                 if refuse and isinstance(answer, Reply) and not answer.ok:
                     raise DeviceError(f"{self.transport.name}: {reply_text(answer)}")
@@ -275,30 +201,11 @@ class CommandExchange:
         what = command_name(command.TYPE)
         raise DeviceError(no_answer(self.link, before, what, TRIES * timeout_s))
 
-    def _await_port(self) -> None:
-        """Wait while the port is gone.
-
-        Raises:
-            DeviceError: it is gone for good.
-        """
-        while self.link.away:
-            item = self.link.next(AWAY_S)
-            if item is not None:
-                self._keep(item)
-
-    def _await_answer(self, command: Command, timeout_s: float) -> Answer | None:
-        deadline = Deadline(self.transport.synchronous, timeout_s)
-        while (rest := deadline.rest_s()) > 0:
-            item = self.link.next(rest)
-            if item is None:
-                return None
-            answer = self._keep(item)
-            if answer is None or answer.request != self._request:
-                continue
-            if isinstance(answer, Reply):
-                expects_more = command.TYPE in ANSWERED_BY and answer.status == ReplyStatus.OK
-                if answer.command == command.TYPE and not expects_more:
-                    return answer
-            elif isinstance(answer, ANSWERED_BY.get(command.TYPE, ())):
-                return answer
-        return None
+    def _fits(self, answer: Answer, command: Command) -> bool:
+        """Whether this is the answer to ``command``, which was sent last."""
+        if answer.request != self._request:
+            return False
+        if isinstance(answer, Reply):
+            expects_more = command.TYPE in ANSWERED_BY and answer.status == ReplyStatus.OK
+            return answer.command == command.TYPE and not expects_more
+        return isinstance(answer, ANSWERED_BY.get(command.TYPE, ()))

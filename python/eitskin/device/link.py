@@ -1,190 +1,289 @@
-"""A transport with its decoder: packets come out, commands go in. With a thread for real boards,
-without one for the others."""
+"""A transport with its decoder: packets come out, commands go in.
+
+Everything that a board sends goes through ONE queue. What is streamed waits there until it is
+fetched; answers to commands wait beside it, so that a command never fetches a frame. The queue
+holds ``room`` items. When it is full, the oldest frame goes, is counted in ``counters.dropped``,
+and a ``LinkEvent`` "dropped" says how many are missing before the next item.
+"""
 
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
-from eitskin.device.transport import Transport
+from eitskin.device.transport import LinkEvent, Transport
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import Keepalive, PacketType
-from eitskin.device.wire.packets import BoardHashes
+from eitskin.device.wire.packets import (
+    BoardHashes,
+    BoardInfo,
+    BoardStats,
+    Fault,
+    FollowedTouches,
+    FrameEvents,
+    RawFrame,
+    Reply,
+    SolvedImage,
+    SolvedTouches,
+)
+from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError, EitskinError
 
-FRAME_PACKETS = frozenset((PacketType.RAW, PacketType.IMAGE, PacketType.TOUCHES, PacketType.EVENTS))
+Answer = Reply | BoardInfo | BoardStats | BoardHashes
+FramePart = RawFrame | SolvedImage | SolvedTouches | FrameEvents
+Streamed = FramePart | FollowedTouches | Fault | LinkEvent
+ROOM = 1024
+ANSWERS = 64  # that nobody waits for; older ones are forgotten
+USELESS = 10_000  # packets in a row that are neither streamed nor answers
 READ_S = 0.1
 KEEPALIVE_S = 0.25  # a board lets no current flow where it hears nothing for a second
 KEEPALIVE = Keepalive(1).payload(0)
-
-
-@dataclass(frozen=True)
-class LinkEvent:
-    """Something happened to the link itself. ``kind``: "gap" (``missing`` packets by their numbers,
-    at least), "dropped" (``missing`` left out of the host's queue), "unplugged", "reconnected",
-    "restarted" (the board restarted), "skipped" (``missing`` lines of another instrument were no
-    frames; without a text it is only counted).
-    """
-
-    kind: str
-    missing: int = 0
-    text: str = ""
-
-
-@runtime_checkable
-class Telling(Protocol):
-    """A transport that has events of its own."""
-
-    def take_events(self) -> list[LinkEvent]:
-        """Those since the last call."""
-
-
-@runtime_checkable
-class Noted(Protocol):
-    """A transport that knows what its board said once."""
-
-    @property
-    def hashes(self) -> BoardHashes:
-        """Of model and program."""
-
-
-@runtime_checkable
-class Clocked(Protocol):
-    """A transport whose board's time passes only while it is read."""
-
-    @property
-    def board_s(self) -> float:
-        """The board's time."""
-
+PACKET_S = 1e-3  # no packet takes less of a board's own time
 
 Tap = Callable[[Packet], None]
 
 
-class Link(Protocol):
-    """What ``client.Device`` needs of a link."""
+class Link(ABC):
+    """The queue, and how packets get into it. Safe to be used by several threads: each answer goes
+    to whoever waits for its request.
 
-    transport: Transport
-    counters: LinkCounters
-    decoder: Decoder
+    Attributes:
+        connected: the board has answered; from now on an INFO without a request says that it
+            restarted.
+    """
+
+    def __init__(self, transport: Transport, room: int = ROOM) -> None:
+        self.transport, self.counters = transport, LinkCounters()
+        self.decoder = Decoder(self.counters)
+        self.connected = False
+        self._queue: deque[Streamed] = deque()
+        self._answers: deque[Answer] = deque(maxlen=ANSWERS)
+        self._changed = threading.Condition()
+        self._room, self._dropped = room, 0
+        self._taps: list[Tap] = []
+        self._tapping = threading.Lock()
+        self._last = self._sequence = 0
+        self._heard_s: float | None = None  # when something was sent last
 
     def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
         """Call ``begin`` with the last packet's sequence number, then ``tap`` with each packet
         after it, before anyone else gets it. An error of ``tap`` comes out of ``next``."""
+        with self._tapping:
+            begin(self._last)
+            self._taps.append(tap)
 
     def end_tap(self, tap: Tap) -> None:
-        """No more of that; nothing where it was not begun."""
+        """Stop calling ``tap``; nothing happens if it was not begun."""
+        with self._tapping:
+            self._taps = [one for one in self._taps if one != tap]
 
-    def next(self, timeout_s: float) -> Packet | LinkEvent | None:
-        """The next packet or event; None if there is none within ``timeout_s`` (of the board's time
-        where it is synchronous).
+    @abstractmethod
+    def next(self, timeout_s: float) -> Streamed | None:
+        """What comes next; None if nothing does within ``timeout_s`` (of the board's time where it
+        has its own clock).
 
         Raises:
             DeviceError: the port is gone for good.
         """
 
+    @abstractmethod
+    def answer(self, fits: Callable[[Answer], bool], timeout_s: float) -> Answer | None:
+        """The answer that ``fits``; None if it does not come within ``timeout_s``. Raises as
+        ``next``."""
+
+    @abstractmethod
     def send(self, packet_type: int, payload: bytes) -> None:
-        """Send one packet.
-
-        Raises:
-            DeviceError: the port is gone for good.
-        """
+        """Send one packet. Raises as ``next``."""
 
     @property
     def ended(self) -> bool:
         """No frame will come again, and nothing is left to fetch."""
+        return self.transport.ended and not self._queue
 
     @property
     def away(self) -> bool:
-        """The port is gone and is waited for."""
+        """The port is gone, and is waited for."""
+        return False
 
+    def await_port(self, timeout_s: float) -> None:  # noqa: B027 -- most ports are never away
+        """Wait while the port is away, ``timeout_s`` at most. Raises as ``next``."""
+
+    @property
+    def keeps(self) -> bool:
+        """Something waits to be fetched."""
+        return bool(self._queue) or self._dropped > 0
+
+    def drop_frames(self) -> None:
+        """Forget the frames of a stream that was left; faults and events stay."""
+        with self._changed:
+            self._queue = deque(one for one in self._queue if isinstance(one, Fault | LinkEvent))
+
+    @abstractmethod
     def close(self) -> None:
         """Stop and let go of the port."""
 
+    # ---- into the queue and out of it ----
 
-class PumpedLink:
-    """The board runs while it is asked: nothing is queued beyond what one read gave."""
+    def _route(self, packet: Packet, *, bounded: bool) -> None:
+        """Parse ``packet`` into the queue, or beside it if it is an answer."""
+        try:
+            content = parse(packet.type, packet.payload)
+        except MalformedPacket:
+            self.counters.malformed += 1
+            content = None
+        with self._changed:
+            if packet.lost:
+                why = "lost on the way, or dropped by the board for lack of room"
+                self._queue.append(LinkEvent("gap", packet.lost, why))
+            if isinstance(content, BoardInfo) and content.request == 0 and self.connected:
+                self._queue.append(LinkEvent("restarted", text="the board restarted"))
+            elif isinstance(content, Answer):
+                self._answers.append(content)
+            elif content is not None:
+                if bounded:
+                    self._make_room()
+                self._queue.append(content)
+            self._changed.notify_all()
 
-    def __init__(self, transport: Transport) -> None:
-        self.transport, self.counters = transport, LinkCounters()
-        self.decoder = Decoder(self.counters)
-        self._taps: list[Tap] = []
-        self._last = 0
-        self._ready: deque[Packet] = deque()
-        self._events: deque[LinkEvent] = deque()
-        self._sequence = 0
-        self._heard_s: float | None = None  # when something was sent last, on the board's clock
+    def _make_room(self) -> None:
+        """Drop the oldest frame of a full queue; without frames, the oldest of a thousand items
+        that nobody fetched."""
+        if len(self._queue) < self._room:
+            return
+        droppable = FramePart | FollowedTouches
+        place = next((k for k, one in enumerate(self._queue) if isinstance(one, droppable)), 0)
+        del self._queue[place]
+        self.counters.dropped += 1
+        self._dropped += 1
+
+    def _take_events(self) -> None:
+        """Queue what happened to the transport itself, counted."""
+        for event in self.transport.take_events():
+            if event.kind == "skipped":
+                self.counters.lines_skipped += event.missing
+            if event.text:
+                self._event(event)
+
+    def _event(self, event: LinkEvent) -> None:
+        with self._changed:
+            self._queue.append(event)
+            self._changed.notify_all()
+
+    def _fetch(self) -> Streamed | None:
+        """The oldest item, with the condition held."""
+        if self._dropped:
+            event = LinkEvent("dropped", self._dropped, "frames came faster than they were fetched")
+            self._dropped = 0
+            return event
+        return self._queue.popleft() if self._queue else None
+
+    def _fetch_answer(self, fits: Callable[[Answer], bool]) -> Answer | None:
+        """The answer that fits, with the condition held."""
+        for place, one in enumerate(self._answers):
+            if fits(one):
+                del self._answers[place]
+                return one
+        return None
+
+
+class PumpedLink(Link):
+    """A board with a clock of its own: it runs while it is asked. A reader that is slow only makes
+    it wait, so that frames are dropped only while a command waits for its answer."""
+
+    def __init__(self, transport: Transport, room: int = ROOM) -> None:
+        super().__init__(transport, room)
+        self._pumping = threading.RLock()
+        self._decoded: deque[Packet] = deque()  # of one read, not in the queue yet
 
     def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
-        begin(self._last)
-        self._taps.append(tap)
-        for packet in self._ready:
-            tap(packet)
+        with self._pumping:
+            super().begin_tap(begin, tap)
+            for packet in self._decoded:
+                tap(packet)
 
-    def end_tap(self, tap: Tap) -> None:
-        self._taps = [one for one in self._taps if one != tap]
+    @property
+    def ended(self) -> bool:
+        return super().ended and not self._decoded
 
-    def _news(self) -> bool:
-        self._events.extend(_told(self.transport, self.counters))
-        return bool(self._events)
+    def next(self, timeout_s: float) -> Streamed | None:
+        useless = 0
+        with self._pumping:
+            while True:
+                with self._changed:
+                    item = self._fetch()
+                if item is not None:
+                    return item
+                if useless > USELESS:
+                    raise DeviceError(
+                        f"{self.transport.name}: ten thousand packets and none of use; is it an"
+                        " eitskin board?"
+                    )
+                count = self._pump(timeout_s, bounded=False)
+                if count is None and not self.keeps:
+                    return None
+                useless += count or 0
 
-    def next(self, timeout_s: float) -> Packet | LinkEvent | None:
-        if self._events:
-            return self._events.popleft()
-        while not self._ready:
+    def answer(self, fits: Callable[[Answer], bool], timeout_s: float) -> Answer | None:
+        """As ``Link.answer``; each packet that comes takes a part of ``timeout_s``, so that a board
+        that talks without answering is given up too."""
+        rest_s = timeout_s - PACKET_S
+        with self._pumping:
+            while True:
+                with self._changed:
+                    found = self._fetch_answer(fits)
+                if found is not None:
+                    return found
+                if rest_s <= 0:
+                    return None
+                count = self._pump(rest_s, bounded=not self.transport.capabilities.replays)
+                if count is None:
+                    return None
+                rest_s -= PACKET_S * count
+
+    def _pump(self, timeout_s: float, *, bounded: bool) -> int | None:
+        """Queue one packet, after reading where none is left; returns 1, 0 where a read completed
+        none, None where no byte came."""
+        if not self._decoded:
             data = self._read(timeout_s)
-            if self._news():
-                return self._events.popleft()
+            self._take_events()
             if not data:
                 return None
             for packet in self.decoder.feed(data):
                 for tap in self._taps:
                     tap(packet)
-                self._ready.append(packet)
-        packet = self._ready.popleft()
+                self._decoded.append(packet)
+        if not self._decoded:
+            return 0
+        packet = self._decoded.popleft()
         self._last = packet.sequence
-        return packet
+        self._route(packet, bounded=bounded)
+        return 1
 
     def _read(self, timeout_s: float) -> bytes:
-        """Of a board with a clock of its own in steps, each with a word that we are there."""
-        if not isinstance(self.transport, Clocked):
+        """Read a board that misses a silent host in steps, and send a keepalive in each."""
+        now_s = self.transport.board_s
+        if now_s is None:
             return self.transport.read(timeout_s)
-        end_s = self.transport.board_s + timeout_s
+        end_s = now_s + timeout_s
         while True:
-            now_s = self.transport.board_s
             if self._heard_s is not None and now_s >= self._heard_s + KEEPALIVE_S:
                 self.send(PacketType.KEEPALIVE, KEEPALIVE)
             data = self.transport.read(min(end_s - now_s, KEEPALIVE_S))
-            if data or self.transport.board_s >= end_s:
+            now_s = self.transport.board_s or 0.0
+            if data or now_s >= end_s:
                 return data
 
     def send(self, packet_type: int, payload: bytes) -> None:
-        self.transport.write(encode(packet_type, self._sequence, payload))
-        self._sequence += 1
-        if isinstance(self.transport, Clocked):
+        with self._pumping:
+            self.transport.write(encode(packet_type, self._sequence, payload))
+            self._sequence += 1
             self._heard_s = self.transport.board_s
-
-    @property
-    def ended(self) -> bool:
-        return not self._ready and self.transport.ended
-
-    @property
-    def away(self) -> bool:
-        return False
 
     def close(self) -> None:
         self.transport.close()
-
-
-def _told(transport: Transport, counters: LinkCounters) -> list[LinkEvent]:
-    """What the transport itself has to tell, counted."""
-    if not isinstance(transport, Telling):
-        return []
-    events = transport.take_events()
-    counters.lines_skipped += sum(event.missing for event in events if event.kind == "skipped")
-    return [event for event in events if event.text]
 
 
 @dataclass(frozen=True)
@@ -195,62 +294,44 @@ class Reconnect:
     every_s: float = 0.5
 
 
-class ThreadedLink:
-    """A thread empties the port into a queue of ``room`` packets, so that a slow reader never makes
-    the port wait: where the queue is full the oldest frame packets are dropped and counted. A port
-    that goes is opened again (``Reconnect``).
+class ThreadedLink(Link):
+    """A real board. A thread owns the port: it alone reads it, empties it into the queue, so that a
+    slow reader never makes the port wait, and opens a port that has gone again (``Reconnect``).
     """
 
     def __init__(
-        self, transport: Transport, *, room: int = 1024, reconnect: Reconnect | None = None
+        self, transport: Transport, room: int = ROOM, *, reconnect: Reconnect | None = None
     ) -> None:
-        self.transport, self.counters = transport, LinkCounters()
-        self.decoder = Decoder(self.counters)
-        self._taps: list[Tap] = []
-        self._tapping = threading.Lock()
-        self._last = 0
-        self._room, self._reconnect = room, reconnect or Reconnect()
-        self._queue: deque[Packet | LinkEvent] = deque()
-        self._changed = threading.Condition()
+        super().__init__(transport, room)
+        self._reconnect = reconnect or Reconnect()
         self._stopping = threading.Event()
         self._failed: EitskinError | None = None
         self._away = False
-        self._dropped = 0
-        self._sequence = 0
         self._sending = threading.Lock()
-        self._heard_s: float | None = None  # when something was sent last
         self._thread = threading.Thread(
             target=self._run, name=f"eitskin {transport.name}", daemon=True
         )
         self._thread.start()
 
-    def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
-        with self._tapping:
-            begin(self._last)
-            self._taps.append(tap)
-
-    def end_tap(self, tap: Tap) -> None:
-        with self._tapping:
-            self._taps = [one for one in self._taps if one != tap]
-
-    def next(self, timeout_s: float) -> Packet | LinkEvent | None:
-        end = time.monotonic() + timeout_s
+    def next(self, timeout_s: float) -> Streamed | None:
         with self._changed:
-            while True:
-                if self._dropped:
-                    event = LinkEvent(
-                        "dropped", self._dropped, "frames came faster than they were fetched"
-                    )
-                    self._dropped = 0
-                    return event
-                if self._queue:
-                    return self._queue.popleft()
-                if self._failed is not None:
-                    raise type(self._failed)(str(self._failed))
-                rest = end - time.monotonic()
-                if rest <= 0:
-                    return None
-                self._changed.wait(rest)
+            self._await(lambda: self.keeps, timeout_s)
+            return self._fetch()
+
+    def answer(self, fits: Callable[[Answer], bool], timeout_s: float) -> Answer | None:
+        with self._changed:
+            self._await(lambda: any(map(fits, self._answers)), timeout_s)
+            return self._fetch_answer(fits)
+
+    def _await(self, ready: Callable[[], bool], timeout_s: float) -> None:
+        """Wait until ``ready``, with the condition held. Raises as ``next``."""
+        done = self._changed.wait_for(lambda: ready() or self._failed is not None, timeout_s)
+        if done and not ready():
+            self._raise_failed()
+
+    def _raise_failed(self) -> None:
+        if self._failed is not None:
+            raise type(self._failed)(str(self._failed))
 
     def send(self, packet_type: int, payload: bytes) -> None:
         with self._sending:
@@ -260,74 +341,51 @@ class ThreadedLink:
             except DeviceError:
                 if self._failed is not None:
                     raise
-                # else the reader is opening the port again, and whoever sent this sends it again
+                # else the thread is opening the port again, and whoever sent this sends it again
                 # when no answer comes
             self._sequence += 1
 
     def _keep_alive(self) -> None:
-        """A word to the board that we are there, where nothing else has said so."""
+        """Send a keepalive where nothing else was sent for a while."""
         if self._heard_s is None or time.monotonic() < self._heard_s + KEEPALIVE_S:
             return
         if not self._sending.locked():  # else a packet is on its way
             self.send(PacketType.KEEPALIVE, KEEPALIVE)
 
     @property
-    def ended(self) -> bool:
-        return self.transport.ended and not self._queue
-
-    @property
     def away(self) -> bool:
         return self._away
+
+    def await_port(self, timeout_s: float) -> None:
+        with self._changed:
+            self._changed.wait_for(lambda: not self._away or self._failed is not None, timeout_s)
+            self._raise_failed()
 
     def close(self) -> None:
         self._stopping.set()
         self.transport.close()
         self._thread.join(timeout=5.0)
 
+    # ---- the thread ----
+
     def _run(self) -> None:
         while not self._stopping.is_set():
             try:
                 self._keep_alive()
                 data = self.transport.read(READ_S)
-                for event in _told(self.transport, self.counters):
-                    self._event(event)
-                if data:
-                    self._put(self.decoder.feed(data))
+                self._take_events()
+                for packet in self.decoder.feed(data):
+                    with self._tapping:
+                        self._last = packet.sequence
+                        for tap in self._taps:
+                            tap(packet)
+                    self._route(packet, bounded=True)
             except DeviceError as error:
                 if self._stopping.is_set() or not self._open_again(error):
                     return
             except EitskinError as error:  # of the tap: a recording that cannot be written
                 self._fail(error)
                 return
-
-    def _put(self, packets: list[Packet]) -> None:
-        for packet in packets:
-            with self._tapping:
-                self._last = packet.sequence
-                for tap in self._taps:
-                    tap(packet)
-            with self._changed:
-                self._make_room()
-                self._queue.append(packet)
-                self._changed.notify()
-
-    def _make_room(self) -> None:
-        if len(self._queue) < self._room:
-            return
-        for place, item in enumerate(self._queue):
-            if isinstance(item, Packet) and item.type in FRAME_PACKETS:
-                del self._queue[place]
-                self.counters.dropped += 1
-                self._dropped += 1
-                return
-        self._queue.popleft()  # a thousand replies that nobody asked for
-        self.counters.dropped += 1
-        self._dropped += 1
-
-    def _event(self, event: LinkEvent) -> None:
-        with self._changed:
-            self._queue.append(event)
-            self._changed.notify()
 
     def _fail(self, error: EitskinError) -> None:
         with self._changed:

@@ -71,16 +71,10 @@ def open_with_files(
     """``open_device`` with the files of ``--model`` and ``--firmware``.
 
     Raises:
-        UsageError: firmware for what runs none.
         EitskinError: as ``open_device`` and ``load_model``.
     """
     from eitskin.model.eitm import load_model
 
-    if firmware is not None and not url.startswith("emu:"):
-        raise UsageError(
-            f"--firmware {firmware}: only emu: runs an image; a board is given one with  eitskin"
-            " flash --image"
-        )
     blob = None if model is None else load_model(model)[1]
     return open_device(url, model=blob, image=firmware, reconnect=reconnect)
 
@@ -101,6 +95,11 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
         raise UsageError(
             f"device {url!r}: {nearest(scheme, (*SCHEMES, *source_schemes()))}, as in auto,"
             f" {', '.join(AS_IN.values())}"
+        )
+    if image is not None and scheme != "emu":
+        raise UsageError(
+            f"--firmware {image}: only emu: runs an image; a board is given one with  eitskin"
+            " flash --image"
         )
     if scheme == "auto":
         return SerialTransport(only_board().path)

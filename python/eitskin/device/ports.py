@@ -6,6 +6,7 @@ import threading
 from dataclasses import dataclass
 from typing import Any
 
+from eitskin.device.transport import Capabilities, Transport
 from eitskin.errors import DeviceError
 
 BAUD = 1_000_000  # of the ST-LINK's virtual port, as the firmware sets its USART
@@ -52,10 +53,10 @@ def ports() -> list[Port]:
 
 def listing(found: list[Port]) -> str:
     """The ports in one line."""
-    told = (
+    shown = (
         f"{port.path} ({port.description})" if port.description else port.path for port in found
     )
-    return ", ".join(told) or "none"
+    return ", ".join(shown) or "none"
 
 
 def only_board() -> Port:
@@ -74,16 +75,12 @@ def only_board() -> Port:
     )
 
 
-class SerialTransport:
+class SerialTransport(Transport):
     """A serial port, open for this program alone. ``baud`` as the firmware's.
 
     Raises:
         DeviceError: it is not there, is busy, may not be opened, or is no serial port.
     """
-
-    synchronous = False
-    replays = False
-    ended = False
 
     def __init__(self, path: str, baud: int = BAUD) -> None:
         self.url = f"serial:{path}" + (f"?baud={baud}" if baud != BAUD else "")
@@ -91,9 +88,14 @@ class SerialTransport:
         self._serial_number = next(
             (port.serial_number for port in ports() if port.path == path), None
         )
+        self._capabilities = Capabilities(baud=baud)
         self._lock = threading.Lock()
         self._closed = False
         self._port = open_port(path, baud)
+
+    @property
+    def capabilities(self) -> Capabilities:
+        return self._capabilities
 
     def read(self, timeout_s: float) -> bytes:
         port = self._port
@@ -142,9 +144,6 @@ class SerialTransport:
                 return False
             self.name = path
             return True
-
-    def begin_scene(self) -> None:
-        """Real skins are touched by real hands."""
 
     def close(self) -> None:
         with self._lock:

@@ -1,6 +1,5 @@
-"""Frames of another instrument behind the board's own application: what a source is, and the
-transport that feeds its frames to the application, so that tare, stream, record and all else are
-the same as of a board.
+"""Frames of another instrument: what a source is, and the transport that feeds its frames to the
+board's own application, so that tare, stream, record and all else work as with a board.
 
 A source of your own is a class with ``read``; the entry point group ``eitskin.sources`` gives it a
 scheme (docs/guide/your-board.md).
@@ -15,9 +14,8 @@ from importlib.metadata import entry_points
 
 from eitskin.arrays import AnyArray
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
-from eitskin.device.link import LinkEvent
-from eitskin.device.simulated import GivenBoard
-from eitskin.device.transport import Transport
+from eitskin.device.host_board import GivenBoard
+from eitskin.device.transport import Capabilities, LinkEvent, Transport
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
@@ -27,13 +25,13 @@ POLL_S = 0.02
 PERIOD_US = 20_000  # where nothing else is known
 MAX_GAP_S = 60.0
 SILENT_S, SILENT_PERIODS = 1.0, 4  # until it is a fault that no frame comes
-PERIODS = 16  # whose mean is told
+PERIODS = 16  # frame periods that the reported rate is the mean of
 
 
 @dataclass(frozen=True, eq=False)
 class GivenFrame:
     """A frame: ``voltage_v`` (m,), real or complex, in the model's rows, NaN where a row cannot be
-    used; ``time_s`` by the instrument's clock, where it tells; ``came_s``: when it came, by
+    used; ``time_s`` by the instrument's clock, where it sends one; ``came_s``: when it came, by
     ``time.monotonic``, where that is not now."""
 
     voltage_v: AnyArray
@@ -42,12 +40,12 @@ class GivenFrame:
 
 
 class Source:
-    """Frames of an instrument; a source of your own is a subclass with ``read``.
+    """Frames of an instrument. A source of your own is a subclass with ``read``.
 
     Attributes:
         name: in messages and in INFO, where 15 characters of it are shown.
         synchronous: frames come whenever they are asked for, as from a file.
-        keeps: what nobody wants yet waits, as in a pipe; else it is gone.
+        keeps: frames that nobody wants yet wait, as in a pipe; else they are lost.
         ended: no frame will come again.
         period_s: from frame to frame, where it is known.
     """
@@ -75,7 +73,7 @@ class Source:
         raise NotImplementedError
 
     def take_events(self) -> list[LinkEvent]:
-        """What else is to be told."""
+        """What happened to the instrument since the last call."""
         return []
 
     def reopen(self) -> bool:
@@ -86,11 +84,9 @@ class Source:
         """Let go of it; may be called twice."""
 
 
-class SourceTransport:
-    """The bytes of the application that is given a source's frames. ``model`` goes into its first
-    bank (None: the prebuilt one)."""
-
-    replays = False
+class SourceTransport(Transport):
+    """The application, built for this host, that gets a source's frames. ``model`` goes into its
+    first bank (None: the prebuilt one)."""
 
     def __init__(self, url: str, source: Source, model: bytes | None = None) -> None:
         self.url, self.source = url, source
@@ -114,28 +110,28 @@ class SourceTransport:
             raise
 
     @property
-    def name(self) -> str:
+    def name(self) -> str:  # type: ignore[override]
         return self.source.name
 
     @property
-    def synchronous(self) -> bool:
-        return self.source.synchronous
+    def capabilities(self) -> Capabilities:
+        return Capabilities(own_clock=self.source.synchronous)
 
     @property
-    def ended(self) -> bool:
+    def ended(self) -> bool:  # type: ignore[override]
         return self.source.ended
 
     def read(self, timeout_s: float) -> bytes:
         with self._lock:
             output = self.board.take_output()
-            if output or (self.synchronous and not self.board.wanted):
+            if output or (self.source.synchronous and not self.board.wanted):
                 return output
         if self.ended:
             return self._after_the_end(timeout_s)
         if self.source.keeps and not self.board.wanted:
             self._await_command(timeout_s)
             return self._output()
-        if self.synchronous:
+        if self.source.synchronous:
             while not output and not self.ended and self.board.wanted:
                 self._give(self.source.read(0.0))
                 output = self._output()
@@ -144,13 +140,13 @@ class SourceTransport:
         return self._output()
 
     def begin(self) -> None:
-        """Give on what has come already, so that the board knows how often frames come."""
-        if not self.synchronous and not self.source.keeps:
+        """Pass on the frames that have come already: the board then knows how often they come."""
+        if not self.source.synchronous and not self.source.keeps:
             self._give(self.source.read(0.0))
 
     def _after_the_end(self, timeout_s: float) -> bytes:
         """Commands are still answered; a tare fails."""
-        if not self.synchronous:
+        if not self.source.synchronous:
             self._await_command(timeout_s)
         with self._lock:
             if self.board.tares:
@@ -167,9 +163,6 @@ class SourceTransport:
 
     def reopen(self) -> bool:
         return self.source.reopen()
-
-    def begin_scene(self) -> None:
-        """Real skins are touched by real hands."""
 
     def close(self) -> None:
         self.source.close()
@@ -208,8 +201,8 @@ class SourceTransport:
             self._rows = model.protocol.n_rows
 
     def _miss(self, now: float) -> None:
-        """The board's clock goes on where frames stay away for long, and it says so."""
-        if self.synchronous:
+        """Where no frame comes for long, the board's clock goes on, and it reports the silence."""
+        if self.source.synchronous:
             return
         limit = max(SILENT_S, SILENT_PERIODS * self._period_us() / 1e6)
         if now - self._last_s > limit and now - self._board_s > SILENT_S:
@@ -221,7 +214,7 @@ class SourceTransport:
         last, self._last_time_s = self._last_time_s, frame.time_s
         if frame.time_s is not None and last is not None and 0 < frame.time_s - last < MAX_GAP_S:
             return round(1e6 * (frame.time_s - last))
-        if self.synchronous or frame.time_s is not None or not self._given:
+        if self.source.synchronous or frame.time_s is not None or not self._given:
             return self._period_us()
         return max(round(1e6 * (now - self._board_s)), 1)
 
@@ -245,7 +238,7 @@ def open_source(url: str, *, model: bytes | None = None) -> Transport:
 
     Raises:
         UsageError: it cannot be loaded, fails, or gives something else.
-        EitskinError: as it says itself.
+        EitskinError: whatever the source itself raises.
     """
     scheme, _, rest = url.partition(":")
     point = next(iter(entry_points(group=GROUP, name=scheme)))

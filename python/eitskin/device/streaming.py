@@ -1,10 +1,12 @@
-"""The loop behind ``Device.stream``: frames as they come, and what to do when none do."""
+"""The packets of a stream: started, resumed after the board was away, and stopped.
+``Device.stream`` and a session read them packet by packet."""
 
-from collections.abc import Iterator
-from contextlib import suppress
+import time
+from typing import Protocol
 
-from eitskin.device.exchange import CommandExchange, Streamed
-from eitskin.device.link import LinkEvent
+from eitskin.device.exchange import AWAY_S, CommandExchange
+from eitskin.device.link import FramePart, Streamed
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.explain import reply_text
 from eitskin.device.wire.link_table import Drive, Stream, StreamCommand
 from eitskin.device.wire.packets import (
@@ -20,12 +22,41 @@ SILENCES = 3
 COMMAND_S = 1.0
 
 
+class PacketStream(Protocol):
+    """Packets and events as they come.
+
+    Attributes:
+        over: nothing will come any more.
+    """
+
+    over: bool
+
+    def next(self, tick_s: float | None) -> Streamed | None:
+        """The next packet or event. None where nothing came for a while, for ``tick_s`` at most
+        (None: as long as a silence may last), or the stream is over.
+
+        Raises:
+            DeviceError: the board refuses (no model, not tared), is gone, or has gone silent.
+        """
+
+    def stop(self) -> bool:
+        """Tell the board to stop; False where it does not answer, which is not an error."""
+
+
+def packet_stream(device: CommandExchange, what: Stream, every: int, frames: int) -> PacketStream:
+    """``what`` of every ``every``-th frame, ``frames`` of them (0: until it is stopped). The first
+    ``next`` starts it."""
+    if device.replays:
+        return RecordedPackets(device, what, every, frames)
+    return BoardPackets(device, what, every, frames)
+
+
 class _Progress:
     """Which frames of a stream came, by kind."""
 
     def __init__(self, what: Stream, frames: int) -> None:
         self.what, self.wanted = what, frames
-        self.restarts = 0  # of the board, when it was last told to stream
+        self.restarts = 0  # of the board, when it last began to stream
         self._came = {kind: 0 for kind in Stream if kind & what & ~Stream.FOLLOWED}
 
     def take(self, item: Streamed) -> bool:
@@ -60,113 +91,151 @@ _KIND: dict[type, Stream] = {
 }
 
 
-def stream(device: CommandExchange, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
-    if device.transport.replays:
-        yield from _replay(device, what, every, frames)
-        return
-    progress = _Progress(what, frames)
-    device.drop_kept()
-    _start(device, progress, every)
-    try:
-        silent = 0
-        while not progress.complete:
-            item = device.next_item(1.0 + 4e-6 * every * max(device.board.frame_us, 1000))
-            if item is None:
-                if device.link.ended:
-                    return
-                silent += 1
-                if _is_over(device, progress, every, silent):
-                    return
-                continue
-            silent = 0
-            if not progress.take(item):
-                continue
-            yield item
-            if isinstance(item, LinkEvent) and item.kind in ("reconnected", "restarted"):
-                _resume(device, progress, every)
-    finally:
-        _stop(device)
+class BoardPackets:
+    """The stream of a board."""
 
+    def __init__(self, device: CommandExchange, what: Stream, every: int, frames: int) -> None:
+        self._device, self._every = device, every
+        self._progress = _Progress(what, frames)
+        self._started = self._resuming = False
+        self._silences, self._waited_s = 0, 0.0
+        self.over = False
 
-def _start(device: CommandExchange, progress: _Progress, every: int) -> None:
-    reply = device.send_command(StreamCommand(int(progress.what), every, progress.rest), COMMAND_S)
-    if not reply.ok:
-        raise DeviceError(f"{device.transport.name}: {reply_text(reply)}")
-    progress.restarts = device.counters.restarts
-
-
-def _stop(device: CommandExchange) -> None:
-    """However the stream ended; a board that is gone cannot be stopped, and that is not what went
-    wrong."""
-    with suppress(EitskinError):
-        device.send_command(StreamCommand(0), COMMAND_S)
-
-
-def _resume(device: CommandExchange, progress: _Progress, every: int) -> None:
-    """Go on after the board was away: only if it is the same, with the same model and, for images,
-    still with its reference."""
-    before = device.board
-    now = device.info()
-    name = device.transport.name
-    if now.serial != before.serial:
-        raise DeviceError(
-            f"{name}: another board came back ({now.serial} for {before.serial}); start again"
-        )
-    if now.model_crc != before.model_crc:
-        raise DeviceError(f"{name}: the board came back with another model; start again")
-    if progress.what & ~Stream.RAW and not now.tared:
-        raise DeviceError(
-            f"{name}: the board restarted and has no reference frame; leave the skin untouched and"
-            " start again"
-        )
-    _start(device, progress, every)
-
-
-def _is_over(device: CommandExchange, progress: _Progress, every: int, silent: int) -> bool:
-    """Nothing came for a while: whether that is because the board has sent all, found out by asking
-    it."""
-    before = device.board
-    now = device.info()
-    if device.keeps:
-        return False  # it came while INFO was waited for
-    if device.link.ended:
-        return True
-    if now.streaming == 0:
-        same = (
-            now.serial == before.serial
-            and now.tared == before.tared
-            and device.counters.restarts == progress.restarts
-        )
-        if progress.wanted and same and now.drive == Drive.ON:
-            return True  # it has sent all that was asked for, and some of it was lost
-        _resume(device, progress, every)
-    elif silent >= SILENCES:
-        faults = ", ".join(code.name.lower().replace("_", " ") for code in now.fault_codes)
-        raise DeviceError(
-            f"{device.transport.name}: the board answers but sends no frame; it reports"
-            f" {faults or 'no fault'}: reset it"
-        )
-    return False
-
-
-def _replay(device: CommandExchange, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
-    """What was recorded, of the kinds asked for."""
-    numbers: dict[int, int] = {}
-    while True:
-        item = device.next_item(0.0)
+    def next(self, tick_s: float | None) -> Streamed | None:
+        device = self._device
+        if not self._started:
+            if device.link.away:
+                device.link.await_port(AWAY_S if tick_s is None else tick_s)
+                return None
+            device.link.drop_frames()  # of the stream before
+            self._started = True
+            self._start()
+        if self._resuming:
+            self._resuming = False
+            self._resume()
+        if self._progress.complete:
+            self.over = True
+            return None
+        item = self._fetch(tick_s)
         if item is None:
-            return
-        kind = _KIND.get(type(item))
-        if kind is None:
-            yield item
-            continue
+            return None
+        self._silences, self._waited_s = 0, 0.0
+        if not self._progress.take(item):
+            return None
+        self._resuming = isinstance(item, LinkEvent) and item.kind in ("reconnected", "restarted")
+        return item
+
+    def _fetch(self, tick_s: float | None) -> Streamed | None:
+        """The next item; where none comes for longer than a few frames take, find out why."""
+        device = self._device
+        patience_s = 1.0 + 4e-6 * self._every * max(device.board.frame_us, 1000)
+        if tick_s is None or device.transport.capabilities.own_clock:
+            item = device.next_item(patience_s)
+            self._waited_s = patience_s
+        else:
+            began = time.monotonic()
+            item = device.next_item(min(tick_s, max(patience_s - self._waited_s, 0.0)))
+            self._waited_s += time.monotonic() - began
+        if item is not None or self._waited_s < patience_s:
+            return item
+        self._waited_s = 0.0
+        if device.link.ended:
+            self.over = True
+        elif not device.link.away:  # else its port is waited for
+            self._silences += 1
+            self.over = self._is_over()
+        return None
+
+    def stop(self) -> bool:
+        if not self._started:
+            return True
+        if self._device.link.away:
+            return False
+        try:
+            self._device.send_command(StreamCommand(0), COMMAND_S)
+        except EitskinError:
+            return False
+        return True
+
+    def _start(self) -> None:
+        device, progress = self._device, self._progress
+        command = StreamCommand(int(progress.what), self._every, progress.rest)
+        reply = device.send_command(command, COMMAND_S)
+        if not reply.ok:
+            raise DeviceError(f"{device.transport.name}: {reply_text(reply)}")
+        progress.restarts = device.counters.restarts
+
+    def _resume(self) -> None:
+        """Go on after the board was away: only if it is the same, with the same model and, for
+        images, still with its reference."""
+        device, what = self._device, self._progress.what
+        before = device.board
+        now = device.info()
+        name = device.transport.name
+        if now.serial != before.serial:
+            raise DeviceError(
+                f"{name}: another board came back ({now.serial} for {before.serial}); start again"
+            )
+        if now.model_crc != before.model_crc:
+            raise DeviceError(f"{name}: the board came back with another model; start again")
+        if what & ~Stream.RAW and not now.tared:
+            raise DeviceError(
+                f"{name}: the board restarted and has no reference frame; leave the skin untouched"
+                " and start again"
+            )
+        self._start()
+
+    def _is_over(self) -> bool:
+        """Nothing came for a while: ask the board whether it has sent everything."""
+        device, progress = self._device, self._progress
+        before = device.board
+        now = device.info()
+        if device.link.keeps:
+            return False  # it came while INFO was waited for
+        if device.link.ended:
+            return True
+        if now.streaming == 0:
+            same = (
+                now.serial == before.serial
+                and now.tared == before.tared
+                and device.counters.restarts == progress.restarts
+            )
+            if progress.wanted and same and now.drive == Drive.ON:
+                return True  # it has sent all that was asked for, and some of it was lost
+            self._resume()
+        elif self._silences >= SILENCES:
+            faults = ", ".join(code.name.lower().replace("_", " ") for code in now.fault_codes)
+            raise DeviceError(
+                f"{device.transport.name}: the board answers but sends no frame; it reports"
+                f" {faults or 'no fault'}: reset it"
+            )
+        return False
+
+
+class RecordedPackets:
+    """What was recorded, of the kinds asked for."""
+
+    def __init__(self, device: CommandExchange, what: Stream, every: int, frames: int) -> None:
+        self._device, self._what = device, what
+        self._every, self._frames = every, frames
+        self._places: dict[int, int] = {}  # of each frame's number
+        self.over = False
+
+    def next(self, tick_s: float | None) -> Streamed | None:
+        item = self._device.next_item(0.0)
+        if item is None:
+            self.over = True
+            return None
         if isinstance(item, FollowedTouches):
-            if kind & what:
-                yield item
-            continue
-        assert isinstance(item, (RawFrame, SolvedImage, SolvedTouches, FrameEvents))
-        place = numbers.setdefault(item.frame, len(numbers))
-        if frames and place >= frames * every:
-            return
-        if kind & what and place % every == 0:
-            yield item
+            return item if self._what & Stream.FOLLOWED else None
+        if not isinstance(item, FramePart):
+            return item
+        place = self._places.setdefault(item.frame, len(self._places))
+        if self._frames and place >= self._frames * self._every:
+            self.over = True
+            return None
+        wanted = _KIND[type(item)] & self._what and place % self._every == 0
+        return item if wanted else None
+
+    def stop(self) -> bool:
+        return True  # a recording needs no word

@@ -4,9 +4,9 @@ import time
 from collections import deque
 from urllib.parse import unquote
 
-from eitskin.device.link import LinkEvent
 from eitskin.device.source import MAX_GAP_S, GivenFrame, Source, SourceTransport
 from eitskin.device.text_port import LinePort, open_port
+from eitskin.device.transport import LinkEvent
 from eitskin.errors import DeviceError, FrameError, UsageError
 from eitskin.frames.layout import BadLine, Layout, LineFrame, LineParser, load_layout
 from eitskin.frames.lines import LineReader, Row
@@ -17,14 +17,14 @@ BAUD = 115_200
 MAX_BAUD = 20_000_000
 WAIT_S, MAX_WAIT_S = 10.0, 600.0  # for the first two frames
 MAX_LINE = 1 << 20
-MAX_TOLD = 8  # kinds of bad lines
+MAX_REPORTED = 8  # kinds of bad lines
 HELP = "text:PORT?layout=FILE&baud=115200"
 
 
 class TextSource(Source):
     """Frames out of lines. ``name`` is the port's.
 
-    Lines that are no frames are skipped and counted; the first of each kind is told.
+    Lines that are not frames are skipped and counted; the first of each kind is reported.
     """
 
     def __init__(self, port: LinePort, layout: Layout, where: str) -> None:
@@ -39,7 +39,7 @@ class TextSource(Source):
         self._cut = port.cut
         self._parsed: deque[tuple[LineFrame, float]] = deque()  # and when it came
         self._events: list[LinkEvent] = []
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._first_bad = ""
         self._drained = False
         headed = layout.options.source.header_rows or 0
@@ -104,8 +104,8 @@ class TextSource(Source):
         elif not self._lines:
             reason = f"{came} bytes came, but no end of a line; check the baud rate"
         else:
-            said = self._first_bad or "lines came, but none with the layout's label"
-            reason = f"no line is a frame: {said}; repair the layout {self._where}"
+            first = self._first_bad or "lines came, but none with the layout's label"
+            reason = f"no line is a frame: {first}; repair the layout {self._where}"
         waited = "" if self._drained else f" ({wait_s:g} s waited)"
         raise DeviceError(f"{self.name}: {reason}{waited}")
 
@@ -178,13 +178,13 @@ class TextSource(Source):
                 raise UsageError(f"{self._where}: {error}") from None
 
     def _skip(self, kind: str, text: str) -> None:
-        """Count a line; the first of a ``kind`` is told."""
-        new = bool(text) and kind not in self._told and len(self._told) < MAX_TOLD
+        """Count a line; the first of a ``kind`` is reported."""
+        new = bool(text) and kind not in self._reported and len(self._reported) < MAX_REPORTED
         if new:
-            self._told.add(kind)
+            self._reported.add(kind)
             self._first_bad = self._first_bad or text
-        told = f"{text}; others like it are only counted" if new else ""
-        self._events.append(LinkEvent("skipped", 1, told))
+        line = f"{text}; others like it are only counted" if new else ""
+        self._events.append(LinkEvent("skipped", 1, line))
 
 
 def open_text(url: str, *, model: bytes | None = None) -> SourceTransport:

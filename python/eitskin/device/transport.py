@@ -1,34 +1,85 @@
-"""How bytes reach a board and come back: what every kind of device gives, and nothing more."""
+"""How bytes reach a board and come back: what every kind of device gives, and what it declares
+that it can do. Nobody asks a transport for more than stands here."""
 
-from typing import Protocol, runtime_checkable
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from eitskin.device.wire.packets import BoardHashes
 
 
-@runtime_checkable
-class Transport(Protocol):
-    """A way to a board.
+@dataclass(frozen=True)
+class SimulatedScene:
+    """The scene before a simulated skin: its ``name`` as ``eitskin scene`` knows it, or a file.
+
+    Attributes:
+        held: the board shows the last frame that has begun, and holds the scene's last one; else it
+            shows the frame that is nearest to the beginning of a scan, and the scene ends.
+        loop: the scene begins again at its end.
+        recorded: it was before the board whose recording this is.
+    """
+
+    name: str
+    held: bool = False
+    loop: bool = False
+    recorded: bool = False
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a kind of device can do.
+
+    Attributes:
+        own_clock: the board runs only while ``read`` is called (simulated, emulated, recorded). It
+            is read by whoever asks, without a thread, so that runs can be repeated to the bit;
+            timeouts count in the board's own time, and frames may be held back as long as anyone
+            likes.
+        replays: it is a recording: nothing can be asked of it.
+        slow: its time passes more slowly than ours: ``watch`` says how far it is.
+        baud: bits per second of the line, where a line limits how many frames come.
+        scene: what a simulated skin is shown; None before a real one.
+    """
+
+    own_clock: bool = False
+    replays: bool = False
+    slow: bool = False
+    baud: int | None = None
+    scene: SimulatedScene | None = None
+
+
+@dataclass(frozen=True)
+class LinkEvent:
+    """Something happened to the link itself. ``kind``: "gap" (at least ``missing`` packets are
+    missing by their numbers), "dropped" (the host's queue left out ``missing``), "unplugged",
+    "reconnected", "restarted" (the board restarted), "skipped" (``missing`` lines of another
+    instrument were not frames; without a text the event is only counted).
+    """
+
+    kind: str
+    missing: int = 0
+    text: str = ""
+
+
+class Transport(ABC):
+    """A way to a board. A kind of device is a subclass; it overrides what it can do.
 
     Attributes:
         url: what it was opened by, such as "serial:/dev/ttyACM0".
         name: one word or two for messages, such as "/dev/ttyACM0".
-        synchronous: the board only runs while ``read`` is called (simulated, emulated, recorded).
-            It is then pumped by whoever asks, without a thread, and runs are reproducible; timeouts
-            count in the board's own time.
-        replays: it is a recording: nothing can be asked of it.
         ended: a scene or a recording is over: no frame will come again. Commands are still
-            answered, but by recordings. Never true of a real board.
+            answered, except by recordings. Never true of a real board.
     """
 
-    @property
-    def url(self) -> str: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def synchronous(self) -> bool: ...
-    @property
-    def replays(self) -> bool: ...
-    @property
-    def ended(self) -> bool: ...
+    url: str = ""
+    name: str = ""
+    ended: bool = False
 
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this kind of device can do: a plain line without a clock of its own."""
+        return Capabilities()
+
+    @abstractmethod
     def read(self, timeout_s: float) -> bytes:
         """Bytes as soon as there are some; empty if none came within ``timeout_s``.
 
@@ -36,6 +87,7 @@ class Transport(Protocol):
             DeviceError: the port is gone.
         """
 
+    @abstractmethod
     def write(self, data: bytes) -> None:
         """Send ``data``.
 
@@ -46,10 +98,33 @@ class Transport(Protocol):
     def reopen(self) -> bool:
         """Try once to open the same board again after ``read`` or ``write`` failed; False if it is
         not there (yet)."""
+        return False
 
-    def begin_scene(self) -> None:
-        """Begin what is to be touched: until then a simulated or emulated skin is untouched.
-        Nothing on a real board."""
+    def take_events(self) -> list[LinkEvent]:
+        """What happened to the line since the last call."""
+        return []
 
+    @property
+    def board_s(self) -> float | None:
+        """The board's time, where it passes only while it is read and the board notices a host that
+        falls silent; None: the host's time counts."""
+        return None
+
+    @property
+    def known_hashes(self) -> BoardHashes | None:
+        """What a recording notes of its board's model and program; None: ask the board."""
+        return None
+
+    def begin_scene(self) -> int | None:
+        """Begin what is to be touched: until then a simulated skin is untouched. Returns the
+        board's clock at the scene's time 0, in us; None: it is when the next scan begins, or the
+        skin is real."""
+        return None
+
+    def watch(self, progress: Callable[[float], None] | None) -> None:  # noqa: B027 -- none is slow
+        """Call ``progress`` with the board's time about once per second while a slow board is
+        read; None: no longer."""
+
+    @abstractmethod
     def close(self) -> None:
         """Let go of the port; may be called twice."""

@@ -54,7 +54,7 @@ def upload(
 
 
 class _Refused(DeviceError):
-    """The board said why."""
+    """The board refuses and says why."""
 
 
 def _demand(device: CommandExchange, reply: Reply) -> None:

@@ -18,7 +18,7 @@ from eitskin.skin.skin import Skin, skin_from_table
 
 DATA_KINDS = ("difference", "normalised", "log-ratio")
 GAIN_DRIFT_KEPT = 8  # of touch_fit_left_out: changes along the reference are data like others
-REFERENCE_FOLLOWS = 16  # likewise: between touches the reference follows the skin
+TRACKS_REFERENCE = 16  # likewise: between touches the reference follows the skin
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Defaults:
 
     Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t
     max(x); ``solver`` is one of ``core.results.SOLVERS``; ``touch_fit_left_out``: bits of
-    ``Options.touch_fit`` that are not set, ``GAIN_DRIFT_KEPT`` and ``REFERENCE_FOLLOWS``.
+    ``Options.touch_fit`` that are not set, ``GAIN_DRIFT_KEPT`` and ``TRACKS_REFERENCE``.
     """
 
     iterations: int = 60

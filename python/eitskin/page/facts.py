@@ -1,4 +1,4 @@
-"""What the page is told: of the session once, of each frame in binary.
+"""What the page gets: the session's facts once, each frame in binary.
 
 A frame is one binary message of the WebSocket, little-endian:
 
@@ -28,10 +28,10 @@ import numpy as np
 
 from eitskin import __version__
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.frame import Frame
-from eitskin.live.message import encoded
-from eitskin.live.session import Session
-from eitskin.live.settings import KINDS
+from eitskin.session.frame import Frame
+from eitskin.session.message import encoded
+from eitskin.session.session import Session
+from eitskin.session.settings import KINDS
 
 MAGIC = b"EVF1"
 HEAD = struct.Struct("<4sIII")
@@ -51,9 +51,10 @@ def frame_bytes(number: int, frame: Frame) -> bytes:
     return b"".join((head, pixels, rows, encoded(message).encode()))
 
 
-def setup_text(session: Session, reference_v: list[float] | None, may_command: bool) -> str:
+def setup_text(session: Session, may_command: bool) -> str:
     """What does not change from frame to frame."""
     board, how, solver = session.device.board, session.settings, session.solver
+    mean_v = None if session.reference is None else session.reference.mean_v
     facts: dict[str, Any] = {
         "eitskin": __version__,
         "url": session.url,
@@ -64,11 +65,11 @@ def setup_text(session: Session, reference_v: list[float] | None, may_command: b
         "electrodes": board.n_electrodes,
         "frame_us": board.frame_us,
         "may_command": may_command,
-        "mode": [kind for kind in KINDS if how.mode & Stream[kind.upper()]],
+        "mode": [kind for kind in KINDS if session.mode & Stream[kind.upper()]],
         "speed": session.pacer.speed,
         "paused": session.pacer.paused,
-        "has_truth": session.truth is not None,
-        "reference_v": reference_v,
+        "has_truth": session.observer is not None,
+        "reference_v": None if mean_v is None else mean_v.tolist(),
         "sign": None if solver is None else solver.sign,
         "iterations": None if solver is None else solver.iterations,
         "preset": "" if how.target is None else how.target.name,

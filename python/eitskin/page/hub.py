@@ -1,5 +1,5 @@
-"""The pages that look on. A frame goes to each that has drawn what it got; what it cannot take is
-dropped and counted, and nobody waits for it."""
+"""The pages that are open. A frame goes to each page that has drawn what it got; what a page cannot
+take is dropped and counted, and nobody waits for it."""
 
 import asyncio
 import time
@@ -25,7 +25,9 @@ class PageClient:
     def __init__(self) -> None:
         self.may_command = False
         self.sent = self.dropped = 0
-        self.latencies_ms: deque[float] = deque(maxlen=100)  # from complete to drawn and told
+        self.latencies_ms: deque[float] = deque(
+            maxlen=100
+        )  # from complete to drawn, as the page reports
         self._texts: deque[str] = deque(maxlen=TEXTS)
         self._frame: Outgoing | None = None
         self._flying: dict[int, int] = {}

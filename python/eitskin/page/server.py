@@ -18,16 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from eitskin.device.timing import read_speed
 from eitskin.errors import EitskinError, UsageError, missing_extra
-from eitskin.live.frame import Frame
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.page.commands import PageCommands
 from eitskin.page.facts import frame_bytes, setup_text, text_of
-from eitskin.page.follower import Follower
 from eitskin.page.hub import Hub, Outgoing, PageClient
+from eitskin.page.reader import AttachOutputs, SessionReader
 from eitskin.page.teacher import Teacher
-from eitskin.sinks.outputs import Outputs
+from eitskin.session.frame import Frame
+from eitskin.session.settings import SessionSettings
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
@@ -45,6 +43,7 @@ FILES = {
 MIN_TOKEN = 12
 MAX_MODEL_BYTES = 8 << 20
 HELLO_S = 10.0
+MAX_WAITING = 16  # commands of a page that are not answered yet
 ABOUT_S = 1.0  # between two messages of how a page keeps up
 NO_TOKEN, NO_ORIGIN = 4401, 4403  # codes that close a WebSocket
 
@@ -73,8 +72,8 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 class PageServer:
-    """Serves one device's page on ``listening`` until ``stop``. ``token`` is asked for by commands,
-    and where ``remote`` by everything. ``say`` gets lines for whoever started it.
+    """Serves one device's page on ``listening`` until ``stop``. Commands need the
+    ``token``; where ``remote``, everything does. ``say`` gets lines for whoever started it.
     """
 
     def __init__(
@@ -89,7 +88,7 @@ class PageServer:
         speed: float = 1.0,
         folder: Path = Path(),
         say: Callable[[str], None] = lambda text: None,
-        outputs: Callable[[Session], Outputs] | None = None,
+        outputs: AttachOutputs | None = None,
         teacher: Teacher | None = None,
     ) -> None:
         _, self._uvicorn = load_server()
@@ -101,7 +100,7 @@ class PageServer:
         self._newest: Frame | None = None  # for pages that come later
         self._frames = 0
         self.skipped = 0  # frames that came while the one before was not taken up yet
-        self.follower = Follower(
+        self.reader = SessionReader(
             url,
             settings,
             speed=speed,
@@ -111,6 +110,7 @@ class PageServer:
             outputs=outputs,
             teacher=teacher,
         )
+        self.commands = PageCommands(self.reader)
 
     @property
     def address(self) -> str:
@@ -133,15 +133,15 @@ class PageServer:
             timeout_graceful_shutdown=1,
         )
         self._server = self._uvicorn.Server(config)
-        self.follower.start()
+        self.reader.start()
         try:
             self._loop.run_until_complete(self._server.serve(sockets=[self._listening]))
         finally:
-            self.follower.stop()
+            self.reader.stop()
             self._loop.run_until_complete(self._loop.shutdown_asyncgens())
             self._loop.close()
-        if self.follower.frames == 0 and self.follower.error is not None:
-            raise self.follower.error
+        if self.reader.frames == 0 and self.reader.error is not None:
+            raise self.reader.error
 
     def stop(self) -> None:
         """End ``serve``; from any thread."""
@@ -163,7 +163,7 @@ class PageServer:
 
     def _news(self, kind: str, facts: dict[str, Any]) -> None:
         failed = kind == "state" and facts["state"] == "failed"
-        if failed and self.follower.frames == 0:
+        if failed and self.reader.frames == 0:
             self.stop()
         if kind == "state" and facts["state"] == "live":
             self._call(self._send_setup)
@@ -192,9 +192,9 @@ class PageServer:
             self._tell_setup(page)
 
     def _tell_setup(self, page: PageClient) -> None:
-        session = self.follower.session or self.follower.last
+        session = self.reader.session or self.reader.last
         if session is not None:
-            page.tell(setup_text(session, session.reference_v, page.may_command))
+            page.tell(setup_text(session, page.may_command))
 
     def _app(self) -> Starlette:
         from starlette.applications import Starlette
@@ -220,7 +220,7 @@ class PageServer:
         return self._remote or address.is_loopback
 
     def _from_here(self, headers: Any) -> bool:
-        """Whether Host is ours, and Origin, where a browser says one, the same."""
+        """Whether Host is ours, and Origin, where a browser sends one, the same."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if not self._host_is_ours(host):
             return False
@@ -262,7 +262,7 @@ class PageServer:
             if len(body) > MAX_MODEL_BYTES:
                 return JSONResponse({"error": "this is too long for a model"}, 413)
         try:
-            text = await asyncio.wrap_future(self.follower.upload(bytes(body)))
+            text = await asyncio.wrap_future(self.commands.upload(bytes(body)))
         except EitskinError as error:
             return JSONResponse({"error": str(error)}, 400)
         return JSONResponse({"text": text})
@@ -283,10 +283,10 @@ class PageServer:
             await _closed(socket.close(NO_TOKEN, "this needs the token"))
             return
         self.hub.pages.add(page)
-        page.tell(text_of("state", state=self.follower.state, text=self.follower.text))
+        page.tell(text_of("state", state=self.reader.state, text=self.reader.text))
         self._tell_setup(page)
-        if self.follower.teacher is not None:
-            page.tell(text_of("teach", **self.follower.teacher.facts()))
+        if self.reader.teacher is not None:
+            page.tell(text_of("teach", **self.reader.teacher.facts()))
         if self._newest is not None:
             data = frame_bytes(self._frames, self._newest)
             page.offer(Outgoing(self._frames, data, time.monotonic_ns()))
@@ -320,53 +320,48 @@ class PageServer:
             )
 
     async def _receive(self, socket: WebSocket, page: PageClient) -> None:
-        while True:
-            try:
-                said = json.loads(await socket.receive_text())
-                if not isinstance(said, dict):
-                    raise ValueError
-                if said.get("type") == "drawn":
-                    page.drawn(int(said["number"]))
+        """Read the page's messages. No answer is waited for here, so that a command that the board
+        does not answer keeps nobody from  Start again."""
+        answers: set[asyncio.Task[None]] = set()
+        try:
+            while True:
+                try:
+                    message = json.loads(await socket.receive_text())
+                    if not isinstance(message, dict):
+                        raise ValueError
+                    if message.get("type") == "drawn":
+                        page.drawn(int(message["number"]))
+                        continue
+                except (ValueError, KeyError, TypeError):
+                    await socket.close(1003)
+                    return
+                if len(answers) >= MAX_WAITING:
+                    page.tell(_refusal(f"the last {MAX_WAITING} commands are not answered yet"))
                     continue
-            except (ValueError, KeyError, TypeError):
-                await socket.close(1003)
-                return
-            page.tell(await self._answer(said, page))
+                task = asyncio.create_task(self._answer(message, page))
+                answers.add(task)
+                task.add_done_callback(answers.discard)
+        finally:
+            for task in list(answers):
+                task.cancel()
 
-    async def _answer(self, said: dict[str, Any], page: PageClient) -> str:
+    async def _answer(self, message: dict[str, Any], page: PageClient) -> None:
         if not page.may_command:
             reason = "this needs the token: open the address that  eitskin view  printed"
-            return text_of("answer", ok=False, text=reason)
+            page.tell(_refusal(reason))
+            return
         try:
-            done = self._do(said)
+            done = self.commands.do(message.get("do"), message.get("value"))
             if isinstance(done, Future):
                 done = await asyncio.wrap_future(done)
-        except EitskinError as error:
-            return text_of("answer", ok=False, text=str(error))
-        return text_of("answer", ok=True, text=done)
+        except Exception as error:  # of whatever kind: the page waits for an answer
+            page.tell(_refusal(str(error) or type(error).__name__))
+            return
+        page.tell(text_of("answer", ok=True, text=done))
 
-    def _do(self, said: dict[str, Any]) -> Future[str] | str:
-        """What a page asks for."""
-        what, value, follower = said.get("do"), said.get("value"), self.follower
-        if what in ("play", "pause", "step"):
-            return follower.pace(what)
-        if what == "speed":
-            return follower.pace("speed", read_speed(str(value), "speed"))
-        if what == "tare":
-            return follower.tare()
-        if what == "record":
-            return follower.record(value is True)
-        if what == "mode" and isinstance(value, list):
-            return follower.mode([str(kind) for kind in value])
-        if what == "sign" and value in ("increase", "decrease", "both"):
-            return follower.solver(sign=value)
-        if what == "preset":
-            return follower.preset(str(value))
-        if what == "teach" and value in ("back", "skip", "fit"):
-            return follower.teach(value)
-        if what == "iterations" and isinstance(value, int) and 1 <= value <= 1_000_000:
-            return follower.solver(iterations=value)
-        raise UsageError(f"{what}: {value!r} cannot be")
+
+def _refusal(text: str) -> str:
+    return text_of("answer", ok=False, text=text)
 
 
 async def _closed(closing: Awaitable[None]) -> None:

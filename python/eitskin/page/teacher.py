@@ -1,5 +1,5 @@
-"""Teaching in the page: the guide of ``eitskin teach record`` fed with the frames that the page
-follows, the same file of presses, and the fit."""
+"""Teaching in the page: the guide of ``eitskin teach record`` fed with the frames of the page's
+session, the same file of presses, and the fit."""
 
 import threading
 from collections.abc import Callable
@@ -9,9 +9,9 @@ from typing import Any
 
 from eitskin.device.known_model import scanned_protocol
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame
-from eitskin.live.session import Session
 from eitskin.model.eitm import save_model
+from eitskin.session.frame import Frame, Message
+from eitskin.session.session import Session
 from eitskin.skin.skin import Skin
 from eitskin.teaching.guide import GuideEvent, PressGuide, Step, scan_of_presses
 from eitskin.teaching.plan import PressPlan
@@ -20,9 +20,9 @@ from eitskin.teaching.teach import teach
 
 
 class Teacher:
-    """Guides through ``plan`` into the file ``presses``; ``skin`` with its description's
-    ``text``, None and "" for that of the board's model. ``on_event`` gets the facts for pages
-    whenever something is new."""
+    """Guides through the presses of ``plan`` and writes them into the file ``presses``; ``skin``
+    with its description's ``text``, None and "" for that of the board's model. ``on_event`` gets
+    the facts for pages whenever something is new."""
 
     def __init__(
         self, plan: PressPlan, presses: Path, skin: Skin | None = None, text: str = ""
@@ -31,7 +31,7 @@ class Teacher:
         self.on_event: Callable[[dict[str, Any]], None] = lambda facts: None
         self._guide: PressGuide | None = None
         self._file: PressFile | None = None
-        self._said = Step.REST.value
+        self._line = Step.REST.value
         self._lock = threading.Lock()
 
     def begin(self, session: Session) -> None:
@@ -48,20 +48,21 @@ class Teacher:
                 self._skin = session.known.model.skin
         self.on_event(self.facts())
 
-    def take(self, frame: Frame) -> None:
-        if frame.voltage_v is None:
+    def take(self, message: Message) -> None:
+        """A consumer of the session's messages."""
+        if not isinstance(message, Frame) or message.voltage_v is None:
             return
         with self._lock:
             if self._guide is None or self._file is None:
                 return
-            event = self._guide.feed(frame.voltage_v, frame.time_s)
+            event = self._guide.feed(message.voltage_v, message.time_s)
             if event is None:
                 return
             if event.accepted and self._guide.taken is not None:
                 self._file.add(event.number, *self._guide.taken)
             if event.withdrawn:
                 self._file.back()
-            self._said = event.text
+            self._line = event.text
         self.on_event(self.facts())
 
     def facts(self) -> dict[str, Any]:
@@ -69,7 +70,7 @@ class Teacher:
         guide, file = self._guide, self._file
         return {
             "step": "rest" if guide is None else guide.step.name.lower(),
-            "text": self._said,
+            "text": self._line,
             "number": 0 if guide is None else guide.number,
             "done": [] if file is None else list(file.numbers),
             "places_mm": self.plan.place_mm.round(2).tolist(),
@@ -87,12 +88,12 @@ class Teacher:
                 raise UsageError("teach: all places are done")
             else:
                 event = self._guide.skip()
-            self._said = event.text
+            self._line = event.text
         self.on_event(self.facts())
         return event.text
 
     def fit(self) -> tuple[bytes, str]:
-        """The taught model's bytes, also in a file beside the presses, and what it is worth."""
+        """The taught model's bytes, also in a file beside the presses, and how good it is."""
         presses = None if self._file is None else self._file.presses
         if presses is None:
             raise UsageError("teach: no press is there yet")

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from eitskin.core.results import NEWTONS_PER_GRAM, Reconstruction, solve_text
-from eitskin.live.message import frame_table, head, known
 from eitskin.reconstruct.steps import ReconstructOutcome
 from eitskin.scoring.score import FrameScore
+from eitskin.session.message import frame_table, head, known
 
 
 def to_text(outcome: ReconstructOutcome) -> str:

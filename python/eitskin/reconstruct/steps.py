@@ -187,21 +187,21 @@ def know_converter(reconstructor: Reconstructor, frames: Frames) -> None:
     """The steps of the frames' converter, where they tell, are the least noise of a row."""
     step_v = frames.meta.get("lsb_v")
     if isinstance(step_v, (int, float)) and 0 < step_v < math.inf:
-        reconstructor.with_options(noise_floor_v=step_v / math.sqrt(12))
+        reconstructor.set_options(noise_floor_v=step_v / math.sqrt(12))
 
 
 def apply_options(
     reconstructor: Reconstructor, how: ReconstructSettings, notes: list[str]
 ) -> Point | None:
     """Give the solver its options; with a wish those of the measured point that fulfils it."""
-    reconstructor.with_options(**how.changes)
+    reconstructor.set_options(**how.changes)
     if how.track:
         reconstructor.set_options(tracking(reconstructor.options))
     if how.target is None:
         return None
 
     point = chosen_point(how.target, reconstructor.model, reconstructor.options)
-    reconstructor.with_options(**point.configuration.solver_settings)
+    reconstructor.set_options(**point.configuration.solver_settings)
     notes.append(settings_text(point, how.target.board))
     return point
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.device.sample import Sample
-from eitskin.device.timing import split_timing
+from eitskin.device.transport import SimulatedScene
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import touches_at, touches_of
 from eitskin.scoring.matching import GATE_MM, WANTED_SIGNS, Matching, match
+from eitskin.session.sample import Sample
 from eitskin.skin.skin import size_to_paper
 
 WRAP_US = 2**32
@@ -82,19 +82,10 @@ class SceneTruth:
         return match([(t.x_mm, t.y_mm) for t in true], found_mm, self.gate_mm)
 
 
-def truth_of(url: str, sign: str = "increase") -> SceneTruth | None:
-    """The truth of a simulated or emulated board's scene; None for any other device. Raises as
-    ``scene_of``."""
-    scene, (bare, timing) = scene_of(url), split_timing(url)
-    if scene is None:
-        return None
-    return SceneTruth(scene, sign, held=bare.startswith("emu:"), loop=timing.loop)
-
-
-def scene_of(url: str) -> Scene | None:
-    """The scene that a device URL names; None for boards and recordings."""
-    scheme, _, rest = split_timing(url)[0].partition(":")
-    return find_scene(rest) if scheme in ("sim", "emu") else None
+def truth_of(scene: SimulatedScene, sign: str = "increase") -> SceneTruth:
+    """The truth of the scene before a simulated skin, for a board that looks for changes of
+    ``sign``. Raises as ``find_scene``."""
+    return SceneTruth(find_scene(scene.name), sign, held=scene.held, loop=scene.loop)
 
 
 @dataclass

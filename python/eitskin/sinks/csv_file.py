@@ -10,7 +10,7 @@ from typing import Any
 from eitskin.device.recordings.new_file import RecordingFile
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
-from eitskin.sinks.sink import Sink, Told, TouchSource
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource
 
 TOUCH = (
     "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence",
@@ -27,8 +27,8 @@ class CsvSink:
     def __init__(self, file: RecordingFile) -> None:
         self._file = file
 
-    def write(self, told: Told) -> None:
-        message = told.message
+    def write(self, outgoing: OutgoingMessage) -> None:
+        message = outgoing.message
         if message["type"] not in ("frame", "report"):
             return
         shared = {name: message.get(name) for name in (*HEAD, "drive", "refused")}

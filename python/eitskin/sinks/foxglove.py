@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import SinkError, missing_extra
-from eitskin.live.message import schema
+from eitskin.session.message import schema
 from eitskin.sinks.mcap_file import FRAME_ID
-from eitskin.sinks.sink import Sink, Told, TouchSource, address, nothing_more
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "foxglove: or foxglove://HOST:PORT"
 PORT = 8765
@@ -63,14 +63,18 @@ class FoxgloveSink:
     def port(self) -> int:
         return int(self._server.port)
 
-    def write(self, told: Told) -> None:
-        channel = self._channels.get(told.message["type"])
+    def write(self, outgoing: OutgoingMessage) -> None:
+        channel = self._channels.get(outgoing.message["type"])
         if channel is None:
             return
-        now = told.time_ns
-        channel.log(json.dumps(told.message).encode(), log_time=now)
-        if told.frame is not None and told.frame.image is not None and self._model is not None:
-            picture = np.nan_to_num(self._model.grid.image(told.frame.image)[::-1])
+        now = outgoing.time_ns
+        channel.log(json.dumps(outgoing.message).encode(), log_time=now)
+        if (
+            outgoing.frame is not None
+            and outgoing.frame.image is not None
+            and self._model is not None
+        ):
+            picture = np.nan_to_num(self._model.grid.image(outgoing.frame.image)[::-1])
             height, width = picture.shape
             self._pictures.log(
                 self._image(

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from eitskin.errors import SinkError, UsageError, missing_extra
-from eitskin.sinks.sink import Sink, Told, TouchSource, or_nan, setting
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, or_nan, setting
 
 QUIET = "[log]\nlevel = -2\n"  # no lines of its own but of what goes wrong
 FIELDS = ("id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n")
@@ -37,14 +37,14 @@ class LslSink:
         self._frames = self._outlet(name, ["touches"], FIELDS, "float32")
         self._drives: Any = None
 
-    def write(self, told: Told) -> None:
-        if told.frame is not None:
-            self._push(self._frames, [], told.message["touches"] or [], FIELDS)
-        elif told.report is not None:
+    def write(self, outgoing: OutgoingMessage) -> None:
+        if outgoing.frame is not None:
+            self._push(self._frames, [], outgoing.message["touches"] or [], FIELDS)
+        elif outgoing.report is not None:
             if self._drives is None:
                 name, first = f"{self._name}-drives", ["time_s", "touches"]
                 self._drives = self._outlet(name, first, MOVING, "double64")
-            message = told.message
+            message = outgoing.message
             self._push(self._drives, [message["time_s"]], message["touches"], MOVING)
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 from eitskin.errors import missing_extra
 from eitskin.sinks import ros2
 from eitskin.sinks.csv_file import new_file
-from eitskin.sinks.sink import Sink, Told, TouchSource
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource
 
 CHUNK_BYTES, REPORTS_BYTES, IMAGES_BYTES = 1 << 14, 1 << 16, 1 << 18  # touches alone, with these
 FRAME_ID = "skin"
@@ -26,26 +26,28 @@ class McapSink:
         self._types: dict[str, Any] = {}
         self._status: Any = None
 
-    def write(self, told: Told) -> None:
-        message = told.message
+    def write(self, outgoing: OutgoingMessage) -> None:
+        message = outgoing.message
         if message["type"] == "summary":
             return
         if self._writer is None:
-            images = told.frame is not None and told.frame.image is not None
-            self._begin(IMAGES_BYTES if images else REPORTS_BYTES if told.report else CHUNK_BYTES)
-        now = told.time_ns
-        if told.report is not None:
+            images = outgoing.frame is not None and outgoing.frame.image is not None
+            self._begin(
+                IMAGES_BYTES if images else REPORTS_BYTES if outgoing.report else CHUNK_BYTES
+            )
+        now = outgoing.time_ns
+        if outgoing.report is not None:
             table = ros2.report(message, now, FRAME_ID)
             self._put("/reports", "eitskin_msgs/msg/Report", table, now)
             return
-        if told.frame is not None:
+        if outgoing.frame is not None:
             table = ros2.touch_array(message, now, FRAME_ID)
             self._put("/touches", "eitskin_msgs/msg/TouchArray", table, now)
-            if told.frame.image is not None and self._source.model is not None:
-                table = ros2.image(self._source.model.grid, told.frame.image, now, FRAME_ID)
+            if outgoing.frame.image is not None and self._source.model is not None:
+                table = ros2.image(self._source.model.grid, outgoing.frame.image, now, FRAME_ID)
                 self._put("/image", "sensor_msgs/msg/Image", table, now)
         table = ros2.diagnostics(message, now, FRAME_ID, self._source.board)
-        if table["status"] != self._status or told.notice is not None:
+        if table["status"] != self._status or outgoing.notice is not None:
             self._put("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", table, now)
             self._status = table["status"]
         self._stream.sync_now_and_then()

@@ -8,8 +8,8 @@ from urllib.parse import unquote
 from eitskin.errors import SinkError, missing_extra
 from eitskin.sinks.sink import (
     Dropped,
+    OutgoingMessage,
     Sink,
-    Told,
     TouchSource,
     address,
     nothing_more,
@@ -30,10 +30,12 @@ class MqttSink:
         self._client, self._topic = client, topic
         self._last: Any = None
 
-    def write(self, told: Told) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         if not self._client.is_connected() or not self._sent():
             raise Dropped
-        self._last = self._client.publish(f"{self._topic}/{told.message['type']}", told.text)
+        self._last = self._client.publish(
+            f"{self._topic}/{outgoing.message['type']}", outgoing.text
+        )
         if not self._sent():
             raise Dropped
 

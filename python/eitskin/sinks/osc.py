@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from eitskin.errors import missing_extra
-from eitskin.sinks.sink import Sink, Told, TouchSource, address, nothing_more
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 from eitskin.sinks.udp import connected, send
 
 USAGE = "osc://HOST:PORT or osc://HOST:PORT/prefix"
@@ -42,8 +42,10 @@ class OscSink:
     def __init__(self, target: Any, prefix: str) -> None:
         self._socket, self._prefix = target, prefix
 
-    def write(self, told: Told) -> None:
-        messages = [(self._prefix + path, values) for path, values in osc_messages(told.message)]
+    def write(self, outgoing: OutgoingMessage) -> None:
+        messages = [
+            (self._prefix + path, values) for path, values in osc_messages(outgoing.message)
+        ]
         if messages:
             send(self._socket, bundle(messages))
 
@@ -71,8 +73,10 @@ def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
         known = [t["strength_s_per_m_mm2"], t["force_n"], t["confidence"]]
         listed.append(("/touch", place + known))
     for event in message["events"]:
-        told = [event[name] for name in ("kind", "x_mm", "y_mm", "direction_deg", "value", "zone")]
-        listed.append(("/event", told + event["touch_ids"]))
+        values = [
+            event[name] for name in ("kind", "x_mm", "y_mm", "direction_deg", "value", "zone")
+        ]
+        listed.append(("/event", values + event["touch_ids"]))
     return listed
 
 

@@ -5,15 +5,17 @@ gone drops and counts, and holds up nobody.
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from eitskin.config import nearest
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame, Notice, Report
-from eitskin.live.message import summary_message
-from eitskin.sinks.sink import Dropped, Sink, Told, TouchSource, without_password
+from eitskin.session.frame import Message
+from eitskin.session.message import summary_message
+from eitskin.session.session import Session
+from eitskin.sinks.sink import Dropped, OutgoingMessage, Sink, TouchSource, without_password
 
 ENTRY_POINT_GROUP = "eitskin.sinks"
 ROOM = 64  # frames: more than a second
@@ -80,17 +82,17 @@ class Outputs:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def put(self, item: Frame | Report | Notice) -> None:
-        told = Told(item)
+    def put(self, item: Message) -> None:
+        outgoing = OutgoingMessage(item)
         for one in self._queues:
-            one.put(told, self._patience_s)
+            one.put(outgoing, self._patience_s)
 
     def end(self, facts: dict[str, Any]) -> list[dict[str, Any]]:
         """Give ``facts``, the summary, to every sink, close them all, and return their counts."""
         if self._queues:
-            told = Told(summary_message(facts))
+            outgoing = OutgoingMessage(summary_message(facts))
             for one in self._queues:
-                one.put(told, self._patience_s)
+                one.put(outgoing, self._patience_s)
         self.close()
         return self.counts
 
@@ -118,13 +120,31 @@ class Outputs:
         ]
 
 
+@contextmanager
+def attached_outputs(
+    session: Session,
+    urls: Sequence[str],
+    *,
+    overwrite: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+) -> Iterator[Outputs]:
+    """The sinks of ``urls``, which get every message of the open ``session``. Raises as
+    ``Outputs``."""
+    model = None if session.known is None else session.known.model
+    board = session.device.board.board
+    source = TouchSource(session.device.transport.url, board, model, overwrite)
+    with Outputs(urls, source, patient=session.patient, say=say) as outputs:
+        session.consumers.append(outputs.put)
+        yield outputs
+
+
 class Queue:
     """A sink's queue and thread."""
 
     def __init__(self, url: str, sink: Sink, say: Callable[[str], None], room: int) -> None:
         self._url, self._sink = without_password(url), sink
         self._say, self._room = say, room
-        self._waiting: deque[Told] = deque()
+        self._waiting: deque[OutgoingMessage] = deque()
         self._reports = 0  # of those
         self._changed = threading.Condition()
         self._ending = self._slow = False
@@ -133,10 +153,10 @@ class Queue:
         self._thread = threading.Thread(target=self._run, name=f"eitskin {self._url}", daemon=True)
         self._thread.start()
 
-    def put(self, told: Told, patience_s: float) -> None:
+    def put(self, outgoing: OutgoingMessage, patience_s: float) -> None:
         """Queue it, or where there is no room, not within the patience either, drop and count it; a
         sink that took nothing through all of that is not waited for again until it does."""
-        is_report = told.report is not None
+        is_report = outgoing.report is not None
 
         def room() -> bool:
             if is_report:
@@ -149,7 +169,7 @@ class Queue:
             if self._ending or not room():
                 self._dropped += 1
                 return
-            self._waiting.append(told)
+            self._waiting.append(outgoing)
             self._reports += is_report
             self._changed.notify_all()
 
@@ -183,12 +203,12 @@ class Queue:
                 self._changed.wait_for(lambda: self._waiting or self._ending)
                 if not self._waiting:
                     break
-                told = self._waiting.popleft()
-                self._reports -= told.report is not None
+                outgoing = self._waiting.popleft()
+                self._reports -= outgoing.report is not None
                 self._slow = False
                 self._changed.notify_all()
             try:
-                self._sink.write(told)
+                self._sink.write(outgoing)
                 self._sent += 1
             except Dropped:
                 self._dropped += 1

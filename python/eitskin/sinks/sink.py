@@ -8,17 +8,17 @@ from typing import Any, Protocol
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame, Notice, Report
-from eitskin.live.message import encoded
 from eitskin.model.model import Model
+from eitskin.session.frame import DriveReport, Frame, Message, Notice
+from eitskin.session.message import encoded
 
 Box = tuple[float, float, float, float]
 THIS_MACHINE = "127.0.0.1"
 
 
 class Dropped(Exception):
-    """A sink could not take this one for now, such as while its broker is away. It is counted, and
-    nothing is said."""
+    """A sink could not take this one for now, such as while its broker is away. It is counted
+    without a line for the user."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,13 @@ class TouchSource:
         return None if self.model is None else self.model.skin.outline.bounding_box_mm
 
 
-class Told:
+class OutgoingMessage:
     """A frame, touches after a drive, a notice, or the ``summary`` message that ends it all, on its
     way to sinks. What they share is made once, by the first that asks for it."""
 
-    def __init__(self, item: Frame | Report | Notice | dict[str, Any]) -> None:
+    def __init__(self, item: Message | dict[str, Any]) -> None:
         self.frame = item if isinstance(item, Frame) else None
-        self.report = item if isinstance(item, Report) else None
+        self.report = item if isinstance(item, DriveReport) else None
         self.notice = item if isinstance(item, Notice) else None
         self._item = item
 
@@ -71,7 +71,7 @@ class Sink(Protocol):
     EitskinError of one line where the sink cannot be opened.
     """
 
-    def write(self, told: Told) -> None:
+    def write(self, outgoing: OutgoingMessage) -> None:
         """Send it; may take its time. Raises Dropped, or whatever went wrong, which is counted."""
 
     def close(self) -> None:

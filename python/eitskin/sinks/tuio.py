@@ -12,7 +12,7 @@ from typing import Any
 
 from eitskin.errors import SinkError
 from eitskin.sinks.osc import bundle, need_osc
-from eitskin.sinks.sink import Box, Sink, Told, TouchSource, address, nothing_more
+from eitskin.sinks.sink import Box, OutgoingMessage, Sink, TouchSource, address, nothing_more
 from eitskin.sinks.udp import connected, send
 
 USAGE = "tuio://HOST or tuio://HOST:PORT"
@@ -75,8 +75,8 @@ class TuioSink:
         self._socket, self._cursors, self._time_s = target, cursors, 0.0
         self._reported: int | None = None  # the frame of the last report
 
-    def write(self, told: Told) -> None:
-        message = told.message
+    def write(self, outgoing: OutgoingMessage) -> None:
+        message = outgoing.message
         if message["type"] == "notice":
             return
         touches = message.get("touches") or []

@@ -3,7 +3,7 @@
 import socket
 
 from eitskin.errors import SinkError
-from eitskin.sinks.sink import Sink, Told, TouchSource, address, nothing_more
+from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "udp://HOST:PORT"
 
@@ -14,8 +14,8 @@ class UdpSink:
     def __init__(self, target: socket.socket) -> None:
         self._socket = target
 
-    def write(self, told: Told) -> None:
-        send(self._socket, told.text.encode())
+    def write(self, outgoing: OutgoingMessage) -> None:
+        send(self._socket, outgoing.text.encode())
 
     def close(self) -> None:
         self._socket.close()

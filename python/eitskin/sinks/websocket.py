@@ -13,7 +13,7 @@ from concurrent import futures
 from typing import Any
 
 from eitskin.errors import SinkError, missing_extra
-from eitskin.sinks.sink import Dropped, Sink, Told, TouchSource, address, nothing_more
+from eitskin.sinks.sink import Dropped, OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "ws://127.0.0.1:PORT, where clients connect"
 FULL_BYTES = 1 << 20  # unsent of a client: it is left out until it has read
@@ -47,8 +47,8 @@ class WebSocketSink:
             self._stop()
             raise
 
-    def write(self, told: Told) -> None:
-        if not self._call(self._send(told.text)):
+    def write(self, outgoing: OutgoingMessage) -> None:
+        if not self._call(self._send(outgoing.text)):
             raise Dropped
 
     def close(self) -> None:

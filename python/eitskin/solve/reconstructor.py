@@ -84,18 +84,9 @@ class Reconstructor:
         """The options in force."""
         return self._options
 
-    def set_options(self, options: Options) -> None:
-        """Replace the options.
-
-        Raises:
-            UsageError: one is out of its range; the old ones stay.
-        """
-        check_options(options)
-        self._engine.set_options(options)
-        self._options = options
-
-    def with_options(self, **changes: Any) -> None:
-        """Change some options by name.
+    def set_options(self, options: Options | None = None, /, **changes: Any) -> None:
+        """Solve with ``options`` (None: those in use) and with ``changes`` to them by name, from
+        now on.
 
         Raises:
             UsageError: one is unknown or out of its range; the old ones stay.
@@ -104,7 +95,10 @@ class Reconstructor:
         for name in changes:
             if name not in known:
                 raise UsageError(f"options: {name!r} is unknown; {nearest(name, known)}")
-        self.set_options(replace(self._options, **changes))
+        wanted = replace(self._options if options is None else options, **changes)
+        check_options(wanted)
+        self._engine.set_options(wanted)
+        self._options = wanted
 
     def check_protocol(self, protocol: Protocol) -> None:
         """Refuse frames that were scanned with another protocol than the model's.

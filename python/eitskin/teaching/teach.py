@@ -141,7 +141,7 @@ def solve_presses(
     strongest touch (the skin's width for none), number of touches, its strength, and the error's
     square in the touch's own covariance (inf where that is not known)."""
     core = Reconstructor(model)
-    core.with_options(**options)
+    core.set_options(**options)
     width = width_of(model)
     out = np.zeros((4, len(presses)))
     for i in range(len(presses)):

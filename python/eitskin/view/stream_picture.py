@@ -1,12 +1,13 @@
 """A board's frames as a picture: one frame at large, or a panel a frame."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from eitskin.model.model import Model
 from eitskin.progress import Progress, silent
-from eitskin.scoring.stream_check import ComparedFrame, spread
+from eitskin.session.frame import Frame
 from eitskin.view.film import MAX_FRAMES, draw_film
 from eitskin.view.panels import draw_frame, draw_panels
 from eitskin.view.pictures import Mark, Panel, found_mark
@@ -20,30 +21,30 @@ class Album:
     last."""
 
     def __init__(self) -> None:
-        self._kept: list[ComparedFrame] = []
+        self._kept: list[Frame] = []
         self._step, self.count = 1, 0  # how many were added
-        self._last: ComparedFrame | None = None
+        self._last: Frame | None = None
 
-    def add(self, seen: ComparedFrame) -> None:
+    def add(self, frame: Frame) -> None:
         if self.count % self._step == 0:
-            self._kept.append(seen)
+            self._kept.append(frame)
             if len(self._kept) >= MAX_KEPT:
                 self._kept, self._step = self._kept[::2], 2 * self._step
         self.count += 1
-        self._last = seen
+        self._last = frame
 
-    def spread(self, most: int = MAX_PANELS) -> list[ComparedFrame]:
+    def spread(self, most: int = MAX_PANELS) -> list[Frame]:
         """At most ``most`` (up to 360), evenly spaced, the first and the last among them."""
         if self._last is None or self._kept[-1] is self._last:
-            return spread(self._kept, most)
-        return spread([*self._kept, self._last], most)
+            return _spread(self._kept, most)
+        return _spread([*self._kept, self._last], most)
 
 
 def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> None:
     """The album as a PNG: circles are true touches, crosses what was found, dashed circles the
     found touches' sizes."""
     frames = album.spread()
-    panels = [_panel(model, seen) for seen in frames]
+    panels = [_panel(model, frame) for frame in frames]
     if len(panels) == 1:
         one = panels[0]
         values = np.zeros(model.grid.n_pixels) if one.values is None else one.values
@@ -64,28 +65,35 @@ def film_stream(
 ) -> None:
     """The album as a film. Raises as ``draw_stream``."""
     frames = album.spread(MAX_FRAMES)
-    times_s = [seen.frame.time_us / 1e6 for seen in frames]
-    draw_film(path, model, [_panel(model, seen) for seen in frames], times_s, progress=progress)
+    times_s = [frame.time_s for frame in frames]
+    draw_film(path, model, [_panel(model, frame) for frame in frames], times_s, progress=progress)
 
 
-def _panel(model: Model, seen: ComparedFrame) -> Panel:
+def _panel(model: Model, frame: Frame) -> Panel:
     return Panel(
-        f"frame {seen.frame.number}, {seen.frame.time_us / 1e6:.2f} s",
-        None if seen.frame.image is None else seen.frame.image.image,
-        _true_marks(model, seen),
-        _found_marks(seen),
+        f"frame {frame.number}, {frame.time_s:.2f} s",
+        frame.image,
+        _true_marks(model, frame),
+        _found_marks(frame),
     )
 
 
-def _true_marks(model: Model, seen: ComparedFrame) -> tuple[Mark, ...]:
+def _true_marks(model: Model, frame: Frame) -> tuple[Mark, ...]:
     conductivity = model.skin.conductivity_s_per_m
     return tuple(
-        Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1) * conductivity) for t in seen.true or ()
+        Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1) * conductivity) for t in frame.true or ()
     )
 
 
-def _found_marks(seen: ComparedFrame) -> tuple[Mark, ...]:
-    if seen.frame.touches is not None:
-        return tuple(map(found_mark, seen.frame.touches.touches))
-    places = seen.found_mm
+def _found_marks(frame: Frame) -> tuple[Mark, ...]:
+    if frame.has_touches:
+        return tuple(map(found_mark, frame.touches))
+    places = frame.places_mm
     return () if places is None else tuple(Mark(float(x), float(y)) for x, y in places)
+
+
+def _spread(frames: Sequence[Frame], most: int) -> list[Frame]:
+    """At most ``most`` of ``frames``, evenly, the first and the last among them."""
+    if len(frames) <= most:
+        return list(frames)
+    return [frames[round(k * (len(frames) - 1) / (most - 1))] for k in range(most)]

@@ -255,20 +255,21 @@ def measure_rate(
         MissingExtraError: the emulator is not installed.
         DeviceError: the board gives no frames.
     """
-    from eitskin.device.live_frames import LiveFrame, follow
     from eitskin.device.open import open_device
-    from eitskin.device.set_up import begin_scene, take_reference
     from eitskin.device.settings import ScanSettings, apply_scan
     from eitskin.device.wire.link_table import Stream
+    from eitskin.session.assemble import read_frames
+    from eitskin.session.frame import Frame
+    from eitskin.session.set_up import begin_scene, take_reference
 
     solved: list[tuple[int, int]] = []
     with open_device(SCENE, model=blob, image=image) as device:
         apply_scan(device, ScanSettings(check_every=check_every))
         take_reference(device, TARE_FRAMES)
         begin_scene(device)
-        for item in follow(device, Stream.TOUCHES, every=1, frames=frames):
-            if isinstance(item, LiveFrame) and item.solved is not None:
-                solved.append((item.time_us, item.solved.solve_us + item.solved.touch_us))
+        for item in read_frames(device, Stream.TOUCHES, every=1, frames=frames):
+            if isinstance(item, Frame) and item.info is not None:
+                solved.append((item.time_us, item.info.solve_us + item.info.touch_us))
         stats, info = device.stats(), device.board
     times, costs = np.array(solved).T
     rate = 1e6 * (len(times) - 1) / float(times[-1] - times[0])

@@ -155,12 +155,12 @@ class _Eye:
         return metrics.disc_mask(self._points, scene.centres_mm(), scene.radii_mm())
 
     def tare(self, quiet_v: FloatArray) -> None:
-        self._solver.with_options(diagnostics=self._all)
+        self._solver.set_options(diagnostics=self._all)
         self._solver.tare(quiet_v)
 
     def look(self, frame_v: FloatArray, blind: bool = False) -> Reconstruction | None:
         """None where the frame is refused."""
-        self._solver.with_options(diagnostics=0 if blind else self._all)
+        self._solver.set_options(diagnostics=0 if blind else self._all)
         self._solver.forget()
         try:
             return self._solver.reconstruct(frame_v)

@@ -20,9 +20,10 @@ from eitskin.arrays import FloatArray
 from eitskin.device.ports import BAUD
 from eitskin.device.wire.codec import Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream
-from eitskin.live.frame import Frame, Report
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.frame import DriveReport, Frame
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
+from eitskin.truth import observe_scene
 from eitskin_studies.benchmarks.outputs import BITS_A_BYTE, host_times_ms
 from eitskin_studies.gestures.bench import wilson
 from eitskin_studies.harness.machine import machine
@@ -237,7 +238,7 @@ def follow(
     settings = SessionSettings(
         mode=Stream.TOUCHES, tare=QUIET_FRAMES, model=model, every=1, report=report
     )
-    with Session(f"{board}:{scene}", settings) as session:
+    with Session(f"{board}:{scene}", settings, observe=observe_scene) as session:
         session.start()
         sizes = [0]  # of the last packet with touches
         teller = PacketType.TOUCHES if report == "frame" else PacketType.FOLLOWED
@@ -247,21 +248,20 @@ def follow(
                 sizes[0] = len(encode(packet.type, packet.sequence, packet.payload))
 
         session.device.record(tap)
-        truth, scan_s = session.truth, 1e-6 * ROWS * session.device.board.slot_us
-        assert truth is not None
+        began_us, scan_s = session.began_us, 1e-6 * ROWS * session.device.board.slot_us
         half_s = scan_s * (ROWS // DRIVES_A_FRAME) / ROWS / 2
-        for item in session.frames():
-            if not isinstance(item, Frame | Report):
+        for item in session.messages():
+            if not isinstance(item, Frame | DriveReport):
                 continue
-            told_us = item.live.board_us
-            if isinstance(item, Report):
+            told_us = item.board_us
+            if isinstance(item, DriveReport):
                 told_us -= round(1e6 * half_s)
-            if truth.began_us is None:  # a simulated board's scene begins with a scan
-                truth.began_us = told_us
-            began_s = 1e-6 * (told_us - (truth.began_us or 0))
+            if began_us is None:  # a simulated board's scene begins with a scan
+                began_us = told_us
+            began_s = 1e-6 * (told_us - began_us)
             link_ms = 1e3 * sizes[0] * BITS_A_BYTE / BAUD
-            if isinstance(item, Report):
-                age_us = item.live.followed.head.age_us
+            if isinstance(item, DriveReport):
+                age_us = item.packet.head.age_us
                 yield Told(
                     began_s, began_s + 2 * half_s, _places(item), (), age_us / 1e3, link_ms, False
                 )
@@ -272,7 +272,7 @@ def follow(
                 yield Told(began_s, ended_s, shown, item.diagnostics, age_ms, link_ms, True)
 
 
-def _places(item: Frame | Report) -> FloatArray:
+def _places(item: Frame | DriveReport) -> FloatArray:
     return np.array([(t.x_mm, t.y_mm) for t in item.touches]).reshape(-1, 2)
 
 

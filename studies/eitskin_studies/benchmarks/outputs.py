@@ -27,11 +27,12 @@ from eitskin.arrays import FloatArray
 from eitskin.device.ports import BAUD
 from eitskin.device.wire.codec import Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream
-from eitskin.live.frame import Frame
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.frame import Frame
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
 from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import TouchSource
+from eitskin.truth import observe_scene
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, Tabular
 
@@ -119,7 +120,9 @@ def _board(place: Path, taps: int, seed: int) -> FloatArray:
     path = place / "taps.toml"
     path.write_text(_scene(ends, ends[-1][1] + 0.2, SCENE_HZ, seed), encoding="utf-8")
     found = []
-    with Session(f"emu:{path}", SessionSettings(mode=Stream.TOUCHES)) as session:
+    with Session(
+        f"emu:{path}", SessionSettings(mode=Stream.TOUCHES), observe=observe_scene
+    ) as session:
         session.start()
         packets: deque[int] = deque(maxlen=1)  # bytes of the last one with touches
 
@@ -130,14 +133,13 @@ def _board(place: Path, taps: int, seed: int) -> FloatArray:
         session.device.record(tap)
         board, waiting = session.device.board, [begin for begin, _ in ends]
         scan_us = board.measured_rows * board.slot_us
-        assert session.truth is not None
-        began_us = session.truth.began_us
+        began_us = session.began_us
         assert began_us is not None
-        for frame in session.frames():
+        for frame in session.messages():
             if not isinstance(frame, Frame) or not frame.touches or not waiting:
                 continue
             contact_us = began_us + 1e6 * waiting[0]
-            ended_us = frame.live.board_us + scan_us
+            ended_us = frame.board_us + scan_us
             assert frame.info is not None
             if ended_us < contact_us:
                 continue
@@ -154,12 +156,12 @@ def host_times_ms(scene: Path) -> FloatArray:
     run_file = scene.with_suffix(".eits")
     settings = SessionSettings(mode=Stream.TOUCHES, record=run_file)
     with Session(f"sim:{scene}", settings) as session:
-        for _ in session.frames():
+        for _ in session.messages():
             pass
     times, last = [], 0
     for _ in range(5):
         with Session(f"file:{run_file}") as session:
-            for number, _ in enumerate(session.frames()):
+            for number, _ in enumerate(session.messages()):
                 now = time.perf_counter_ns()
                 if number:
                     times.append((now - last) / 1e6)
@@ -207,7 +209,7 @@ def _sink(name: str, scene: Path, seconds: float) -> FloatArray:
         assert session.known is not None
         url = f"{name}://127.0.0.1:{ours.recv()}"
         with Outputs([url], TouchSource(session.url, "", session.known.model)) as outputs:
-            for frame in session.frames():
+            for frame in session.messages():
                 if isinstance(frame, Frame):
                     arrived.append(frame.arrived_ns)
                     outputs.put(frame)
@@ -235,7 +237,7 @@ def _load(place: Path, scene: Path, seconds: float) -> Load:
             with Outputs(urls, source) as outputs:
                 early, count, used, start = 0.0, 0, time.process_time(), time.perf_counter()
                 client = _reading(f"ws://127.0.0.1:{port}")
-                for frame in session.frames():
+                for frame in session.messages():
                     outputs.put(frame)
                     count += isinstance(frame, Frame)
                     if count == settings.frames // 10:

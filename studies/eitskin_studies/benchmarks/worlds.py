@@ -40,7 +40,7 @@ def run(settings: Settings, progress: Progress = silent) -> list[WorldScore]:
     """
     model, blob, _ = load_or_prebuilt(settings.model)
     solver = Reconstructor(model, blob=blob)
-    solver.with_options(**option_values(settings.changes))
+    solver.set_options(**option_values(settings.changes))
     factory = WorldFactory(model.skin, model.protocol, settings.cache)
     return score_worlds(
         CoreFinder(solver),

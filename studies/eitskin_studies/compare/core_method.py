@@ -100,7 +100,7 @@ def core_methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     def family(iterations: int, painted: bool) -> Family:
         def make(_: float) -> CoreMethod:
             solver = Reconstructor(model)
-            solver.with_options(iterations=iterations)
+            solver.set_options(iterations=iterations)
             return CoreMethod(solver, painted, threads)
 
         return Family("", (0.0,), make)

@@ -20,11 +20,11 @@ from eitskin.progress import Progress, silent
 from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
 from eitskin.scene.simulate import ELEMENTS, Measurement, Simulated, simulate
 from eitskin.scoring import metrics
-from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import GATE_MM, Matching
 from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
+from eitskin.solve.image_touches import touches_in_image
 from eitskin_studies.compare.families import Family, FindsTouches, Learns, Method, Setup, setup_for
 from eitskin_studies.compare.methods import methods
 from eitskin_studies.harness.summary import Summary, summarise

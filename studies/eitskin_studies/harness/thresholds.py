@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.errors import UsageError
-from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.scoring.metrics import ImageScorer
+from eitskin.solve.image_touches import touches_in_image
 
 THRESHOLDS: tuple[float, ...] = tuple(round(0.02 * k, 2) for k in range(1, 50))
 

@@ -37,7 +37,7 @@ class Built:
     def reconstructor(self, one: Configuration) -> Reconstructor:
         """The C core in float32 with the configuration's settings."""
         solver = Reconstructor(self.model, blob=self.blob)
-        solver.with_options(**one.solver_settings)
+        solver.set_options(**one.solver_settings)
         return solver
 
 

@@ -97,14 +97,14 @@ class CoreFinder:
 
     def look_for(self, sign: str | None) -> None:
         """Changes of ``sign`` from now on; None: as the solver was told at first."""
-        self.solver.with_options(sign=sign or self._own_sign)
+        self.solver.set_options(sign=sign or self._own_sign)
 
     def __call__(
         self, quiet_v: FloatArray, frame_v: FloatArray, step_v: float
     ) -> tuple[Touch, ...]:
         """As ``Finder``; a board tells its step, too (``BoardInfo.noise_floor_v``)."""
         self.diagnostics = ()
-        self.solver.with_options(noise_floor_v=step_v / math.sqrt(12))
+        self.solver.set_options(noise_floor_v=step_v / math.sqrt(12))
         self.solver.tare(quiet_v)
         self.solver.forget()
         result = self.solver.reconstruct(frame_v)

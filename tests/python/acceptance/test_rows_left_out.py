@@ -90,7 +90,7 @@ class LeftOutRows:
         self.scorer: Scorer = scorer_for(model)
         self.points_mm = self.scorer.image_scorer.raster.points_mm
         self.reconstructor = Reconstructor(model, blob=blob)
-        self.reconstructor.with_options(max_masked=len(model.protocol.drive_measure))
+        self.reconstructor.set_options(max_masked=len(model.protocol.drive_measure))
 
     def mask(self, discs: Sequence[Touch | TrueTouch]) -> BoolArray:
         centres, radii = [(t.x_mm, t.y_mm) for t in discs], [t.radius_mm for t in discs]

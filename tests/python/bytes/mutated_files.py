@@ -23,10 +23,10 @@ from test_bytes_models import WHOLE, resealed
 from eitskin.core.engine import CoreEngine
 from eitskin.frames.frames import load_frames
 from eitskin.frames.layout import load_layout
-from eitskin.live.zones import load_zones
 from eitskin.model.eitm import load_model
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import load_scene
+from eitskin.session.zones import load_zones
 from eitskin.skin.drawing import read_drawing
 from eitskin.skin.drawing_shapes import DrawingReading
 from eitskin.skin.protocol import opposite

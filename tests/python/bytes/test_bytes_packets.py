@@ -8,7 +8,7 @@ from bytes_damage import any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
 from hypothesis import strategies as st
 
-from eitskin.device.recordings.recording import frames_of, read_head, recorded_options
+from eitskin.device.recordings.recording import read_head, recorded_options
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.explain import fault_text, quality_text, reply_text
 from eitskin.device.wire.link_table import PacketType
@@ -22,6 +22,7 @@ from eitskin.device.wire.packets import (
     SolvedTouches,
 )
 from eitskin.device.wire.payloads import MalformedPacket, pack, parse
+from eitskin.session.checks.raw_frames import frames_of
 from eitskin.skin.protocol import adjacent
 from made_payloads import build_image, build_raw, build_touches
 

@@ -11,13 +11,14 @@ from board_cases import board_of
 from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
-from eitskin.device.live_frames import LiveFrame, follow
-from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
-from eitskin.device.set_up import take_reference
 from eitskin.device.simulated import SimTransport
 from eitskin.device.wire.link_table import Stream
 from eitskin.model.eitm import decode_model, load_model
+from eitskin.session.assemble import read_frames
+from eitskin.session.checks.host_check import check_recording
+from eitskin.session.frame import Frame
+from eitskin.session.set_up import take_reference
 from fresh_python import words
 from small_models import prebuilt
 
@@ -93,7 +94,7 @@ def test_it_says_what_it_found(folder, done, told):
     done(f"model verify {folder / 'skin.eitm'}")
 
 
-def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
+def recorded(folder: Path, blob: bytes, path: Path) -> list[Frame]:
     """The new presses on a simulated board with this model, recorded to ``path``."""
     board = board_of(folder / "new.toml", blob)
     with Device(SimTransport("test", board)) as device:
@@ -102,8 +103,8 @@ def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
         with Recorder(path, device, options):
             take_reference(device, 16, streamed=True)
             device.start_scene()
-            items = list(follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES))
-    return [item for item in items if isinstance(item, LiveFrame)]
+            items = list(read_frames(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES))
+    return [item for item in items if isinstance(item, Frame)]
 
 
 def test_a_board_with_that_model_sends_the_same_load_bits(folder, tmp_path):
@@ -112,7 +113,7 @@ def test_a_board_with_that_model_sends_the_same_load_bits(folder, tmp_path):
         t.force_n / NEWTONS_PER_GRAM
         for frame in live
         if frame.touches is not None
-        for t in frame.touches.touches
+        for t in frame.touches
     ]
     assert told == pytest.approx([grams for _, grams in NEW], rel=SOME)
     check, _ = check_recording(tmp_path / "run.eits", folder / "skin.eitm")

@@ -137,7 +137,7 @@ def test_python_takes_a_preset(scene, tmp_path):
     with eitskin.open_device(f"file:{run}") as device:
         assert (device.board.samples, device.board.check_every) == (20, 0)
     skin = eitskin.Reconstructor(eitskin.load_model())
-    skin.with_options(**eitskin.preset("accurate"))
+    skin.set_options(**eitskin.preset("accurate"))
     assert skin.options.iterations > eitskin.load_model().defaults.iterations
     for wrong in ({"preset": "quick"}, {"preset": "fast", "iterations": 5}):
         with pytest.raises(UsageError, match="preset"):

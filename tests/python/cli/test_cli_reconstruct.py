@@ -84,7 +84,7 @@ def test_what_is_found_is_said(done, frames_file, tmp_path, capsys):
 def test_what_it_says_is_what_the_reconstructor_does(told, frames_file):
     facts = told(f"reconstruct {frames_file} --iterations 25 --sign both")
     reconstructor = Reconstructor(*prebuilt()[:1], blob=prebuilt()[1])
-    reconstructor.with_options(iterations=25, sign="both")
+    reconstructor.set_options(iterations=25, sign="both")
     reconstructor.tare(session().quiet_v)
     for number in (0, 7, 19):
         reconstructor.forget()

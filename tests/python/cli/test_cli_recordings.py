@@ -123,7 +123,7 @@ def test_the_hosts_images_are_the_boards(done, told, run):
     assert found == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
     facts = told(f"replay {run} --check")
     assert facts["same_bits"] and facts["solver_noted"]
-    assert (facts["same"], facts["untold"]) == (FRAMES, 0)
+    assert (facts["same"], facts["inconclusive"]) == (FRAMES, 0)
 
 
 @pytest.mark.parametrize(
@@ -173,8 +173,8 @@ def test_frames_after_a_loss_are_not_called_different(how, same, done, told, sce
     done(f"record --device sim:{scene} -o {run}", how)
     facts = told(f"replay {lost(run, tmp_path / 'other.eits')} --check")
     assert facts["different"] == [] and facts["alone"] == 1
-    assert facts["same"] + facts["untold"] == FRAMES - 1
-    assert same in (None, facts["same"]) and (facts["untold"] > 0) == (how != "--no-track")
+    assert facts["same"] + facts["inconclusive"] == FRAMES - 1
+    assert same in (None, facts["same"]) and (facts["inconclusive"] > 0) == (how != "--no-track")
 
 
 def test_an_image_after_a_loss_is_judged_all_the_same(run, tmp_path, ran):

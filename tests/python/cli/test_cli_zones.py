@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from eitskin.errors import EitskinError
-from eitskin.live.zones import load_zones, refuse_off_skin
 from eitskin.public import stream
+from eitskin.session.zones import load_zones, refuse_off_skin
 from small_models import prebuilt
 
 PAD = '[[pad]]\nname = "{}"\nx_mm = {}\ny_mm = 0\nradius_mm = {}\n'

@@ -43,7 +43,16 @@ OWNERS = {
     "columns": {"context"},
     "options": set(),
 }
-FIRMWARE = {"hal": set(), "drivers": {"hal", "drivers"}, "app": {"hal", "drivers", "app"}}
+# the firmware's folders, and those that each may include; `app` itself wires its modules
+BELOW = {"hal", "drivers", "app/clock.h"}
+FIRMWARE = {
+    "hal": set(),
+    "drivers": {"hal", "drivers"},
+    "app/safety": BELOW | {"app/safety"},
+    "app/acquire": BELOW | {"app/safety", "app/acquire"},
+    "app/solve": BELOW | {"app/safety", "app/acquire", "app/solve"},
+    "app/link": BELOW | {"app/safety", "app/acquire", "app/solve", "app/link"},
+}
 MOST_FILES = 12
 SOURCES = sorted((CSRC / "src").rglob("*.[ch]"))
 
@@ -86,7 +95,7 @@ def test_a_file_keeps_to_its_room(path):
     ("folder", "read"),
     [
         (CSRC / "src", ("frame/fold", "context/context")),
-        (ROOT / "firmware", ("app/main_loop", "app/link/commands")),
+        (ROOT / "firmware", ("app/instrument", "app/link/stream")),
     ],
     ids=["core", "firmware"],
 )
@@ -137,11 +146,30 @@ def test_a_circle_of_calls_is_found():
         TopologicalSorter(edges).prepare()
 
 
-@pytest.mark.parametrize(("room", "below"), FIRMWARE.items())
-def test_the_firmwares_rooms_know_those_below(room, below):
-    for path in sorted((ROOT / "firmware" / room).rglob("*.[ch]")):
-        text = path.read_text(encoding="ascii")
-        assert {name.split("/")[0] for name in includes(text)} <= below, path.name
+@pytest.mark.parametrize(("folder", "below"), FIRMWARE.items())
+def test_the_firmwares_folders_include_only_those_below(folder, below):
+    paths = sorted((ROOT / "firmware" / folder).rglob("*.[ch]"))
+    assert paths
+    for path in paths:
+        for name in includes(path.read_text(encoding="ascii")):
+            assert {name, name.rpartition("/")[0]} & below, f"{path.name}: {name}"
+
+
+def test_the_firmwares_modules_hide_their_state():
+    """The fields of a module are defined in its state.h. Other modules do not include it, so that
+    the compiler lets them only call functions."""
+    app = ROOT / "firmware" / "app"
+    modules = [folder.removeprefix("app/") for folder in FIRMWARE if folder.startswith("app/")]
+    assert {path.name for path in app.iterdir() if path.is_dir()} == set(modules)
+    for path in sorted(app.rglob("*.[ch]")):
+        shown = {name for name in includes(path.read_text(encoding="ascii")) if "state.h" in name}
+        if path.name == "instrument.h":
+            assert shown == {f"app/{module}/state.h" for module in modules}
+        else:
+            assert shown <= {f"app/{path.parent.name}/state.h"}, path.name
+    for module in modules:
+        state = (app / module / "state.h").read_text(encoding="ascii")
+        assert len(re.findall(r"^struct fw_\w+ {", state, re.M)) == 1
 
 
 def test_rooms_are_small():

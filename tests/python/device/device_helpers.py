@@ -11,6 +11,7 @@ from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.ports import Port
 from eitskin.device.simulated import SimBoard, SimTransport
+from eitskin.device.transport import Capabilities, Transport
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.link_table import GetStats, PacketType, Stream
 from eitskin.device.wire.packets import BoardInfo, BoardStats, RawFrame
@@ -77,7 +78,7 @@ def st_link(path: str, serial: str = "SERIAL1") -> Port:
     return Port(path, "STM32 STLink", 0x0483, 0x374B, serial)
 
 
-class Damaging:
+class Damaging(Transport):
     """A transport that puts every piece of bytes through ``there`` (to the board) or ``back`` (from
     it)."""
 
@@ -86,10 +87,13 @@ class Damaging:
     ) -> None:
         self._inner, self._there, self._back = inner, there, back
         self.url = self.name = inner.name
-        self.synchronous, self.replays = True, False
 
     @property
-    def ended(self) -> bool:
+    def capabilities(self) -> Capabilities:
+        return Capabilities(own_clock=True)
+
+    @property
+    def ended(self) -> bool:  # type: ignore[override]
         return self._inner.ended
 
     def read(self, timeout_s: float) -> bytes:
@@ -101,8 +105,8 @@ class Damaging:
     def reopen(self) -> bool:
         return True
 
-    def begin_scene(self) -> None:
-        self._inner.begin_scene()
+    def begin_scene(self) -> int | None:
+        return self._inner.begin_scene()
 
     def close(self) -> None:
         self._inner.close()

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from device_helpers import board_info
 
-from eitskin.device.diagnose_board import MeasuredBoard, board_findings
 from eitskin.device.known_model import KnownModel, find_model, need_model, scanned_protocol
-from eitskin.device.live_frames import LiveFrame
-from eitskin.device.recordings.raw_frames import RawRun, as_frames, finite_only, gather
 from eitskin.device.wire.link_table import FaultCode, Quality
 from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame
 from eitskin.errors import DeviceError, FrameError
 from eitskin.frames.doctor.examine import examine
 from eitskin.frames.doctor.subject import subject_from_frames
+from eitskin.session.checks.diagnose_board import MeasuredBoard, board_findings
+from eitskin.session.checks.raw_frames import RawRun, as_frames, finite_only, gather
+from eitskin.session.frame import Frame
 from eitskin.skin.protocol import adjacent, opposite, skip
 from small_models import prebuilt, session
 
@@ -104,6 +104,6 @@ def test_of_two_tares_the_last_counts():
     marked = (
         replace(raw, flags=int(quiet)) for raw, quiet in zip(raw_frames(), order, strict=False)
     )
-    run = gather(LiveFrame(raw.frame, 0, 0, raw=raw) for raw in marked)
+    run = gather(Frame(raw.frame, 0, 0, raw=raw) for raw in marked)
     assert [raw.frame for raw in run.quiet] == [4] and [raw.frame for raw in run.frames] == [5]
     assert run.left_out == 4

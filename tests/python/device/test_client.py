@@ -23,8 +23,8 @@ from device_helpers import (
 
 from eitskin.device.check import check_board, check_model, host_major
 from eitskin.device.client import Device, _asked_millihz
-from eitskin.device.link import LinkEvent
 from eitskin.device.simulated import SimTransport
+from eitskin.device.transport import Capabilities, LinkEvent, Transport
 from eitskin.device.wire.codec import encode
 from eitskin.device.wire.link_table import PacketType, Stream
 from eitskin.device.wire.packets import RawFrame, SolvedTouches
@@ -130,13 +130,11 @@ def test_a_restart_loses_the_reference_and_says_so():
                 board.restart()
 
 
-class Scripted:
+class Scripted(Transport):
     """A port that says what it is told to; ``answers`` turns what is written into what is read."""
 
     url = name = "serial:/dev/scripted"
-    synchronous = True
-    replays = ended = False
-    baud = 115200
+    capabilities = Capabilities(own_clock=True, baud=115200)
 
     def __init__(self, *pieces: bytes) -> None:
         self.pieces = list(pieces)
@@ -150,9 +148,6 @@ class Scripted:
 
     def reopen(self) -> bool:
         return False
-
-    def begin_scene(self) -> None:
-        pass
 
     def close(self) -> None:
         self.closed = True

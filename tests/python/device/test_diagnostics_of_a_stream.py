@@ -12,19 +12,20 @@ from device_helpers import QUIET, Damaging, empty_bank, of, same, scene, sim_dev
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
-from eitskin.device.events import Events
 from eitskin.device.known_model import board_options
-from eitskin.device.live_frames import LiveFrame, follow
 from eitskin.device.open import open_device
-from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
-from eitskin.device.set_up import take_reference
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FaultCode, PacketType, Stream
 from eitskin.device.wire.packets import Fault, Solved, SolvedTouches
 from eitskin.errors import DeviceError
 from eitskin.scene.board_frames import BoardFrames
+from eitskin.session.assemble import read_frames
+from eitskin.session.checks.host_check import check_recording
+from eitskin.session.frame import Frame
+from eitskin.session.notices import Novelty, notice_of
+from eitskin.session.set_up import take_reference
 from small_models import prebuilt
 
 OPEN_AT = Solved.LAYOUT.size - 24  # of the open electrodes in a head
@@ -106,8 +107,8 @@ def test_the_check_finds_what_the_board_found(tmp_path):
         with Recorder(path, device, options):
             take_reference(device, QUIET, streamed=True)
             device.start_scene()
-            live = of(LiveFrame, follow(device, ALL))
-    assert (OFF,) in {frame.solved.open_electrodes for frame in live if frame.solved is not None}
+            live = of(Frame, read_frames(device, ALL))
+    assert (OFF,) in {frame.info.open_electrodes for frame in live if frame.info is not None}
     check, noted = check_recording(path, None)
     assert noted and (check.same, check.different) == (FRAMES, [])
 
@@ -127,7 +128,7 @@ def test_the_check_tells_findings_apart(tmp_path):
         device.solver(board_options(prebuilt()[0]))
         take_reference(device, QUIET, streamed=True)
         device.start_scene()
-        list(follow(device, ALL))
+        list(read_frames(device, ALL))
     check, _ = check_recording(path, None)
     assert len(check.different) == UNTIL_FRAME - FROM_FRAME
 
@@ -148,11 +149,11 @@ def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path):
 # ---- lines ----
 
 
-def solved(frame: int, **found: object) -> LiveFrame:
+def solved(frame: int, **found: object) -> Frame:
     head = Solved(
         frame, 0, 0, 0, 0, 0, 0, "gap", 0, 1, 1, 1, 1, 0.1, 0.2, 0.0, 0.0, 0.0, 1.0, **found
     )
-    return LiveFrame(frame, 0, 0, touches=SolvedTouches(head, ()))
+    return Frame(frame, 0, 0, has_touches=True, info=head)
 
 
 def bits(*names: str) -> int:
@@ -160,7 +161,7 @@ def bits(*names: str) -> int:
 
 
 def test_what_only_heads_tell_is_said_once_and_when_it_is_over():
-    events, nearly = Events(), FAULT_CLEAR_FRAMES - 1
+    events, nearly = Novelty(), FAULT_CLEAR_FRAMES - 1
     outlier = {"diagnostics": bits("outlier"), "outliers": 1}
     assert events.lines(solved(1)) == []
     assert events.lines(solved(2, **outlier)) == ["1 row left out as an outlier, frame 2"]
@@ -172,7 +173,7 @@ def test_what_only_heads_tell_is_said_once_and_when_it_is_over():
 
 
 def test_what_fault_and_head_tell_is_said_once():
-    events, opened = Events(), {"diagnostics": bits("electrode open")}
+    events, opened = Novelty(), {"diagnostics": bits("electrode open")}
     rise = Fault(FaultCode.ELECTRODE_OPEN, True, 41, 5, 0)
     over = Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)
     what_to_do = "it makes no contact; wet or press it, then tare"
@@ -185,11 +186,11 @@ def test_what_fault_and_head_tell_is_said_once():
         (over, ["electrode 5 open: over, frame 53"]),
         (over, []),
     ):
-        assert events.lines(told) == said
+        assert events.lines(told if isinstance(told, Frame) else notice_of(told)) == said
 
 
 def test_a_bridged_pair_is_said_once():
-    events, both = Events(), (0xC0, 0, 0, 0, 0)
+    events, both = Novelty(), (0xC0, 0, 0, 0, 0)
     what_to_do = "water, paste or a wire joins them; dry or part them"
     pair = {"diagnostics": bits("electrodes bridged"), "bridged_electrodes": (6, 7)}
     for told, said in (
@@ -200,11 +201,11 @@ def test_a_bridged_pair_is_said_once():
         (Fault(FaultCode.BRIDGED, False, 11, 6, 0), ["electrode 6 bridged: over, frame 11"]),
         (Fault(FaultCode.BRIDGED, False, 11, 7, 0), ["electrode 7 bridged: over, frame 11"]),
     ):  # fmt: skip
-        assert events.lines(told) == said
+        assert events.lines(told if isinstance(told, Frame) else notice_of(told)) == said
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts():
-    events, off = Events(), {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125}
+    events, off = Novelty(), {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125}
     frames = ((k, off if k in (2, 3, 7, 8, 9, 10) else {}) for k in range(1, 12))
     told = [events.lines(solved(frame, **found)) for frame, found in frames]
     assert told == [[]] * 8 + [["model mismatch 12.5 %, frame 9"], [], []]

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.settings import ScanSettings
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.link_table import FollowedHead, FollowedTouch, PacketType, Stream
 from eitskin.device.wire.payloads import MalformedPacket, pack, parse
 from eitskin.errors import DeviceError
-from eitskin.live.frame import Frame, Report
-from eitskin.live.message import schema
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.checks.host_check import check_recording
+from eitskin.session.frame import DriveReport, Frame
+from eitskin.session.message import schema
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
+from eitskin.truth import observe_scene
 
 DRIVE_S, SCAN_S = 1.3e-3, 20.8e-3
 CONTACT_S, MOVES_S, STOPS_S = 0.0527, 0.1, 0.2
@@ -52,8 +53,8 @@ def scene(tmp_path_factory) -> Path:
 
 
 def followed(url: str, settings: SessionSettings) -> list[Any]:
-    with Session(url, settings) as session:
-        return [item for item in session.frames() if isinstance(item, Frame | Report)]
+    with Session(url, settings, observe=observe_scene) as session:
+        return [item for item in session.messages() if isinstance(item, Frame | DriveReport)]
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +64,7 @@ def recorded(scene) -> tuple[Path, list[Any]]:
 
 
 def test_they_are_told_soon_where_they_are_and_how_fast(recorded):
-    reports = [item for item in recorded[1] if isinstance(item, Report)]
+    reports = [item for item in recorded[1] if isinstance(item, DriveReport)]
     begun = reports[0].time_s - DRIVE_S / 2  # the scene's time 0
     told = [(one.time_s - begun, one.touches) for one in reports if one.touches]
     assert reports[0].touches == () and 0 < told[0][0] - CONTACT_S < 6 * DRIVE_S
@@ -84,7 +85,7 @@ def test_their_messages_keep_to_the_schema(recorded):
     validator = Draft202012Validator(schema())
     for item in recorded[1]:
         validator.validate(item.message())
-    report = next(item for item in recorded[1] if isinstance(item, Report) and item.touches)
+    report = next(item for item in recorded[1] if isinstance(item, DriveReport) and item.touches)
     broken = report.message() | {"touches": [{"id": 1}]}
     assert not validator.is_valid(broken)
 
@@ -94,15 +95,15 @@ def test_a_recording_gives_them_again_to_the_bit(recorded):
     again = followed(f"file:{path}", replace(SETTINGS, tare=None))
 
     def numbers(found: list[Any]) -> list[Any]:
-        return [(one.live.followed.touches, one.live.board_us) for one in found
-                if isinstance(one, Report)]  # fmt: skip
+        return [(one.touches, one.board_us) for one in found
+                if isinstance(one, DriveReport)]  # fmt: skip
 
     assert numbers(again) == numbers(items)
     frames = sum(isinstance(item, Frame) for item in items)
     check, _ = check_recording(path, None)
     assert check.as_dict()["same_bits"] and check.drives == 16 * frames
     without = followed(f"file:{path}", replace(SETTINGS, tare=None, report="frame"))
-    assert not any(isinstance(item, Report) for item in without) and len(without) == frames
+    assert not any(isinstance(item, DriveReport) for item in without) and len(without) == frames
 
 
 def test_another_bit_is_noticed(recorded, tmp_path):

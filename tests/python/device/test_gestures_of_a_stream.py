@@ -9,22 +9,23 @@ import pytest
 from eitskin.core.gestures import Gestures, Zone
 from eitskin.core.gestures_table import EventKind
 from eitskin.device.client import Device
-from eitskin.device.live_frames import follow
-from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import FileTransport
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.assemble import read_frames
+from eitskin.session.checks.host_check import check_recording
+from eitskin.session.frame import Frame
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
+from eitskin.truth import observe_scene
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "python"
 
 
 def frames_of(url: str, mode: Stream, record: Path | None = None, **more: object) -> list[Frame]:
     settings = SessionSettings(mode=mode, record=record, **more)
-    with Session(url, settings) as session:
-        return [item for item in session.frames() if isinstance(item, Frame)]
+    with Session(url, settings, observe=observe_scene) as session:
+        return [item for item in session.messages() if isinstance(item, Frame)]
 
 
 def told(frames: list[Frame]) -> list[str]:
@@ -59,11 +60,11 @@ def test_the_boards_events_are_the_hosts_and_a_recording_keeps_them(tmp_path):
     live = frames_of("sim:double_tap", everything, record=path)
     here = frames_of("sim:double_tap", Stream.TOUCHES)
     assert told(live) == told(here) == ["tap", "double-tap"]
-    sent = [frame.live.events.events for frame in live if frame.live.events is not None]
+    sent = [frame.board_events for frame in live if frame.board_events is not None]
     assert sent == [frame.events for frame in here]
     with Device(FileTransport(path)) as device:
-        replayed = [item for item in follow(device, Stream.EVENTS) if getattr(item, "events", None)]
-    assert [item.events.events for item in replayed] == sent
+        replayed = [item for item in read_frames(device, Stream.EVENTS) if isinstance(item, Frame)]
+    assert [item.board_events for item in replayed] == sent
     check, _ = check_recording(path, None)
     assert not check.different and check.events == sum(map(len, sent)) > 4
 

@@ -10,9 +10,9 @@ from eitskin.device.client import Device
 from eitskin.device.open import open_device, open_with_files
 from eitskin.device.wire.link_table import LIMIT_KEPT, Drive, Setting, Settings
 from eitskin.errors import DeviceError
-from eitskin.live.session import KEPT_ON, Session
-from eitskin.live.settings import SessionSettings
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.session.session import KEPT_ON, Session
+from eitskin.session.settings import SessionSettings
 
 
 def test_a_locked_board_wants_its_button():
@@ -66,7 +66,7 @@ def test_whoever_follows_a_board_hears_that_current_flows_on(
 
     for opening, told in ((open_with_files, []), (opened, [KEPT_ON])):
         said: list[str] = []
-        monkeypatch.setattr("eitskin.live.session.open_with_files", opening)
+        monkeypatch.setattr("eitskin.session.session.open_with_files", opening)
         with Session("sim:two_touch", SessionSettings(frames=1), say=said.append) as session:
             session.start()
         assert said == told

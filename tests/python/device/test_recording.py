@@ -19,13 +19,14 @@ from device_helpers import FRAMES, QUIET, Damaging, same, sim_board, sim_device
 from eitskin.device.client import Device
 from eitskin.device.open import open_device
 from eitskin.device.recordings import new_file
-from eitskin.device.recordings.recording import FileTransport, Recorder, frames_of, read_head
+from eitskin.device.recordings.recording import FileTransport, Recorder, read_head
 from eitskin.device.simulated import SimTransport
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import PacketType, Stream, StreamCommand
 from eitskin.device.wire.packets import RawFrame, SolvedTouches
 from eitskin.errors import DeviceError, FileError, FrameError
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.session.checks.raw_frames import frames_of
 from small_models import prebuilt, tiny_blob
 
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
@@ -78,7 +79,7 @@ def test_the_head_says_where_it_comes_from(tmp_path):
     for noted in (None, 7, {}, {"model": "0x" + "1" * 62, "firmware": [1]}):
         head = json.dumps({"format": "eits", "version": 1, "sha256": noted}).encode()
         (tmp_path / "odd.eits").write_bytes(encode(PacketType.RECORDING, 0, head))
-        found = FileTransport(tmp_path / "odd.eits").hashes.as_dict()
+        found = FileTransport(tmp_path / "odd.eits").known_hashes.as_dict()
         assert found == {"model": None, "firmware": None}
     assert (tmp_path / "run.eits").read_bytes()[0] == 0
 

@@ -12,14 +12,15 @@ from device_helpers import board_info
 
 from eitskin.device import bandwidth, check, known_model
 from eitskin.device.client import check_tare_frames
-from eitskin.device.events import Events
-from eitskin.device.link import LinkEvent
-from eitskin.device.live_frames import LiveFrame, LiveSummary
-from eitskin.device.sample import Sample
 from eitskin.device.settings import ScanSettings, SolverSettings
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire import explain, link_table
 from eitskin.device.wire import packets as pk
 from eitskin.device.wire.payloads import MalformedPacket, parse
+from eitskin.session.frame import Frame
+from eitskin.session.notices import Novelty, notice_of
+from eitskin.session.sample import Sample
+from eitskin.session.summary import Summary
 from eitskin.skin.protocol import adjacent, opposite, skip
 from same_results import check_same
 from small_models import prebuilt
@@ -86,13 +87,13 @@ def replies() -> list[str]:
 
 
 def events() -> list[list[str]]:
-    told = Events()
+    told = Novelty()
     link = [
         LinkEvent(kind, missing, text)
         for kind in ("gap", "dropped", "unplugged", "reconnected", "restarted", "skipped")
         for missing, text in ((0, ""), (1, ""), (4, "said"))
     ]
-    return [told.lines(item) for item in (*faults(), *link, *faults()[::-1])]
+    return [told.lines(notice_of(item)) for item in (*faults(), *link, *faults()[::-1])]
 
 
 def sampled() -> list[Any]:
@@ -104,9 +105,9 @@ def sampled() -> list[Any]:
 
 def summed() -> list[Any]:
     """A summary as it grows."""
-    summary, found = LiveSummary(link={"gaps": 2, "missing": 5, "dropped": 1}), []
+    summary, found = Summary(link={"gaps": 2, "missing": 5, "dropped": 1}), []
     for number in range(4):
-        summary.add(LiveFrame(number, 20_000 * number, 7))
+        summary.add(Frame(number, 20_000 * number, 7))
         summary.drives += number
         summary.faults += number % 2
         summary.refused += number // 3

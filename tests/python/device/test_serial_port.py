@@ -18,10 +18,11 @@ from board_on_a_port import Wire
 from eitskin.device import ports as ports_module
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
-from eitskin.device.link import LinkEvent, Reconnect
+from eitskin.device.link import Reconnect
 from eitskin.device.open import list_devices, open_device
 from eitskin.device.ports import Port, SerialTransport
 from eitskin.device.simulated import SimBoard
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import GetInfo, Stream, Tare
 from eitskin.device.wire.packets import BoardInfo, RawFrame
 from eitskin.errors import DeviceError
@@ -75,7 +76,7 @@ def test_a_board_on_a_port(wire):
         frames = [raw.frame for raw in raw_frames(device, 20)]
         assert frames == list(range(frames[0], frames[0] + 20))
         assert device.counters.gaps == device.counters.crc_errors == 0
-        assert not device.transport.synchronous
+        assert not device.transport.capabilities.own_clock
 
 
 def test_a_slow_reader_loses_the_oldest_whole_frames_and_knows_how_many(wire):

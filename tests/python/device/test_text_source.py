@@ -16,10 +16,11 @@ import pytest
 from device_helpers import frames, of
 
 from eitskin.device import source as source_module
-from eitskin.device.link import LinkEvent, Reconnect
+from eitskin.device.link import Reconnect
 from eitskin.device.open import open_device
 from eitskin.device.text_port import FileLines
 from eitskin.device.text_source import TextSource
+from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.codec import LinkCounters
 from eitskin.device.wire.link_table import FaultCode, Stream
 from eitskin.device.wire.packets import Fault, RawFrame, SolvedTouches

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from eitskin.device.timing import Pacer, Slowness, Timing, split_timing
+from eitskin.device.timing import Timing, split_timing
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import UsageError
-from eitskin.live.frame import Frame
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.frame import Frame
+from eitskin.session.pacing import Pacer, Slowness
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
+from eitskin.truth import observe_scene
 
 
 class CountedClock:
@@ -112,13 +114,13 @@ def scene_file(tmp_path_factory) -> Path:
 
 def frames_of(url: str, count: int, **more: object) -> list[Frame]:
     settings = SessionSettings(Stream.TOUCHES, frames=count)
-    with Session(url, settings, **more) as session:
-        return [item for item in session.frames() if isinstance(item, Frame)]
+    with Session(url, settings, observe=observe_scene, **more) as session:
+        return [item for item in session.messages() if isinstance(item, Frame)]
 
 
 def test_a_looped_scene_begins_again_and_the_truth_with_it(scene_file):
     frames = frames_of(f"sim:{scene_file}?loop=1", 20)
-    assert [f.live.time_us for f in frames] == [50_000 * k for k in range(20)]
+    assert [f.time_us for f in frames] == [50_000 * k for k in range(20)]
     first, second, third = frames[0:6], frames[6:12], frames[12:18]
     assert [f.true for f in first] == [f.true for f in second] == [f.true for f in third]
     assert len({f.true for f in first}) == 6
@@ -127,11 +129,11 @@ def test_a_looped_scene_begins_again_and_the_truth_with_it(scene_file):
 def test_a_looped_recording_goes_on_in_time(scene_file, tmp_path):
     settings = SessionSettings(Stream.TOUCHES, record=tmp_path / "run.eits")
     with Session(f"sim:{scene_file}", settings) as session:
-        recorded = [item for item in session.frames() if isinstance(item, Frame)]
+        recorded = [item for item in session.messages() if isinstance(item, Frame)]
     frames = frames_of(f"file:{tmp_path}/run.eits?loop=1", 15)
     assert len(recorded) == 6
     assert len(frames) == 15
-    assert [f.live.time_us for f in frames] == [50_000 * k for k in range(15)]
+    assert [f.time_us for f in frames] == [50_000 * k for k in range(15)]
     assert [f.touches for f in frames[6:12]] == [f.touches for f in recorded]
 
 
@@ -139,5 +141,5 @@ def test_pacing_changes_nothing_but_when(scene_file):
     clock = CountedClock()
     fast = frames_of(f"sim:{scene_file}", 6)
     paced = frames_of(f"sim:{scene_file}?speed=0.5", 6, clock=clock)
-    assert [f.live.touches for f in fast] == [f.live.touches for f in paced]
+    assert [f.touches for f in fast] == [f.touches for f in paced]
     assert clock.s == pytest.approx(5 * 0.05 / 0.5)

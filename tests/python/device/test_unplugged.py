@@ -11,24 +11,24 @@ import pytest
 from device_helpers import QUIET, of, scene, sim_board
 
 from eitskin.device.client import Device
-from eitskin.device.events import link_text
-from eitskin.device.link import LinkEvent, Reconnect, ThreadedLink
+from eitskin.device.link import Reconnect, ThreadedLink
 from eitskin.device.simulated import SimTransport
+from eitskin.device.transport import LinkEvent, Transport
 from eitskin.device.wire.codec import encode
 from eitskin.device.wire.link_table import Drive, Keepalive, PacketType, Stream
 from eitskin.device.wire.packets import RawFrame, SolvedTouches
 from eitskin.errors import DeviceError
+from eitskin.session.notices import link_text
 
 FRAME_S = 1 / scene().rate_hz
 WANTED = 10 + round(2 / FRAME_S)  # more than the board sends before it misses its host
 
 
-class Port:
+class Port(Transport):
     """A simulated board behind a port that is pulled out for ``away_s`` after so many more reads;
     ``Clock`` counts. The board keeps its power, and scans until it misses its host."""
 
     url = name = "/dev/ttyFAKE"
-    synchronous = replays = ended = False
 
     def __init__(self) -> None:
         self.board = sim_board()

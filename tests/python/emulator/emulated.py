@@ -8,15 +8,15 @@ from eitskin.core.results import Reconstruction
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, board_options
-from eitskin.device.link import LinkEvent
-from eitskin.device.live_frames import LiveFrame, put_together
-from eitskin.device.recordings.host_check import HostCheck, HostTwin
-from eitskin.device.transport import Transport
+from eitskin.device.transport import LinkEvent, Transport
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import RawFrame
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.library_scenes import find_scene
+from eitskin.session.assemble import assembled
+from eitskin.session.checks.host_check import HostCheck, HostTwin
+from eitskin.session.frame import Frame, Notice
 from eitskin_emulator.board import EmulatedBoard
 from eitskin_emulator.clocktime import TICKS_PER_S
 from eitskin_emulator.memory import RAM
@@ -78,7 +78,7 @@ def raw_frames(device: Device, count: int) -> list[RawFrame]:
 
 def twin_check(
     device: Device, blob: bytes, frames: int, quiet: int = 4
-) -> tuple[HostCheck, list[LiveFrame], list[Reconstruction | None]]:
+) -> tuple[HostCheck, list[Frame], list[Reconstruction | None]]:
     """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core
     and its results."""
     from eitskin.device.wire import link_table as commands
@@ -94,12 +94,12 @@ def twin_check(
     twin = HostTwin(KnownModel(model, blob), board_options(model, device.board))
     for item in taken:
         if isinstance(item, RawFrame) and item.quiet:
-            twin.take(LiveFrame(item.frame, 0, item.time_us, raw=item))
+            twin.take(Frame(item.frame, 0, item.time_us, raw=item))
     seen, results = [], []
-    for item in put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING):
-        if isinstance(item, LinkEvent):
+    for item in assembled(device.stream(EVERYTHING, frames=frames), EVERYTHING):
+        if isinstance(item, Notice) and isinstance(item.cause, LinkEvent):
             twin.lost()  # the line does not carry all at full rate
-        elif isinstance(item, LiveFrame):
+        elif isinstance(item, Frame):
             seen.append(item)
             results.append(twin.take(item))
     return twin.check, seen, results

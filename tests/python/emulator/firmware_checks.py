@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from eitskin.device.link import PumpedLink
+from eitskin.device.link import Answer, PumpedLink
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo, RawFrame, Reply
-from eitskin.device.wire.payloads import parse
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
@@ -53,28 +52,30 @@ class Session:
         assert self.link is not None
         self.asked += 1
         self.link.send(command.TYPE, command.payload(self.asked))
-        end = self.board.clock.now + round(timeout_s * TICKS_PER_S)
-        while self.board.clock.now < end:
-            found = self._next((end - self.board.clock.now) / TICKS_PER_S)
-            if isinstance(found, Reply) or (isinstance(found, BoardInfo) and found.request):
-                return found
-        return None
+        answer = self.link.answer(_answers, timeout_s)
+        while self.link.keeps:
+            self._keep(0.0)
+        if isinstance(answer, BoardInfo):
+            self.info = answer
+        assert answer is None or isinstance(answer, Reply | BoardInfo)
+        return answer
 
     def listen(self, time_s: float) -> None:
         """Keep the raw frames that come within ``time_s``."""
         end = self.board.clock.now + round(time_s * TICKS_PER_S)
         while self.board.clock.now < end:
-            self._next((end - self.board.clock.now) / TICKS_PER_S)
+            self._keep((end - self.board.clock.now) / TICKS_PER_S)
 
-    def _next(self, timeout_s: float) -> object:
+    def _keep(self, timeout_s: float) -> None:
         assert self.link is not None
-        packet = self.link.next(timeout_s)
-        content = None if packet is None else parse(packet.type, packet.payload)
+        content = self.link.next(timeout_s)
         if isinstance(content, RawFrame):
             self.frames.append(content)
-        if isinstance(content, BoardInfo):
-            self.info = content
-        return content
+
+
+def _answers(one: Answer) -> bool:
+    """Whether it answers a command, which an INFO after a restart does not."""
+    return isinstance(one, Reply | BoardInfo) and one.request != 0
 
 
 class Impatient(EmulatedTransport):

@@ -3,11 +3,12 @@ rate, and the bits of this host."""
 
 import numpy as np
 
-from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.frame import Frame, Report
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.checks.host_check import check_recording
+from eitskin.session.frame import DriveReport, Frame
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
+from eitskin.truth import observe_scene
 from eitskin_emulator.peripherals.nvic import PENDSV
 
 DRIVE_US, SCAN_US, FRAMES = 1300, 20_800, 9
@@ -31,19 +32,19 @@ def test_drives_do_not_wait_for_frames(tmp_path):
     scene, run = tmp_path / "press.toml", tmp_path / "run.eits"
     scene.write_text(SCENE, encoding="utf-8")
     settings = SessionSettings(mode=Stream.RAW | Stream.TOUCHES, report="drive", tare=4, record=run)
-    with Session(f"emu:{scene}", settings) as session:
-        items = [item for item in session.frames() if isinstance(item, Frame | Report)]
+    with Session(f"emu:{scene}", settings, observe=observe_scene) as session:
+        items = [item for item in session.messages() if isinstance(item, Frame | DriveReport)]
         stats = session.device.stats()
         interrupts = session.device.transport.board.record.interrupts
     frames = [item for item in items if isinstance(item, Frame)]
-    told = [item.live for item in items if isinstance(item, Report) and item.touches]
+    told = [item for item in items if isinstance(item, DriveReport) and item.touches]
     solved = [frame.info for frame in frames if frame.info is not None]
     # solves take several drives' time; drives are told within their own
     assert max(one.solve_us + one.touch_us for one in solved) > 3 * DRIVE_US
-    ages_us = [one.followed.head.age_us for one in told]
+    ages_us = [one.packet.head.age_us for one in told]
     assert np.quantile(ages_us, 0.8) < DRIVE_US and len(told) > 16 * (FRAMES - 4)
     # the frame rate holds: no scan waited, no row was late
-    assert {int(us) for us in np.diff([frame.live.board_us for frame in frames])} == {SCAN_US}
+    assert {int(us) for us in np.diff([frame.board_us for frame in frames])} == {SCAN_US}
     assert {int(us) for us in np.diff([one.board_us for one in told])} == {DRIVE_US}
     assert (stats.slots_repeated, stats.packets_dropped) == (0, 0)
     assert interrupts[PENDSV] >= 16 * FRAMES

@@ -38,7 +38,7 @@ def test_a_device_by_its_url(built, scene):
 def test_time_is_the_board_s(built):
     transport = open_emulated("two_touch", image=built)
     board = transport.board
-    assert transport.synchronous
+    assert transport.capabilities.own_clock
     while transport.read(0.001):
         pass
     began = board.now_s

@@ -17,8 +17,9 @@ from eitskin.device.wire.codec import Decoder
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import FollowedTouches, RawFrame, SolvedTouches
 from eitskin.device.wire.payloads import parse
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
+from eitskin.truth import observe_scene
 
 QUIET, FRAMES = 4, 6
 SCENE = f"""[scene]
@@ -132,11 +133,11 @@ def test_both_boards_tell_the_same_of_the_same_volts(tmp_path, cortex_m7):
     for kind, run in zip(("sim", "emu"), runs, strict=True):
         emulated = kind == "emu"
         how = replace(settings, record=run, firmware=image if emulated else None)
-        with Session(f"{kind}:{scene}", how) as session:
+        with Session(f"{kind}:{scene}", how, observe=observe_scene) as session:
             if emulated:
                 board = session.device.transport.board
                 Given(board, image.with_suffix(".elf"), Recorded.read(runs[0]))
-            for _ in session.frames():
+            for _ in session.messages():
                 pass
     one, other = map(Recorded.read, runs)
     assert [frame.voltage_v.tobytes() for frame in one.quiet] == [

@@ -244,7 +244,7 @@ def runs(blob: bytes) -> None:
     for engine in ("c", "c64"):
         try:
             reconstructor = Reconstructor(model, engine=engine, blob=blob)
-            reconstructor.with_options(iterations=20)
+            reconstructor.set_options(iterations=20)
             reconstructor.tare(model.golden.reference_v)
             result = reconstructor.reconstruct(model.golden.frame_v)
             assert np.isfinite(result.image).all()
@@ -272,7 +272,7 @@ def test_both_take_a_file_of_format_1_0_as_fista():
     macs = {}
     for solver in (None, "fista", "working-set"):
         reconstructor = Reconstructor(model, blob=old)
-        reconstructor.with_options(**({} if solver is None else {"solver": solver}))
+        reconstructor.set_options(**({} if solver is None else {"solver": solver}))
         reconstructor.tare(model.golden.reference_v)
         macs[solver] = reconstructor.reconstruct(model.golden.frame_v).info.macs
     assert macs[None] == macs["fista"] > macs["working-set"]

@@ -11,8 +11,8 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.settings import SessionSettings
 from eitskin.page.server import PageServer, listen
+from eitskin.session.settings import SessionSettings
 
 TOKEN = "a word for tests"
 FLAGS = (
@@ -40,7 +40,7 @@ def serving(url: str, mode: Stream = ALL, **more: Any) -> Iterator[PageServer]:
     thread = threading.Thread(target=server.serve, daemon=True)
     thread.start()
     try:
-        until(lambda: server.follower.state != "starting")
+        until(lambda: server.reader.state != "starting")
         yield server
     finally:
         server.stop()
@@ -94,7 +94,7 @@ class Page:
 
     def answer(self) -> str:
         """What came of the last press."""
-        return str(until(lambda: self.text("answer").replace("…", "")))
+        return str(until(lambda: self.text("answer").replace("…", ""), 120))
 
     def touches(self) -> list[tuple[float, float]]:
         """Places in mm, as the page's table says them."""

@@ -16,18 +16,19 @@ from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.ports import Port
 from eitskin.device.simulated import SimBoard
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.page.server import PageServer
 from eitskin.page.teacher import Teacher
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import load_scene
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.teaching.plan import plan_places
 from eitskin.teaching.practice import practice_scene
 from eitskin.teaching.presses import load_presses
+from eitskin.truth import observe_scene
 
 PLACES = [(-40.0, 10.0), (30.0, -20.0)]
 NEAR_MM = 3.0
@@ -66,7 +67,7 @@ def server(scene, tmp_path_factory) -> Iterator[PageServer]:
 @pytest.fixture
 def live(server, page) -> Page:
     """The simulated board's page, playing."""
-    server.follower.live().pacer.play()
+    server.reader.live().pacer.play()
     page.size(1200, 900)
     page.open(server)
     until(page.touches)
@@ -109,21 +110,21 @@ def test_simulated(live):
 
 def test_recorded(scene, page, tmp_path):
     settings = SessionSettings(ALL, record=tmp_path / "run.eits")
-    with Session(f"sim:{scene}", settings) as session:
-        count = sum(1 for _ in session.items())
+    with Session(f"sim:{scene}", settings, observe=observe_scene) as session:
+        count = sum(1 for _ in session.messages())
     with serving(f"file:{tmp_path}/run.eits") as server:
         page.open(server)
         until(lambda: page.text("state") == "over")
         assert_shown(page)
         assert page.text("n-frame").isdigit()
-        assert server.follower.frames == count
+        assert server.reader.frames == count
         assert page.get("tare", "disabled")
         page.open(server)  # a page that comes later sees the last frame
         assert_shown(page)
         until(lambda: page.text("play") == "Start again")
         page.click("play")
         assert page.answer() == "starting again"
-        until(lambda: server.follower.frames == 2 * count)
+        until(lambda: server.reader.frames == 2 * count)
 
 
 def test_lines_of_an_instrument(scene, page, tmp_path):
@@ -136,7 +137,7 @@ def test_lines_of_an_instrument(scene, page, tmp_path):
         page.open(server)
         until(lambda: page.text("state") == "over")
         assert_shown(page)
-        assert server.follower.frames == 12
+        assert server.reader.frames == 12
 
 
 def test_gestures_and_zones(page):
@@ -164,7 +165,7 @@ def test_teaching_press_by_press(page, tmp_path):
         page.click("teach-fit")
         answer = page.answer()
         assert answer.startswith("presses.eitm: 6 presses") and "is in use" in answer
-        known = server.follower.live().known
+        known = server.reader.live().known
         assert known is not None and known.model.precision is not None
         page.click("teach-back")
         assert page.answer() == "place 6 again; leave the skin untouched"
@@ -175,21 +176,21 @@ def test_pause_step_play_and_speed(live, server):
     live.click("play")
     assert live.answer() == "paused"
     until(lambda: live.text("play") == "Play")
-    before = server.follower.frames
+    before = server.reader.frames
     live.click("step")
     assert live.answer() == "one frame"
-    until(lambda: server.follower.frames == before + 1)
+    until(lambda: server.reader.frames == before + 1)
     live.choose("speed", "2")
     assert live.answer().startswith("speed 2")
-    assert server.follower.live().pacer.speed == 2.0
+    assert server.reader.live().pacer.speed == 2.0
     live.choose("speed", "1")
-    assert server.follower.frames == before + 1
+    assert server.reader.frames == before + 1
     live.run("document.body.dispatchEvent(new KeyboardEvent('keydown', {key: ' ', bubbles: true}))")
-    until(lambda: server.follower.frames > before + 3)
+    until(lambda: server.reader.frames > before + 3)
 
 
 def test_tare_solver_and_mode(live, server):
-    session = server.follower.live()
+    session = server.reader.live()
     live.choose("sign", "decrease")
     assert live.answer() == "solver: sign decrease"
     until(lambda: not live.touches())  # they are increases
@@ -218,17 +219,17 @@ def test_tare_solver_and_mode(live, server):
 
 def more_frames(server: PageServer) -> None:
     """They go on."""
-    before = server.follower.frames
-    until(lambda: server.follower.frames > before + 3)
+    before = server.reader.frames
+    until(lambda: server.reader.frames > before + 3)
 
 
 def begin_again(server: PageServer) -> None:
     """The board switched off and on, and its reference taken before the scene."""
-    session = server.follower.live()
+    session = server.reader.live()
     session.stop()
-    until(lambda: server.follower.state == "ended")
-    server.follower.again()
-    until(lambda: server.follower.session not in (None, session))
+    until(lambda: server.reader.state == "ended")
+    server.reader.again()
+    until(lambda: server.reader.session not in (None, session))
 
 
 def test_record(live, server):
@@ -239,8 +240,8 @@ def test_record(live, server):
     live.click("record")
     assert live.answer().endswith(name)
     until(lambda: live.text("record-text") == "Record")
-    with Session(f"file:{server.follower.folder / name}", SessionSettings(ALL)) as session:
-        assert sum(1 for _ in session.items()) > 2
+    with Session(f"file:{server.reader.folder / name}", SessionSettings(ALL)) as session:
+        assert sum(1 for _ in session.messages()) > 2
 
 
 def test_a_model_is_uploaded(live, server, tmp_path):
@@ -273,7 +274,7 @@ def test_unplugged_and_back(scene, page, monkeypatch):
         first = plugged()
         with serving(f"serial:{first.path}", Stream.TOUCHES) as server:
             page.open(server)
-            until(lambda: server.follower.frames > 3)
+            until(lambda: server.reader.frames > 3)
             assert page.get("step", "hidden")
             there.clear()
             first.unplug()
@@ -345,11 +346,11 @@ def test_without_the_token_it_only_looks_on(live, server):
         "return ['tare', 'record', 'sign', 'model', 'play'].every(i =>"
         " document.getElementById(i).disabled)"
     )
-    before = server.follower.live().pacer.paused
+    before = server.reader.live().pacer.paused
     live.run("document.getElementById('play').disabled = false")
     live.click("play")
     assert "needs the token" in live.answer()
-    assert server.follower.live().pacer.paused == before
+    assert server.reader.live().pacer.paused == before
     live.open(server, token=TOKEN + "!")
     until(lambda: "eitskin view printed" in live.text("answer"))
 
@@ -357,16 +358,16 @@ def test_without_the_token_it_only_looks_on(live, server):
 def test_frames_go_on_without_end_and_memory_does_not(live, server):
     """As many frames as in ten minutes at 50 a second, as fast as they come."""
     live.choose("speed", "max")
-    start = server.follower.frames
+    start = server.reader.frames
 
     def sizes() -> tuple[float, float]:
         live.command("HeapProfiler.collectGarbage")
         pages = int(Path("/proc/self/statm").read_text().split()[1])
         return pages * 4096 / 1e6, live.run("return performance.memory.usedJSHeapSize") / 1e6
 
-    until(lambda: server.follower.frames > start + 5_000, 300)
+    until(lambda: server.reader.frames > start + 5_000, 300)
     before = sizes()
-    until(lambda: server.follower.frames > start + 35_000, 600)
+    until(lambda: server.reader.frames > start + 35_000, 600)
     after = sizes()
     live.choose("speed", "1")
     assert after[0] < before[0] + 20

@@ -10,6 +10,7 @@ import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,10 +22,14 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from eitskin.cli.main import main
+from eitskin.device.client import Device
+from eitskin.device.wire.link_table import Stream
 from eitskin.page.facts import HEAD, MAGIC
 from eitskin.page.hub import IN_FLIGHT, Hub, Outgoing, PageClient
-from eitskin.page.server import NO_TOKEN, PageServer
+from eitskin.page.server import MAX_WAITING, NO_TOKEN, PageServer
+from eitskin.session import session as session_module
 from fresh_python import INTERRUPTIBLE
+from line_of_a_board import Line
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +143,7 @@ def test_commands_need_the_token(server, token):
             answer = told(line, "answer")
             assert not answer["ok"]
             assert "needs the token" in answer["text"]
-    assert not server.follower.live().pacer.paused
+    assert not server.reader.live().pacer.paused
 
 
 @pytest.mark.parametrize(
@@ -159,6 +164,47 @@ def test_an_order_that_cannot_be_is_answered(server, what):
         line.send(json.dumps({"type": "do", "do": what, "value": ["x"]}))
         answer = told(line, "answer")
         assert not answer["ok"]
+
+
+def test_commands_of_a_board_that_falls_silent_are_answered_and_the_page_starts_it_again(
+    monkeypatch,
+):
+    """Two pages ask for a tare before the session fails; then one presses  Start again."""
+    board = Line()
+    monkeypatch.setattr(session_module, "open_with_files", lambda *files, **how: Device(board))
+    with (
+        serving("serial:fake", Stream.RAW) as server,
+        opened(server, TOKEN) as page,
+        opened(server, TOKEN) as other,
+    ):
+        until(lambda: server.reader.frames > 3)
+        board.silent = True
+        for one in (page, other):
+            one.send(json.dumps({"type": "do", "do": "tare"}))
+        for one in (page, other):
+            answer = told(one, "answer")
+            assert not answer["ok"] and "has fallen silent" in answer["text"]
+        until(lambda: server.reader.state == "failed")
+        board.silent = False
+        page.send(json.dumps({"type": "do", "do": "play"}))
+        assert told(page, "answer")["text"] == "starting again"
+        until(lambda: server.reader.state == "live")
+        page.send(json.dumps({"type": "do", "do": "tare"}))
+        assert told(page, "answer")["ok"]
+
+
+def test_a_command_that_is_not_answered_yet_keeps_no_other_from_its_answer(server, monkeypatch):
+    """Sixteen may wait; one more is refused."""
+    never: Future[str] = Future()
+    monkeypatch.setattr(server.commands, "tare", lambda: never)
+    with opened(server, TOKEN) as line:
+        for _ in range(MAX_WAITING - 1):
+            line.send(json.dumps({"type": "do", "do": "tare"}))
+        line.send(json.dumps({"type": "do", "do": "sign", "value": "up"}))
+        assert "cannot be" in told(line, "answer")["text"]
+        for _ in range(2):
+            line.send(json.dumps({"type": "do", "do": "tare"}))
+        assert "are not answered yet" in told(line, "answer")["text"]
 
 
 def test_from_elsewhere_even_looking_on_needs_the_token(scene):

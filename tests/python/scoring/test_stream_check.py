@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from eitskin.cli.frame_line import line
 from eitskin.core.diagnostics_table import Touch
 from eitskin.device.known_model import KnownModel
-from eitskin.device.live_frames import LiveFrame
 from eitskin.device.wire.link_table import Quality
-from eitskin.device.wire.packets import RawFrame, Solved, SolvedImage, SolvedTouches
-from eitskin.live.frame import Frame
+from eitskin.device.wire.packets import RawFrame, Solved
 from eitskin.scene.library_scenes import find_scene
+from eitskin.scoring.observer import TruthObserver
 from eitskin.scoring.scene_truth import SceneTruth
-from eitskin.scoring.stream_check import Watcher, line, spread
+from eitskin.session.frame import Frame
 from small_models import prebuilt
 
 SOLVED = Solved(
@@ -22,32 +22,36 @@ SOLVED = Solved(
 )
 
 
-def touches(*places: tuple[float, float], status: int = 0, time_us: int = 1000) -> LiveFrame:
+def touches(*places: tuple[float, float], status: int = 0, time_us: int = 1000) -> Frame:
     found = tuple(Touch(k + 1, x, y, 8.0, 3.0, 0.5) for k, (x, y) in enumerate(places))
     solved = replace(SOLVED, status=status, count=len(found))
-    return LiveFrame(7, 0, time_us, touches=SolvedTouches(solved, found))
+    return Frame(7, 0, time_us, touches=found, has_touches=True, info=solved, known=known())
 
 
-def image(*places: tuple[float, float], sign: float = 1.0) -> LiveFrame:
+def image(*places: tuple[float, float], sign: float = 1.0) -> Frame:
     centres = prebuilt()[0].grid.centres_mm()
     near = (np.linalg.norm(centres - place, axis=1) < 10 for place in places)
     values = (0.01 * sign * sum(near, np.zeros(len(centres)))).astype(np.float32)
-    return LiveFrame(7, 0, 1000, image=SolvedImage(SOLVED, values))
+    return Frame(7, 0, 1000, image=values, info=SOLVED, known=known())
 
 
-def watcher(scene: str = "two_touch", sign: str = "increase") -> Watcher:
-    return Watcher(KnownModel(*prebuilt()), SceneTruth(find_scene(scene), sign))
+def known() -> KnownModel:
+    return KnownModel(*prebuilt())
+
+
+def observer(scene: str = "two_touch", sign: str = "increase") -> TruthObserver:
+    return TruthObserver(SceneTruth(find_scene(scene), sign))
 
 
 def test_touches_are_paired_with_the_true_ones():
-    look = watcher()
+    look = observer()
     seen = look.see(touches((30.0, -24.0), (-40.0, 13.0), (0.0, 0.0)))
     assert seen.errors_mm == {0: pytest.approx(1.0), 1: pytest.approx(3.0)}
     text = line(seen)
     assert text.count("off by") == 2 and "#1 (30.0, -24.0) mm" in text
     assert "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text
     assert text.endswith(" ms")
-    facts = Frame(seen.frame, seen).message()
+    facts = seen.message()
     found = [touch["error_mm"] for touch in facts["touches"]]
     assert found == [pytest.approx(1.0), pytest.approx(3.0), None]
     assert len(facts["true"]) == 2
@@ -60,7 +64,7 @@ def test_touches_are_paired_with_the_true_ones():
 
 
 def test_nothing_found_is_no_error_of_zero():
-    look = watcher()
+    look = observer()
     assert " s  no touch; 60 iterations" in line(look.see(touches()))
     assert look.score.as_dict()["position_worst_mm"] is None
     assert "position error" not in look.score.text()
@@ -68,7 +72,7 @@ def test_nothing_found_is_no_error_of_zero():
 
 
 def test_touches_that_are_not_looked_for_are_not_missed():
-    look = watcher(sign="decrease")
+    look = observer(sign="decrease")
     look.see(touches())
     assert look.score.missed == 0
 
@@ -84,22 +88,21 @@ def test_a_moving_touch_is_where_it_is_at_the_boards_time():
 
 
 def test_a_refused_frame_says_why_and_is_not_scored():
-    look = watcher()
+    look = observer()
     seen = look.see(touches(status=-5))
-    assert "refused: " in line(seen) and Frame(seen.frame, seen).message()["refused"]
+    assert "refused: " in line(seen) and seen.message()["refused"]
     assert look.score.frames == 0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_an_image_in_brief(sign):
-    places, look = [(-40.0, 10.0), (30.0, -25.0)], Watcher(KnownModel(*prebuilt()), None)
-    seen = look.see(image(*places, sign=sign))
-    distance = np.linalg.norm(seen.view.places_mm[:, None] - np.array(places), axis=2)
+    places = [(-40.0, 10.0), (30.0, -25.0)]
+    seen = image(*places, sign=sign)
+    distance = np.linalg.norm(seen.places_mm[:, None] - np.array(places), axis=2)
     assert (distance.min(axis=0) < 3).all() and len(distance) == 2
-    assert seen.view.peak == pytest.approx(0.01 * sign) and seen.errors_mm is None
+    assert seen.peak.value == pytest.approx(0.01 * sign) and seen.errors_mm is None
     assert "off by" not in line(seen)
-    flat = look.see(image())
-    assert flat.view is not None and " s  image: flat; 60 iterations" in line(flat)
+    assert " s  image: flat; 60 iterations" in line(image())
 
 
 def test_raw_rows_that_are_missing_become_null():
@@ -107,16 +110,9 @@ def test_raw_rows_that_are_missing_become_null():
     volts[2] = np.nan
     quality = np.array([0, 0, Quality.OPEN | Quality.SATURATED, Quality.COPIED, 0], dtype=np.uint8)
     raw = RawFrame(3, 9, 20_800, 0, volts, quality)
-    seen = Watcher(None, None).see(LiveFrame(3, 250_000, 9, raw=raw))
-    facts = json.loads(json.dumps(Frame(seen.frame, seen).message(), allow_nan=False))
+    seen = Frame(3, 250_000, 9, raw=raw)
+    facts = json.loads(json.dumps(seen.message(), allow_nan=False))
     assert facts["voltage_v"][2] is None and facts["voltage_v"][0] == 1.0
     assert facts["time_s"] == 0.25
     assert "5 rows in 20.80 ms" in line(seen) and "1 not usable" in line(seen)
     assert "nan" not in line(seen)
-
-
-def test_spread_keeps_the_ends():
-    seen = [Watcher(None, None).see(touches()) for _ in range(100)]
-    kept = spread(seen, 36)
-    assert len(kept) == 36 and kept[0] is seen[0] and kept[-1] is seen[-1]
-    assert spread(seen[:3], 36) == seen[:3]

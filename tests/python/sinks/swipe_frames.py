@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from eitskin.device.wire.link_table import Stream
-from eitskin.live.frame import Frame, Report
-from eitskin.live.session import Session
-from eitskin.live.settings import SessionSettings
+from eitskin.session.frame import DriveReport, Frame
+from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
 from eitskin.sinks.sink import TouchSource
+from eitskin.truth import observe_scene
 
 os.environ.setdefault("LSLAPICFG", str(Path(__file__).with_name("lsl_local.cfg")))
 
@@ -24,7 +25,7 @@ FRAMES_OF_DRIVES = 8
 class Swipe:
     """What was seen, and on which skin."""
 
-    items: list[Frame | Report]
+    items: list[Frame | DriveReport]
     source: TouchSource
 
     @property
@@ -32,18 +33,18 @@ class Swipe:
         return [item for item in self.items if isinstance(item, Frame)]
 
     @property
-    def reports(self) -> list[Report]:
-        return [item for item in self.items if isinstance(item, Report)]
+    def reports(self) -> list[DriveReport]:
+        return [item for item in self.items if isinstance(item, DriveReport)]
 
     @property
     def touches(self) -> list[list[Any]]:
         return [list(frame.touches) for frame in self.frames]
 
 
-def seen(session: Session, frames: int) -> Iterator[Frame | Report]:
+def seen(session: Session, frames: int) -> Iterator[Frame | DriveReport]:
     """The first ``frames`` of a session, and its reports."""
-    for item in session.frames():
-        if isinstance(item, Frame | Report):
+    for item in session.messages():
+        if isinstance(item, Frame | DriveReport):
             yield item
         frames -= isinstance(item, Frame)
         if frames == 0:
@@ -53,7 +54,7 @@ def seen(session: Session, frames: int) -> Iterator[Frame | Report]:
 @pytest.fixture(scope="session")
 def swipe() -> Swipe:
     settings = SessionSettings(mode=Stream.TOUCHES | Stream.IMAGE)
-    with Session("sim:swipe", settings) as session:
+    with Session("sim:swipe", settings, observe=observe_scene) as session:
         items = list(seen(session, 40))
         assert session.known is not None
         return Swipe(items, TouchSource(session.url, "simulated", session.known.model))
@@ -62,7 +63,8 @@ def swipe() -> Swipe:
 @pytest.fixture(scope="session")
 def drives(swipe) -> Swipe:
     """The swipe's first frames, and reports, of ``--report drive``."""
-    with Session("sim:swipe", SessionSettings(mode=Stream.TOUCHES, report="drive")) as session:
+    settings = SessionSettings(mode=Stream.TOUCHES, report="drive")
+    with Session("sim:swipe", settings, observe=observe_scene) as session:
         found = Swipe(list(seen(session, FRAMES_OF_DRIVES)), swipe.source)
     assert sum(bool(report.touches) for report in found.reports) > 40
     return found

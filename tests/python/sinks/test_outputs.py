@@ -14,7 +14,7 @@ from eitskin.errors import EitskinError
 from eitskin.sinks import outputs as module
 from eitskin.sinks.mqtt import open_sink as open_mqtt
 from eitskin.sinks.outputs import DRIVES, Outputs
-from eitskin.sinks.sink import Dropped, Told, TouchSource
+from eitskin.sinks.sink import Dropped, OutgoingMessage, TouchSource
 
 ROOM = 8
 
@@ -23,10 +23,10 @@ class Heard:
     """A sink that keeps what it is told."""
 
     def __init__(self) -> None:
-        self.told: list[Told] = []
+        self.told: list[OutgoingMessage] = []
         self.closed = threading.Event()
 
-    def write(self, told: Told) -> None:
+    def write(self, told: OutgoingMessage) -> None:
         self.told.append(told)
 
     def close(self) -> None:
@@ -40,21 +40,21 @@ class Stuck(Heard):
         super().__init__()
         self.free = threading.Event()
 
-    def write(self, told: Told) -> None:
+    def write(self, told: OutgoingMessage) -> None:
         self.free.wait()
 
 
 class Dying(Heard):
     """Fails from the third on."""
 
-    def write(self, told: Told) -> None:
+    def write(self, told: OutgoingMessage) -> None:
         super().write(told)
         if len(self.told) > 2:
             raise OSError("the cable\nis out")
 
 
 class Away(Heard):
-    def write(self, told: Told) -> None:
+    def write(self, told: OutgoingMessage) -> None:
         raise Dropped
 
 
@@ -108,7 +108,7 @@ def test_an_impatient_session_never_waits(swipe, drives, made):
 
 
 def test_a_message_is_made_once_for_all(swipe):
-    told = Told(swipe.frames[20])
+    told = OutgoingMessage(swipe.frames[20])
     assert told.message is told.message and told.text is told.text
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.live.frame import Notice
+from eitskin.session.frame import Notice
 from eitskin.sinks import ros2
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -77,7 +77,7 @@ def test_messages_take_what_the_conversion_sets(swipe, drives):
     report = drives.reports[-1]
     table = ros2.report(report.message(), now, "skin")
     message = fill(report_class(), table, {"touches": parts["eitskin_msgs/MovingTouch"]})
-    assert (message.time_s, message.drive) == (report.time_s, report.live.followed.head.drive)
+    assert (message.time_s, message.drive) == (report.time_s, report.drive)
     assert message.touches[0].vx_mm_per_s == report.touches[0].vx_mm_per_s
 
     image_class, _ = classes(defined["sensor_msgs/msg/Image"])

@@ -22,8 +22,8 @@ from swipe_frames import Swipe
 
 import eitskin
 from eitskin.device.wire.link_table import FollowedTouch
-from eitskin.live.frame import Frame
-from eitskin.live.message import schema
+from eitskin.session.frame import Frame
+from eitskin.session.message import schema
 from eitskin.sinks.outputs import Outputs
 
 SUMMARY = {
@@ -170,7 +170,7 @@ def test_tuio_of_drives(drives, osc):
         if isinstance(item, Frame):
             expected += [[]] if item.number > reported else []
             continue
-        reported = item.live.followed.head.frame
+        reported = item.frame
         expected.append([
             pytest.approx((
                 one.id, (one.x_mm - x0) / (x1 - x0), (y1 - one.y_mm) / (y1 - y0),
@@ -352,7 +352,7 @@ def test_csv(swipe, drives, tmp_path):
     names = ("time_s", "drive", "id", "x_mm", "vx_mm_per_s", "vy_mm_per_s", "confirmed")
     told_of_drives = [[line[name] for name in names] for line in lines[len(rows) :]]
     assert told_of_drives == [
-        [str(one.time_s), str(one.live.followed.head.drive)]
+        [str(one.time_s), str(one.drive)]
         + [str(getattr(touch, name)) if touch else "" for name in names[2:]]
         for one in drives.reports
         for touch in one.touches or [None]
@@ -388,8 +388,7 @@ def test_mcap(swipe, drives, tmp_path):
     np.testing.assert_array_equal(grid.values(picture), swipe.frames[20].image)
     assert [one.level for one in came["/diagnostics"][0].status] == [0]
     assert [(one.frame, one.drive, one.time_s) for one in came["/reports"]] == [
-        (one.live.followed.head.frame, one.live.followed.head.drive, one.time_s)
-        for one in drives.reports
+        (one.frame, one.drive, one.time_s) for one in drives.reports
     ]
     for message, report in zip(came["/reports"], drives.reports, strict=True):
         names = [field.name for field in fields(FollowedTouch)]
@@ -400,12 +399,12 @@ def test_mcap(swipe, drives, tmp_path):
 KILLED = """
 import os, signal, sys, time
 from eitskin.cli import live_output
-from eitskin.live.session import Session
+from eitskin.session.session import Session
 from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import TouchSource
 source = TouchSource("x")
 with Session("sim:swipe") as session, Outputs(sys.argv[1:], source, patient=True) as outputs:
-    items = [outputs.put(item) for item in session.frames()]
+    items = [outputs.put(item) for item in session.messages()]
     until = time.monotonic() + 20
     while min(one["sent"] for one in outputs.counts) < len(items) and time.monotonic() < until:
         pass

@@ -37,9 +37,9 @@ def engines(storage: str, data_kind: str, solver: str, **options: object) -> All
 
 def share_lambda(made: AllEngines, frame: np.ndarray) -> None:
     """Give all engines the lambda that is a twentieth of numpy's lambda_max for ``frame``."""
-    made["numpy"].with_options(lambda_abs=1e30)
+    made["numpy"].set_options(lambda_abs=1e30)
     greatest = made["numpy"].reconstruct(frame, touches=False).info.lambda_max
-    made.with_options(lambda_abs=0.05 * greatest)
+    made.set_options(lambda_abs=0.05 * greatest)
 
 
 def narrow(frames: np.ndarray) -> np.ndarray:
@@ -85,7 +85,7 @@ def agree(made: AllEngines, frames: np.ndarray, *, keep: bool = False) -> dict[s
 def test_same_images(storage, data_kind, drift, solver):
     made = engines(storage, data_kind, solver, project_reference=drift)
     for seed, sign in enumerate(SIGNS):
-        made.with_options(sign=sign, lambda_abs=0.0)
+        made.set_options(sign=sign, lambda_abs=0.0)
         made.tare(narrow(small().quiet(1, 8) if drift else small().linear.v0_v))
         worst = agree(made, narrow(small().frames(5 + seed, FRAMES, sign)))
         assert worst["c64"] <= F64_BOUND and worst["c"] <= F32_BOUND[solver], (sign, worst)
@@ -122,7 +122,7 @@ def test_same_images_without_electrodes(storage, data_kind, solver):
     made = engines(storage, data_kind, solver, max_masked=208)
     worst = {"c64": 0.0, "c": 0.0}
     for seed, sign in enumerate(SIGNS):
-        made.with_options(sign=sign, lambda_abs=0.0)
+        made.set_options(sign=sign, lambda_abs=0.0)
         made.tare(narrow(s.quiet(1, 8)))
         frames = narrow(s.frames(15 + seed, 6, sign))
         for k, frame in enumerate(frames):
@@ -159,7 +159,7 @@ def test_same_facts_without_an_electrode(data_kind, solver):
     for masked in (np.zeros(208, dtype=bool), out):
         made.mask_rows(masked)
         made.tare(s.quiet(3, 21))
-        made.with_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
+        made.set_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
         results = made.reconstruct(frame)
         expected, wide = results["numpy"], results["c64"]
         assert expected.touches and expected.info.stop in SOLVED
@@ -229,7 +229,7 @@ def test_same_facts(data_kind, solver):
     """LearnedReference and info of float64 C are the reference's."""
     made = engines("f16", data_kind, solver)
     baselines = made.tare(small().quiet(3, 21))
-    made.with_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
+    made.set_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
     results = made.reconstruct(small().frames(4, 1)[0])
     infos = {name: result.info for name, result in results.items()}
     for name, bound in (("c64", 1e-10), ("c", 1e-4)):

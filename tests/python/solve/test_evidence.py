@@ -64,7 +64,7 @@ def blob(*, errors: bool = True) -> bytes:
 def made(engine: str, *, errors: bool = True, **options: object) -> Reconstructor:
     content = blob(errors=errors)
     reconstructor = Reconstructor(decode_model(content, "x"), engine=engine, blob=content)
-    reconstructor.with_options(**options)
+    reconstructor.set_options(**options)
     return reconstructor
 
 
@@ -233,7 +233,7 @@ def test_row_gains_can_be_switched_after_the_tare(engine):
     reconstructor = made(engine)
     reconstructor.tare(scenes.quiet_v[0])
     for on in (0, 1, 0):
-        reconstructor.with_options(row_gains=on)
+        reconstructor.set_options(row_gains=on)
         image = reconstructor.reconstruct(scenes.frames_v[0]).image
         assert np.abs(image - expected[on]).max() <= 1e-6 * np.abs(image).max()
     assert np.abs(expected[0] - expected[1]).max() > 0.01 * np.abs(expected[1]).max()

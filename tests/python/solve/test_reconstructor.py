@@ -18,7 +18,7 @@ def made(engine: str = "c", quiet: bool = True, **options: object) -> Reconstruc
     """On the prebuilt model, tared on the session's 64 quiet frames."""
     model, blob = prebuilt()
     reconstructor = Reconstructor(model, engine=engine, blob=blob)
-    reconstructor.with_options(**options)
+    reconstructor.set_options(**options)
     if quiet:
         reconstructor.tare(session().quiet_v)
     return reconstructor
@@ -129,7 +129,7 @@ def test_too_many_bad_channels(engine):
     frame[104] = np.nan
     with pytest.raises(FrameError, match="too many channels"):
         reconstructor.reconstruct(frame)
-    reconstructor.with_options(max_masked=3)
+    reconstructor.set_options(max_masked=3)
     frame = session().frames_v[0].copy()
     frame[:4] = np.inf
     with pytest.raises(FrameError, match="too many channels"):
@@ -145,10 +145,10 @@ def test_saturated_channels_are_left_out(engine):
     damaged = frame.copy()
     damaged[[3, 50, 171]] = [limit, -limit, 3 * limit]
     assert reconstructor.reconstruct(damaged).info.outliers == 3
-    reconstructor.with_options(diagnostics=0)
+    reconstructor.set_options(diagnostics=0)
     spoilt = reconstructor.reconstruct(damaged)
     assert np.abs(spoilt.image - whole.image).max() > whole.image.max()
-    reconstructor.with_options(saturation_v=limit)
+    reconstructor.set_options(saturation_v=limit)
     saved = reconstructor.reconstruct(damaged)
     assert saved.info.masked == 3
     assert np.abs(saved.image - whole.image).max() < 0.1 * whole.image.max()
@@ -240,7 +240,7 @@ def test_bad_options_are_named_and_the_old_ones_stay(engine, changes, text):
     reconstructor = made(engine, iterations=7)
     before = reconstructor.options
     with pytest.raises(UsageError) as error:
-        reconstructor.with_options(**changes)
+        reconstructor.set_options(**changes)
     assert text in one_line(error)
     assert reconstructor.options == before
     assert reconstructor.reconstruct(session().frames_v[0]).info.iterations == 7
@@ -331,7 +331,7 @@ def test_results_do_not_change_afterwards():
 
 def test_two_reconstructors_share_nothing():
     a, b = made(), made()
-    a.with_options(sign="both", iterations=3)
+    a.set_options(sign="both", iterations=3)
     assert b.options.iterations == 60
     alone = b.reconstruct(session().frames_v[0]).image
     a.reconstruct(session().frames_v[1])
@@ -340,4 +340,4 @@ def test_two_reconstructors_share_nothing():
 
 def test_the_reference_counts_no_macs():
     with pytest.raises(UsageError, match="counts no multiply-accumulates"):
-        made("numpy", quiet=False).with_options(mac_limit=5)
+        made("numpy", quiet=False).set_options(mac_limit=5)

@@ -128,7 +128,7 @@ def test_a_resistive_change_is_a_touch_of_negative_strength():
     frame = s.linear.v0_v - s.linear.jacobian @ (0.01 * near)
     for sign, expected in (("decrease", -1), ("both", -1), ("increase", 0)):
         made = Reconstructor(model)
-        made.with_options(sign=sign)
+        made.set_options(sign=sign)
         made.tare(s.quiet(1, 16, 1e-5))
         touches = made.reconstruct(frame).touches
         if expected:

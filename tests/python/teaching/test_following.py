@@ -65,7 +65,7 @@ def test_drift_between_presses_does_no_harm(model):
     assert core.options.reference_frames == 512  # taught models ask for it
     late = {}
     for frames in (0, 2):
-        core.with_options(reference_frames=frames)
+        core.set_options(reference_frames=frames)
         late[frames] = np.median(errors_mm(core)[-30:])
     assert late[2] < 5 < 10 < late[0]
 
@@ -96,7 +96,7 @@ def test_a_resting_hand_does_not_fade_while_the_sheet_dries(model):
     one, core, worst = presses(1, seed=5), Reconstructor(model), {}
     untouched, press = one.untouched[0], one.difference[0]
     for frames in (0, TIME):
-        core.with_options(reference_frames=frames)
+        core.set_options(reference_frames=frames)
         core.forget()
         core.tare(untouched + noise(16, 1))
         for frame in untouched + noise(2 * TIME, 2):
@@ -122,7 +122,7 @@ def test_the_librarys_resting_hand_does_not_fade():
     scene = replace(find_scene("resting_hand"), rate_hz=1 / 16, frames=50, elements=1000)
     frames, time_s, worst = run_scene(scene), 16 * np.arange(scene.frames), {}
     for constant in (0, 4):
-        core.with_options(reference_frames=constant)
+        core.set_options(reference_frames=constant)
         core.tare(frames.reference_voltage_v)
         force = np.array([strength(core.reconstruct(frame)) for frame in frames.voltage_v])
         assert not force[time_s < 120].any() and (constant == 0 or not force[time_s > 724].any())
@@ -136,7 +136,7 @@ def test_a_slow_light_touch_is_not_taken_for_drift(model, share, grows):
     """It grows for so many time constants, and is as strong in the end as one that came at once;
     nothing is left behind when it lifts."""
     one, core = presses(1, seed=5), Reconstructor(model)
-    core.with_options(reference_frames=TIME)
+    core.set_options(reference_frames=TIME)
     in_the_end = []
     for frames in (1, grows * TIME):
         core.tare(one.untouched[0] + noise(16, 1))

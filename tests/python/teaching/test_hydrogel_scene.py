@@ -36,7 +36,7 @@ def pressed(place_mm: np.ndarray) -> Presses:
 def by_physics(model: Model, judged: Presses, sign: str) -> tuple[np.ndarray, np.ndarray]:
     """Errors (n,) mm of the strongest touch, and numbers of touches (n,)."""
     core, found = Reconstructor(model), []
-    core.with_options(sign=sign)
+    core.set_options(sign=sign)
     for i in range(len(judged)):
         core.forget()
         core.tare(judged.untouched[i])

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from eitskin.device.live_frames import LiveFrame
-from eitskin.device.wire.packets import Solved, SolvedImage
+from eitskin.device.wire.packets import Solved
 from eitskin.scene.random_touches import TrueTouch
-from eitskin.scoring.stream_check import ComparedFrame
+from eitskin.session.frame import Frame
 from eitskin.view.stream_picture import MAX_KEPT, MAX_PANELS, Album, draw_stream
 from small_models import prebuilt
 
@@ -16,11 +15,11 @@ SOLVED = Solved(
 )
 
 
-def seen(number: int) -> ComparedFrame:
+def seen(number: int) -> Frame:
     values = np.zeros(812, dtype=np.float32)
     values[number % 812] = 1.0
-    frame = LiveFrame(number, 1000 * number, 0, image=SolvedImage(SOLVED, values))
-    return ComparedFrame(frame, true=(TrueTouch(0.0, 0.0, 9.0, 5.0),))
+    true = (TrueTouch(0.0, 0.0, 9.0, 5.0),)
+    return Frame(number, 1000 * number, 0, image=values, info=SOLVED, true=true)
 
 
 def album(count: int) -> Album:
@@ -37,9 +36,16 @@ def test_pictures(count, tmp_path):
     assert path.read_bytes()[:8] == PNG and path.stat().st_size > 5000
 
 
+def test_panels_are_spread_evenly_with_both_ends():
+    kept = album(100)
+    numbers = [one.number for one in kept.spread()]
+    assert len(numbers) == MAX_PANELS and (numbers[0], numbers[-1]) == (0, 99)
+    assert [one.number for one in album(3).spread()] == [0, 1, 2]
+
+
 def test_a_long_stream_is_thinned_and_its_last_frame_kept():
     long = album(5 * MAX_KEPT + 3)
-    numbers = [one.frame.number for one in long.spread()]
+    numbers = [one.number for one in long.spread()]
     assert len(numbers) == MAX_PANELS and numbers[0] == 0 and numbers[-1] == 5 * MAX_KEPT + 2
     assert len(long._kept) < MAX_KEPT and long.count == 5 * MAX_KEPT + 3
     steps = np.diff(numbers)

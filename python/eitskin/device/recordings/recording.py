@@ -14,17 +14,14 @@ from typing import Any
 from eitskin import __version__
 from eitskin.core.results import Options, check_options
 from eitskin.device.client import Device
-from eitskin.device.known_model import find_model, scanned_protocol
-from eitskin.device.live_frames import follow
 from eitskin.device.recordings.new_file import RecordingFile
-from eitskin.device.recordings.raw_frames import as_frames, gather
+from eitskin.device.transport import Capabilities, SimulatedScene, Transport
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import LINK_VERSION, PacketType, Stream
 from eitskin.device.wire.packets import BoardHashes
 from eitskin.device.wire.payloads import pack
-from eitskin.errors import DeviceError, EitskinError, FileError, FrameError
+from eitskin.errors import DeviceError, EitskinError, FileError
 from eitskin.fileio import parse_json
-from eitskin.frames.frames import Frames
 
 FORMAT = "eits"
 VERSION = 1
@@ -54,7 +51,7 @@ class Recorder:
     ) -> None:
         self.path, self._device = Path(path), device
         self.packets = self.bytes = 0
-        info = device.board if device.transport.replays else device.info()
+        info = device.board if device.transport.capabilities.replays else device.info()
         head = {
             "format": FORMAT,
             "version": VERSION,
@@ -101,7 +98,7 @@ class Recorder:
         self._file.sync_now_and_then()
 
 
-class FileTransport:
+class FileTransport(Transport):
     """A recording in place of a board: its bytes, and nothing to be asked.
 
     Raises:
@@ -109,15 +106,22 @@ class FileTransport:
         DeviceError: it is of a newer version.
     """
 
-    synchronous = True
-    replays = True
-
     def __init__(self, path: str | Path) -> None:
         self.url, self.name = f"file:{path}", str(path)
         self.head = read_head(path)
-        self.hashes = _noted_hashes(self.head.get("sha256"))
+        scene = _noted_scene(str(self.head.get("url", "")))
+        self._capabilities = Capabilities(own_clock=True, replays=True, scene=scene)
+        self._hashes = _noted_hashes(self.head.get("sha256"))
         self._file = Path(path).open("rb")  # noqa: SIM115 -- open as long as the device is
         self.ended = False
+
+    @property
+    def capabilities(self) -> Capabilities:
+        return self._capabilities
+
+    @property
+    def known_hashes(self) -> BoardHashes:
+        return self._hashes
 
     def read(self, timeout_s: float) -> bytes:
         """The next bytes; at the end once a zero, so that a packet cut short is counted."""
@@ -135,19 +139,13 @@ class FileTransport:
     def write(self, data: bytes) -> None:
         raise DeviceError(f"{self.name} is a recording and takes no commands")
 
-    def reopen(self) -> bool:
-        return False
-
-    def begin_scene(self) -> None:
-        """What was touched was touched."""
-
     def close(self) -> None:
         self.ended = True
         self._file.close()
 
 
 def read_head(path: str | Path) -> dict[str, Any]:
-    """What the recording in ``path`` says of itself."""
+    """The head of the recording in ``path``."""
     try:
         with Path(path).open("rb") as stream:
             data = stream.read(MAX_HEAD)
@@ -192,36 +190,22 @@ def read_head(path: str | Path) -> dict[str, Any]:
     return head
 
 
+def _noted_scene(url: str) -> SimulatedScene | None:
+    """The scene before the recorded board; None where the skin was real."""
+    scheme, _, name = url.partition(":")
+    if scheme not in ("sim", "emu"):
+        return None
+    return SimulatedScene(name, held=scheme == "emu", recorded=True)
+
+
 def _noted_hashes(noted: Any) -> BoardHashes:
-    """What the head says, zero where it says nothing that can be."""
+    """The hashes that the head notes; zero where it notes none, or no hash."""
     values = []
     for name in ("model", "firmware"):
         text = str(noted.get(name)) if isinstance(noted, dict) else ""
         known = re.fullmatch("[0-9a-f]{64}", text) is not None
         values.append(bytes.fromhex(text) if known else bytes(32))
     return BoardHashes(0, *values)
-
-
-def frames_of(path: str | Path, model: Path | None = None) -> Frames:
-    """The raw frames of a recording as frames, the quiet ones of its last tare as their reference;
-    rows that were masked or could not be measured are NaN. ``model``: the board's, where its
-    protocol is none of the usual.
-
-    Raises:
-        FileError, DeviceError: it cannot be read, or the model is another.
-        FrameError: no raw frames were recorded, or no quiet ones.
-    """
-    with Device(FileTransport(path)) as device:
-        name = str(path)
-        known = find_model(device.board, model, name)
-        protocol = scanned_protocol(device.board, known, name)
-        run = gather(follow(device, Stream.RAW))
-        if not run.frames:
-            raise FrameError(
-                f"{name}: holds no raw frames; record with raw streaming (eitskin record does by"
-                " default)"
-            )
-        return as_frames(run.quiet, run.frames, protocol, device.board, known, allow_nonfinite=True)
 
 
 def recorded_options(path: str | Path) -> Options | None:

@@ -10,9 +10,9 @@ import numpy as np
 
 from eitskin.arrays import AnyArray, FloatArray
 from eitskin.scoring import metrics
-from eitskin.scoring.image_touches import touches_in_image
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
+from eitskin.solve.image_touches import touches_in_image
 from eitskin_studies.compare.families import FindsTouches, Learns, Method, Setup, setup_for
 from eitskin_studies.experiments.algorithms.candidates import Candidate, macs_of
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, SHOWN, shown_set, touch_set

@@ -94,7 +94,7 @@ def _scored(
     span_v = how.adc_headroom * float(np.abs(quiet).max())
     lsb_v = 2 * span_v / 2 ** (how.adc_bits or 12)
     converter = (noise_deviation_v(quiet, SNR_DB), lsb_v, span_v, seed)
-    finder.with_options(noise_floor_v=lsb_v / 12**0.5)
+    finder.set_options(noise_floor_v=lsb_v / 12**0.5)
     finder.tare(measure(np.tile(quiet, (64, 1)), *converter, "quiet deformation")[0])
     frames = measure(solved["frames"], *converter, "frame deformation")[0]
     nothing = measure(np.tile(solved["quiet"], (UNTOUCHED, 1)), *converter, "untouched")[0]

@@ -12,8 +12,8 @@ from eitskin.errors import FrameError
 from eitskin.model.build import BuildSettings
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
-from eitskin.scoring.image_touches import touches_in_image
 from eitskin.solve.batch import Batch
+from eitskin.solve.image_touches import touches_in_image
 from eitskin_studies.compare.families import Family, Method
 from eitskin_studies.harness.sessions import MeasuredFrames
 from eitskin_studies.harness.thresholds import best_touch_threshold, match_all

@@ -46,7 +46,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     settings = workspace.settings
     model, blob = load_prebuilt()
     finder, bare = (CoreFinder(Reconstructor(model, blob=blob)) for _ in range(2))
-    bare.solver.with_options(**BARE)
+    bare.solver.set_options(**BARE)
     factory = WorldFactory(model.skin, model.protocol, workspace.folder / "frames")
     count, seed = settings.count(USUAL), settings.seed
     facts = {"model": hashlib.sha256(blob).hexdigest()[:16], "scenes": count, "family": FAMILY}

@@ -12,8 +12,8 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.fem.grid import Grid
 from eitskin.frames.frames import Frames
 from eitskin.scoring import metrics
-from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import Matching
+from eitskin.solve.image_touches import touches_in_image
 from eitskin_studies.experiments.tank.imagers import Entry, Imager, Shown
 from eitskin_studies.experiments.tank.scenes import Set
 from eitskin_studies.experiments.tank.signed_scores import (

@@ -167,13 +167,13 @@ class CoreImager:
         blur = tank.kernel(levers.blur)
         self._paint = (blur / blur.sum(axis=1, keepdims=True)) @ tank.kernel(levers.atom)
         self._solver = Reconstructor(tank.model(levers.kind, levers.regularisation, levers.atom))
-        self._solver.with_options(
+        self._solver.set_options(
             iterations=levers.iterations, lambda_rel=levers.lambda_rel, **(options or {})
         )
 
     def show(self, quiet_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
         """As :class:`Imager`."""
-        self._solver.with_options(sign="both" if signed else "increase")
+        self._solver.set_options(sign="both" if signed else "increase")
         self._solver.tare(quiet_v)
         results = []
         for frame in frames_v:

@@ -7,8 +7,8 @@ import numpy as np
 from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.scene.streams import stream
 from eitskin.scoring import metrics
-from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.matching import Matching, match
+from eitskin.solve.image_touches import touches_in_image
 from eitskin_studies.harness.thresholds import THRESHOLDS
 
 

@@ -247,7 +247,7 @@ def _one_tare(model: Model, presses: Presses, frames: int) -> float:
     """Median error of the last presses after one tare, before the 400 that follow the first 100;
     ``frames``: the reference's time constant, two a press."""
     core, error = Reconstructor(model), []
-    core.with_options(reference_frames=frames)
+    core.set_options(reference_frames=frames)
     core.tare(presses.untouched[100 - TARE : 100])
     for i in range(100, len(presses)):
         core.reconstruct(presses.untouched[i])

@@ -1,0 +1,168 @@
+#include "app/acquire/acquire.h"
+
+#include "app/acquire/state.h"
+#include "app/clock.h"
+#include "app/safety/current_enable.h"
+#include "app/safety/faults.h"
+
+void fw_acquire_init(fw_acquire *acquire, const fw_board *board, fw_safety *safety)
+{
+    *acquire = (fw_acquire){.board = board, .safety = safety, .settings = FW_SCAN_DEFAULT};
+    acquire->settings.frame_period_us = board->frame_period_us;
+    fw_ad9833_init(&acquire->generator, board->generator);
+    fw_scan_init(&acquire->scan, board, &acquire->demodulator);
+}
+
+const fw_scan_settings *fw_acquire_settings(const fw_acquire *acquire)
+{
+    return &acquire->settings;
+}
+
+fw_status fw_acquire_set(fw_acquire *acquire, const fw_scan_settings *settings)
+{
+    (void)fw_scan_stop(&acquire->scan);
+    const fw_status status = fw_scan_configure(&acquire->scan, settings);
+    if (status == FW_OK)
+        acquire->settings = *settings;
+    return status;
+}
+
+uint64_t fw_acquire_min_period_us(const fw_scan_settings *settings, const fw_scan_table *table)
+{
+    return (uint64_t)fw_scan_rows(settings, table) * fw_slot_us(settings);
+}
+
+void fw_acquire_fit_period(fw_acquire *acquire, const fw_scan_table *table)
+{
+    fw_scan_settings *settings = &acquire->settings;
+    if (!acquire->board->frames_given &&
+        settings->frame_period_us < fw_acquire_min_period_us(settings, table))
+        settings->frame_period_us = 0;
+}
+
+float fw_acquire_noise_floor_v(const fw_acquire *acquire)
+{
+    const fw_scan_settings *s = &acquire->settings;
+    if (acquire->board->frames_given)
+        return 0;
+    return fw_rounding_v(fw_volts_per_code_nv(&acquire->board->capture), s->excitation_millihz,
+                         s->sample_rate_hz, s->samples);
+}
+
+fw_status fw_acquire_stop(fw_acquire *acquire)
+{
+    return fw_scan_stop(&acquire->scan);
+}
+
+/* At the tuning word that the settings ask for. A generator that has it already is left alone, so
+ * that it keeps its phase. */
+static fw_status start_generator(fw_acquire *acquire, bool *new_phase)
+{
+    fw_ad9833 *generator = &acquire->generator;
+    const uint32_t tuning =
+        fw_ad9833_tuning(acquire->board->mclk_hz, acquire->settings.excitation_millihz);
+    *new_phase = generator->state != FW_AD9833_RUNNING || generator->tuning != tuning;
+    return *new_phase ? fw_ad9833_start(generator, tuning, 0, FW_SINE) : FW_OK;
+}
+
+static fw_status stop_generator(fw_acquire *acquire)
+{
+    fw_ad9833 *generator = &acquire->generator;
+    return generator->state == FW_AD9833_RESET ? FW_OK : fw_ad9833_stop(generator);
+}
+
+static fw_status start_scan(fw_acquire *acquire, const fw_scan_table *table, fw_frame *frames)
+{
+    const fw_board *board = acquire->board;
+    const fw_scan_settings *s = &acquire->settings;
+    const fw_status status = fw_demodulate_setup(
+        &acquire->demodulator, &board->capture, board->mclk_hz, acquire->generator.tuning,
+        s->excitation_millihz, s->sample_rate_hz, s->samples);
+    return status == FW_OK ? fw_scan_start(&acquire->scan, s, table, frames) : status;
+}
+
+fw_started fw_acquire_start(fw_acquire *acquire, fw_status stopped, const fw_scan_table *table,
+                            fw_frame *frames)
+{
+    fw_started started = {.status = stopped};
+    /* multiplexers that may be closed must not meet a running generator */
+    const bool wanted = stopped == FW_OK && table != NULL && fw_current_allowed(acquire->safety);
+    acquire->tried_us = fw_now_us(acquire->board);
+    const fw_status generator =
+        wanted ? start_generator(acquire, &started.new_phase) : stop_generator(acquire);
+    if (stopped == FW_OK)
+        started.status = generator;
+    bool bus = started.status != FW_OK;
+    if (!bus && wanted) {
+        started.status = start_scan(acquire, table, frames);
+        bus = started.status == FW_E_BUS;
+    }
+    fw_fault_set(acquire->safety, EITS_FAULT_BUS, bus, (fw_fault_detail){0});
+    if (started.status != FW_OK && !bus) /* the next frame clears it */
+        fw_fault_set(acquire->safety, EITS_FAULT_SCAN_STALLED, true, (fw_fault_detail){0});
+    return started;
+}
+
+bool fw_acquire_running(const fw_acquire *acquire)
+{
+    return acquire->scan.running;
+}
+
+bool fw_acquire_stalled(fw_acquire *acquire)
+{
+    return fw_scan_stalled(&acquire->scan, fw_now_us(acquire->board));
+}
+
+bool fw_acquire_retry_due(const fw_acquire *acquire)
+{
+    return !acquire->scan.running && fw_current_allowed(acquire->safety) &&
+           fw_now_us(acquire->board) - acquire->tried_us > FW_RETRY_US;
+}
+
+void fw_acquire_shut_down(fw_acquire *acquire)
+{
+    (void)fw_scan_stop(&acquire->scan);
+    (void)fw_ad9833_stop(&acquire->generator);
+}
+
+fw_frame *fw_acquire_take(fw_acquire *acquire)
+{
+    return fw_scan_take(&acquire->scan);
+}
+
+void fw_acquire_release(fw_acquire *acquire)
+{
+    fw_scan_release(&acquire->scan);
+}
+
+void fw_acquire_report_drives(fw_acquire *acquire, void (*done)(void *user), void *user)
+{
+    acquire->scan.user = user;
+    acquire->scan.newest = done != NULL;
+    acquire->scan.drive_done = done;
+}
+
+const fw_scan_drive *fw_acquire_next_drive(const fw_acquire *acquire)
+{
+    return fw_scan_next_drive(&acquire->scan);
+}
+
+void fw_acquire_take_drive(fw_acquire *acquire)
+{
+    fw_scan_take_drive(&acquire->scan);
+}
+
+uint32_t fw_acquire_row_at(const fw_acquire *acquire, uint32_t position)
+{
+    return fw_scan_row_at(&acquire->scan, position);
+}
+
+uint32_t fw_acquire_frames_scanned(const fw_acquire *acquire)
+{
+    return acquire->scan.frames_scanned;
+}
+
+uint32_t fw_acquire_slots_repeated(const fw_acquire *acquire)
+{
+    return acquire->scan.slots_repeated;
+}

@@ -1,0 +1,26 @@
+/* The owner's settings, and what only the owner may do. */
+#ifndef FW_OWNER_H
+#define FW_OWNER_H
+
+#include "eitskin/link.h"
+#include "hal/hal.h"
+
+typedef struct fw_safety fw_safety;
+
+/* The settings in use: bits of eits_setting. */
+uint32_t fw_owner_settings(const fw_safety *safety);
+
+/* Whether current may flow without a host. */
+bool fw_owner_keeps_current(const fw_safety *safety);
+
+/* The owner's own limit of the current, rms; 0: the owner has set none. */
+uint32_t fw_owner_current_limit_ua(const fw_safety *safety);
+
+/* Whether the board is locked and the owner does not hold its button; raises LOCKED then. `command`
+ * is what the host asked for. */
+bool fw_owner_refuses(fw_safety *safety, eits_packet_type command);
+
+/* Store new settings and use them. Errors: as fw_owner_record_save. */
+fw_status fw_owner_save(fw_safety *safety, uint32_t settings, uint32_t current_limit_ua_rms);
+
+#endif

@@ -1,0 +1,191 @@
+"""What a page may ask for. Whatever needs the board goes through its session (``Session.ask``), so
+that each command gets an answer; may be called from any thread."""
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from datetime import datetime
+from typing import Any, TypeVar
+
+from eitskin.device.client import TARE_FRAMES, Device
+from eitskin.device.known_model import KnownModel
+from eitskin.device.recordings.recording import Recorder
+from eitskin.device.timing import read_speed
+from eitskin.device.wire.link_table import Stream
+from eitskin.errors import EitskinError, UsageError
+from eitskin.model.eitm import decode_model
+from eitskin.page.reader import SessionReader
+from eitskin.session.session import Session
+from eitskin.session.set_up import take_reference
+from eitskin.session.settings import KINDS
+from eitskin.tuning.front import preset
+
+T = TypeVar("T")
+Answer = Future[str] | str
+
+
+class PageCommands:
+    """Commands for the session of ``reader``. Each answers with a line, or raises an EitskinError;
+    a Future gives either later."""
+
+    def __init__(self, reader: SessionReader) -> None:
+        self._reader = reader
+
+    def do(self, what: object, value: object) -> Answer:
+        """What a page's message asks for."""
+        if what in ("play", "pause", "step"):
+            return self.pace(str(what))
+        if what == "speed":
+            return self.pace("speed", read_speed(str(value), "speed"))
+        if what == "tare":
+            return self.tare()
+        if what == "record":
+            return self.record(value is True)
+        if what == "mode" and isinstance(value, list):
+            return self.mode([str(kind) for kind in value])
+        if what == "sign" and value in ("increase", "decrease", "both"):
+            return self.solver(sign=value)
+        if what == "preset":
+            return self.preset(str(value))
+        if what == "teach" and value in ("back", "skip", "fit"):
+            return self.teach(str(value))
+        if what == "iterations" and isinstance(value, int) and 1 <= value <= 1_000_000:
+            return self.solver(iterations=value)
+        raise UsageError(f"{what}: {value!r} cannot be")
+
+    def tare(self) -> Future[str]:
+        session = self._board("tare")
+
+        def action(device: Device) -> str:
+            take_reference(device, TARE_FRAMES, streamed=True)
+            return f"reference taken from {TARE_FRAMES} frames"
+
+        return self._changed(session, action)
+
+    def mode(self, kinds: list[str]) -> Future[str]:
+        """What is streamed."""
+        session = self._reader.live()
+        if not kinds or not set(kinds) <= set(KINDS):
+            raise UsageError(f"mode: choose from {', '.join(KINDS)}")
+        mode = Stream(0)
+        for kind in kinds:
+            mode |= Stream[kind.upper()]
+
+        def action(device: Device) -> str:
+            session.change_mode(mode)
+            return f"streaming {', '.join(kinds)}"
+
+        return self._changed(session, action)
+
+    def solver(self, **changes: Any) -> Future[str]:
+        session = self._board("the solver")
+        named = replace(session.settings.solver, **changes)
+
+        def action(device: Device) -> str:
+            session.change_solver(named)
+            return "solver: " + ", ".join(f"{k} {v}" for k, v in changes.items())
+
+        return self._changed(session, action)
+
+    def preset(self, name: str) -> Future[str]:
+        """Scan and solver by name, and the reference for them."""
+        session, target = self._board("a preset"), preset(name, "f767")
+
+        def action(device: Device) -> str:
+            session.apply(replace(session.settings, target=target))
+            take_reference(device, TARE_FRAMES, streamed=True)
+            return f"preset {name} is in use, and the reference is taken"
+
+        return self._changed(session, action)
+
+    def upload(self, blob: bytes) -> Future[str]:
+        """Another model, and the reference for it."""
+        session = self._board("a model")
+        model = decode_model(blob, "the uploaded file")
+
+        def action(device: Device) -> str:
+            device.upload_model(blob)
+            session.use_model(KnownModel(model, blob))
+            take_reference(device, TARE_FRAMES, streamed=True)
+            return f"model {device.board.model_crc:08x} is in use, and the reference is taken"
+
+        return self._changed(session, action)
+
+    def teach(self, what: str) -> Answer:
+        """ "back", "skip"; "fit": a thread of its own makes the model, then the board gets it."""
+        teacher = self._reader.teacher
+        if teacher is None:
+            raise UsageError("teach: start  eitskin view --teach PLAN.csv")
+        if what != "fit":
+            return teacher.go(what)
+        answer: Future[str] = Future()
+        answer.set_running_or_notify_cancel()  # a page that goes does not stop it
+
+        def run() -> None:
+            try:
+                blob, text = teacher.fit()
+                try:
+                    text += f"; {self.upload(blob).result()}"
+                except EitskinError as error:
+                    text += f"; the board has it not: {error}"
+                answer.set_result(text)
+            except BaseException as error:
+                answer.set_exception(error)
+
+        threading.Thread(target=run, name="eitskin teach", daemon=True).start()
+        return answer
+
+    def record(self, on: bool) -> Future[str]:
+        """Begin or end a recording in the folder."""
+        session, folder = self._board("a recording"), self._reader.folder
+
+        def action(device: Device) -> str:
+            if session.recorder is not None:
+                name, count = session.recorder.path.name, session.recorder.packets
+                session.recorder.close()
+                session.recorder = None
+                if not on:
+                    return f"recorded {count} packets in {name}"
+            if on:
+                name = f"eitskin-{datetime.now():%Y%m%d-%H%M%S}.eits"
+                session.recorder = Recorder(folder / name, device, session.solver)
+                return f"recording to {name}"
+            return "nothing is being recorded"
+
+        return self._changed(session, action)
+
+    def pace(self, what: str, speed: float | None = None) -> str:
+        """ "play", "pause", "step" or "speed"."""
+        if what == "play" and self._reader.session is None:
+            self._reader.again()
+            return "starting again"
+        session = self._reader.live()
+        if not session.timed:
+            raise UsageError(f"{session.name} is a real board; its time cannot be held")
+        pacer = session.pacer
+        if what == "speed":
+            pacer.set_speed(speed or 0.0)
+        else:
+            {"play": pacer.play, "pause": pacer.pause, "step": pacer.step}[what]()
+        self._reader.report("setup", {})
+        return {"speed": f"speed {speed or 'max'}", "play": "playing", "step": "one frame"}.get(
+            what, "paused"
+        )
+
+    def _board(self, what: str) -> Session:
+        session = self._reader.live()
+        if session.replays:
+            raise UsageError(f"{session.name} is a recording: {what} needs a board")
+        return session
+
+    def _changed(self, session: Session, action: Callable[[Device], T]) -> Future[T]:
+        """Let ``action`` be carried out, and the pages hear of what has changed."""
+
+        def run(device: Device) -> T:
+            try:
+                return action(device)
+            finally:
+                self._reader.report("setup", {})
+
+        return session.ask(run)

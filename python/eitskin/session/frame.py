@@ -1,0 +1,276 @@
+"""What a session gives to every consumer: ONE family of messages. A ``Frame``, a ``DriveReport``
+between frames, and a ``Notice`` of something beside them."""
+
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.arrays import FloatArray
+from eitskin.core.diagnostics import names, words
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.gestures import GestureEvent
+from eitskin.core.notebook import places_text, touches_html
+from eitskin.device.known_model import KnownModel
+from eitskin.device.transport import LinkEvent
+from eitskin.device.wire.explain import status_text
+from eitskin.device.wire.link_table import FollowedTouch
+from eitskin.device.wire.packets import Fault, FollowedTouches, RawFrame, Solved
+from eitskin.errors import MissingExtraError
+from eitskin.session.message import TrueTouch, frame_table, head, report_table, true_table
+from eitskin.solve.image_touches import touches_in_image
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something beside the frames. ``kind``: "fault" (the board reports one, or that it has gone),
+    "link" (a gap, an unplugged board) or "diagnostic" (frames show something wrong, or no longer);
+    ``text`` is a line. ``time_s``: of the frame before; ``time_unix_s`` as a frame's. ``cause``:
+    the packet or event that it reports; None: the frame before."""
+
+    kind: str
+    text: str
+    time_s: float | None
+    time_unix_s: float | None = None
+    cause: Fault | LinkEvent | None = field(default=None, repr=False)
+
+    def message(self) -> dict[str, Any]:
+        facts = asdict(self)
+        del facts["cause"]
+        return head("notice") | facts
+
+
+@dataclass(frozen=True, eq=False)
+class DriveReport:
+    """Touches after a drive: where they are at an instant within a scan, and where to they go.
+
+    Attributes:
+        time_us: the instant, by the clock of frames' ``time_us``.
+        board_us: the same by the board's own clock.
+        packet: as the board sent it.
+        time_unix_s: as a frame's.
+    """
+
+    time_us: int
+    board_us: int
+    packet: FollowedTouches
+    time_unix_s: float | None = None
+
+    @property
+    def time_s(self) -> float:
+        """The instant, by the clock of frames' ``time_s``."""
+        return self.time_us / 1e6
+
+    @property
+    def frame(self) -> int:
+        """The number of the frame whose scan it is in."""
+        return self.packet.head.frame
+
+    @property
+    def drive(self) -> int:
+        """Which drive it comes after."""
+        return self.packet.head.drive
+
+    @property
+    def touches(self) -> tuple[FollowedTouch, ...]:
+        """In the order in which they came: mm, mm/s; their ids are not those of frames."""
+        return self.packet.touches
+
+    def message(self) -> dict[str, Any]:
+        times = (self.time_s, self.time_unix_s)
+        message = report_table(self.frame, self.drive, *times, self.touches)
+        return message | {"board_us": self.board_us, "age_us": self.packet.head.age_us}
+
+
+@dataclass(frozen=True, eq=False)
+class ImagePeak:
+    """The pixel of an image that differs most from 0: its value in S/m, and where it is."""
+
+    value: float
+    place_mm: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What came of one frame.
+
+    Attributes:
+        number: the board's count, from 0, and again from 0 after 2^32.
+        time_us: when its scan began, from the first frame of the stream; it does not wrap.
+        board_us: the same by the board's own clock, which wraps.
+        raw: the voltages as the board sent them, each with its quality; None where they were not
+            asked for.
+        image: (n,) S/m on the model's pixels; None where it was not asked for.
+        touches: strongest first; none where touches were not asked for (``has_touches``).
+        info: what the solver reports; None where nothing was solved.
+        board_events: what the board itself made of its touches; None where it was not asked for.
+        events: what its touches amounted to: fingers down, moved and up, gestures, zones pressed.
+        known: the board's model, where the host has it.
+        time_unix_s: when it was complete on this host, in seconds since 1970 (UTC); None for what
+            was recorded.
+        arrived_ns: the same by ``time.monotonic_ns``.
+        true: the touches that were there, where an observer of a scene knows them.
+        errors_mm: how far off the found touches (without them, the image's places) are, by their
+            number; false ones are missing. None where the truth is not known.
+        notices: what was noticed since the frame before.
+    """
+
+    number: int
+    time_us: int
+    board_us: int
+    raw: RawFrame | None = None
+    image: npt.NDArray[np.float32] | None = None
+    touches: tuple[Touch, ...] = ()
+    has_touches: bool = False
+    info: Solved | None = None
+    board_events: tuple[GestureEvent, ...] | None = None
+    events: tuple[GestureEvent, ...] = ()
+    known: KnownModel | None = None
+    time_unix_s: float | None = None
+    arrived_ns: int = 0
+    true: tuple[TrueTouch, ...] | None = None
+    errors_mm: dict[int, float] | None = None
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def time_s(self) -> float:
+        """When its scan began, by the board's clock, from the first frame of the stream."""
+        return self.time_us / 1e6
+
+    @property
+    def voltage_v(self) -> npt.NDArray[np.float32] | None:
+        """(m,) V, NaN for rows that cannot be used; None where it was not asked for."""
+        return None if self.raw is None else self.raw.voltage_v
+
+    @property
+    def untouched(self) -> bool:
+        """It is a frame of a tare."""
+        return self.raw is not None and self.raw.quiet
+
+    @property
+    def refused(self) -> str | None:
+        """Why the board's core refused the frame; None where it did not."""
+        info = self.info
+        return status_text(info.status) if info is not None and info.status else None
+
+    @property
+    def diagnostics(self) -> tuple[str, ...]:
+        """Names of what was found wrong with the frame."""
+        return () if self.info is None else names(self.info.diagnostics)
+
+    @property
+    def found(self) -> tuple[str, ...]:
+        """The same in a few words each."""
+        return () if self.info is None else words(self.info)
+
+    @cached_property
+    def peak(self) -> ImagePeak | None:
+        """Where the image is strongest; None without an image that was solved, or its model."""
+        if self.image is None or self.known is None or self.refused:
+            return None
+        top = int(np.argmax(np.abs(self.image)))
+        x_mm, y_mm = self.known.model.grid.centres_mm()[top]
+        return ImagePeak(float(self.image[top]), (float(x_mm), float(y_mm)))
+
+    @cached_property
+    def places_mm(self) -> FloatArray | None:
+        """Centroids (k, 2) of what stands out of the image, strongest first (``image_touches``, at
+        the model's threshold for touches); None as ``peak``, or where scipy is not installed."""
+        if self.peak is None or self.known is None:
+            return None
+        if self.peak.value == 0:
+            return np.zeros((0, 2))
+        model = self.known.model
+        threshold, sign = model.defaults.touch_threshold, 1 if self.peak.value > 0 else -1
+        values, centres = np.asarray(self.image, np.float64), model.grid.centres_mm()
+        try:
+            return touches_in_image(values, model.grid.index, centres, threshold, sign)
+        except MissingExtraError:
+            return None
+
+    @property
+    def found_mm(self) -> FloatArray | None:
+        """Places (k, 2) of the touches, without them those in the image; None where the frame has
+        neither."""
+        if not self.has_touches:
+            return self.places_mm
+        return np.array([(t.x_mm, t.y_mm) for t in self.touches], dtype=np.float64).reshape(-1, 2)
+
+    def message(self, *, arrays: bool = True) -> dict[str, Any]:
+        """For programs (docs/reference/message.md); without ``arrays`` image and raw voltages are
+        left out."""
+        message = frame_table(
+            self.number,
+            time_s=self.time_s,
+            time_unix_s=self.time_unix_s,
+            touches=self.touches if self.has_touches else None,
+            diagnostics=self.diagnostics,
+            found=self.found,
+            refused=self.refused,
+            events=[event.as_dict() | {"time_s": self.time_s} for event in self.events],
+            info=None if self.info is None else self.info.as_dict(),
+        )
+        message["board_us"] = self.board_us
+        if arrays:
+            message |= self._image_facts() | self._raw_facts()
+        return message | self._truth_facts(message)
+
+    def _image_facts(self) -> dict[str, Any]:
+        if self.image is None:
+            return {}
+        facts: dict[str, Any] = {"image_s_per_m": self.image.tolist()}
+        facts |= {"peak_s_per_m": None, "peak_mm": None, "places": None}
+        if self.peak is not None:
+            facts |= {"peak_s_per_m": self.peak.value, "peak_mm": list(self.peak.place_mm)}
+        if self.places_mm is not None:
+            facts["places"] = [{"x_mm": x, "y_mm": y} for x, y in self.places_mm.tolist()]
+        return facts
+
+    def _raw_facts(self) -> dict[str, Any]:
+        raw = self.raw
+        if raw is None:
+            return {}
+        return {
+            "voltage_v": [v if np.isfinite(v) else None for v in raw.voltage_v.tolist()],
+            "quality": raw.quality.tolist(),
+            "scan_us": raw.scan_us,
+            "quiet": raw.quiet,
+        }
+
+    def _truth_facts(self, message: dict[str, Any]) -> dict[str, Any]:
+        """The true touches; and how far off each found one is, null for a false one."""
+        if self.true is None:
+            return {}
+        found = message["touches"] if message["touches"] is not None else message.get("places")
+        for number, one in enumerate(found or ()):
+            one["error_mm"] = (self.errors_mm or {}).get(number)
+        return {"true": [true_table(t) for t in self.true]}
+
+    def __repr__(self) -> str:
+        parts = (("image", self.image), ("raw", self.raw))
+        shown = (
+            f"refused: {self.refused}"
+            if self.refused
+            else f"touches: {places_text(self.touches)}"
+            if self.has_touches
+            else ", ".join(name for name, part in parts if part is not None)
+        )
+        return f"<Frame {self.number} at {self.time_s:.3f} s, {shown}>"
+
+    def _repr_html_(self) -> str:
+        return touches_html(f"frame {self.number}, {self.time_s:.3f} s", self.touches)
+
+    def _repr_png_(self) -> bytes | None:
+        """Where the model is known and matplotlib is installed."""
+        if self.known is None or find_spec("matplotlib") is None:
+            return None
+        axes = import_module("eitskin.view.touch_axes")  # of a later module, as a result's picture
+        png: bytes = axes.touches_png(self.known.model, self.touches, self.image, self.true or ())
+        return png
+
+
+Message = Frame | DriveReport | Notice

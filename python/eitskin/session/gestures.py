@@ -1,0 +1,22 @@
+"""A stream's gestures: the board's own where it sends them, else what its touches give here, by the
+same C code; named zones always here."""
+
+from collections.abc import Sequence
+
+from eitskin.core.gestures import GestureEvent, Gestures, Zone
+from eitskin.session.frame import Frame
+
+
+class StreamGestures:
+    """Takes the frames of a stream in their order."""
+
+    def __init__(self, zones: Sequence[Zone] = ()) -> None:
+        self._gestures = Gestures(zones)
+
+    def take(self, frame: Frame) -> tuple[GestureEvent, ...]:
+        """What happened in ``frame``; nothing where its touches are not known."""
+        if frame.board_events is not None:
+            return frame.board_events + tuple(self._gestures.press_zones(frame.board_events))
+        if not frame.has_touches or frame.refused is not None:
+            return ()
+        return tuple(self._gestures.update(frame.touches, frame.board_us))

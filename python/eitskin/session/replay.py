@@ -1,0 +1,43 @@
+"""A recording as a live stream would have shown it."""
+
+from dataclasses import replace
+
+from eitskin.session.frame import DriveReport, Frame, Message
+
+
+class Replay:
+    """Takes the messages of a recording in their order: leaves out the untouched frames of tares,
+    times the others from the first of them plus ``offset_us``, and keeps every ``every``-th frame.
+    """
+
+    def __init__(self, every: int = 1, offset_us: int = 0) -> None:
+        self._every, self._offset_us = every, offset_us
+        self._start_us: int | None = None
+        self._count = self._step_us = 0
+        self._last_us = offset_us
+
+    def take(self, message: Message) -> Message | None:
+        """``message`` as it is shown; None where it is not."""
+        if isinstance(message, DriveReport):
+            return replace(message, time_us=self._shown_us(message.time_us))
+        if not isinstance(message, Frame):
+            return message
+        if message.untouched:
+            return None
+        time_us = self._shown_us(message.time_us)
+        self._count += 1
+        if (self._count - 1) % self._every:
+            return None
+        self._step_us, self._last_us = time_us - self._last_us, time_us
+        return replace(message, time_us=time_us)
+
+    def _shown_us(self, time_us: int) -> int:
+        if self._start_us is None:
+            self._start_us = time_us
+        return time_us - self._start_us + self._offset_us
+
+    def again(self) -> "Replay | None":
+        """The recording once more, as if it went on; None where it showed no time that passes."""
+        if self._last_us <= self._offset_us:
+            return None
+        return Replay(self._every, self._last_us + self._step_us)

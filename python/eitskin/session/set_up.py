@@ -1,0 +1,63 @@
+"""What comes before a board's frames: scan, solver, reference, and a scene's beginning."""
+
+from eitskin.core.results import Options
+from eitskin.device.client import Device
+from eitskin.device.known_model import NAMES_IT, KnownModel
+from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
+from eitskin.device.transport import LinkEvent
+from eitskin.device.wire.link_table import Stream, StreamCommand
+from eitskin.device.wire.packets import Fault
+from eitskin.errors import DeviceError
+
+
+def set_up(
+    device: Device, scan: ScanSettings, solver: SolverSettings, known: KnownModel | None
+) -> Options | None:
+    """Set scan and solver; returns the solver's options as they now are, None where the model is
+    not known here and nothing of the solver was asked for: then they stay what they are, whatever
+    that is.
+
+    Raises:
+        UsageError: a number is out of its range.
+        DeviceError: the board refuses (it keeps what it had), or its model is not known here.
+    """
+    apply_scan(device, scan)
+    if known is None:
+        if solver.named:
+            raise DeviceError(
+                f"{device.transport.name}: changing the solver needs the defaults of the board's"
+                f" model, {device.board.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
+            )
+        return None
+    options = solver.applied(known.model, device.board)
+    device.solver(options)
+    return options
+
+
+def take_reference(device: Device, frames: int, *, streamed: bool = False) -> None:
+    """Tare; where ``streamed``, the quiet frames are sent as raw frames too, for recordings."""
+    if not streamed:
+        device.tare(frames)
+        return
+    device.send_command(StreamCommand(int(Stream.RAW)), 1.0)
+    try:
+        device.tare(frames)
+    finally:
+        device.send_command(StreamCommand(0), 1.0)
+
+
+def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
+    """Let what is to be touched begin, on a simulated board. Where the scene begins within a scan,
+    that scan, which still shows the untouched skin, is waited for. Returns the board's clock at the
+    scene's time 0 (None: it is when the next scan begins), and what was reported meanwhile.
+    """
+    events: list[Fault | LinkEvent] = []
+    began_us = device.start_scene()
+    if began_us is None:
+        return None, []
+    info = device.board
+    scan_s = 1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us)
+    while (item := device.next_item(scan_s)) is not None:
+        if isinstance(item, Fault | LinkEvent):
+            events.append(item)
+    return began_us, events

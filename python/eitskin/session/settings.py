@@ -1,0 +1,101 @@
+"""The settings of a session with a board."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from eitskin.config import nearest
+from eitskin.core.gestures import Zone
+from eitskin.device.known_model import KnownModel, need_model
+from eitskin.device.settings import ScanSettings, SolverSettings
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import BoardInfo
+from eitskin.errors import UsageError
+from eitskin.tuning.for_model import chosen_point, settings_text
+from eitskin.tuning.front import REPORT_US, Target, board_takes
+
+KINDS = ("raw", "image", "touches", "events")
+Say: TypeAlias = Callable[[str], None]
+
+
+def kinds_of(text: str, name: str) -> Stream:
+    """The kinds in "raw,touches"; ``name`` is the option that gave them."""
+    what = Stream(0)
+    for kind in text.split(","):
+        if kind not in KINDS:
+            raise UsageError(f"{name} {text}: {nearest(kind, KINDS)}")
+        what |= Stream[kind.upper()]
+    return what
+
+
+@dataclass(frozen=True)
+class SessionSettings:
+    """The settings of a session; those that are not given stay as they are on the board.
+
+    Attributes:
+        mode: what is streamed; None: all that a simulated or recorded board can send, and image
+            and touches of a real one, whose line carries fewer frames with raw voltages.
+        report: "frame", or also touches after each "drive", with their velocity.
+        every: every n-th frame; 0: as many as the line carries.
+        frames: stop after so many; 0: go on until the scene or the recording ends.
+        model: a file, where the board's model is not the prebuilt one.
+        firmware: of an emulated board.
+        model_for: what cannot do without the board's model, such as "a picture"; "": nothing.
+        tare: take the reference from so many frames; None: from 16 where that is needed.
+        zones: named places that fingers press (``eitskin.session.zones``).
+        target: a budget or an accuracy that chooses the solver's settings.
+        record: a new recording of every packet; an existing file is written over.
+        quiet_frames: the untouched frames of the reference are sent too, and their mean is kept.
+    """
+
+    mode: Stream | None = Stream.TOUCHES
+    report: str = "frame"
+    every: int = 0
+    frames: int = 0
+    model: Path | None = None
+    firmware: Path | None = None
+    model_for: str = ""
+    scan: ScanSettings = field(default_factory=ScanSettings)
+    solver: SolverSettings = field(default_factory=SolverSettings)
+    zones: tuple[Zone, ...] = ()
+    target: "Target | None" = None
+    tare: int | None = None
+    record: Path | None = None
+    quiet_frames: bool = False
+
+    def scan_and_solver(
+        self, board: BoardInfo, known: KnownModel | None, name: str, say: Say
+    ) -> tuple[ScanSettings, SolverSettings]:
+        """As named; with a target those of the measured point that it chooses for the board's
+        ``known`` model; ``name`` is the board's."""
+        scan, named, target = self.scan, self.solver, self.target
+        if target is None:
+            return scan, named
+
+        known = known or need_model(board, self.model, name, "a budget")
+        any_scan = target.unit == REPORT_US
+        now = named.applied(known.model, board)
+        point = chosen_point(target, known.model, now, board_takes(), any_scan)
+        say(settings_text(point, target.board))
+        one = point.configuration
+        kept = {k: value for k, value in one.solver_settings.items() if k in board_takes()}
+        own = {key: getattr(named, key) for key in ("sign", "warm_start", "diagnostics", "track")}
+        if any_scan:
+            check_every = 1 if one.scan == "full" else 0
+            scan = replace(scan, samples=one.samples, check_every=check_every)
+        return scan, replace(SolverSettings(**kept), **own)
+
+    def refuse_of_recording(self, name: str) -> None:
+        """A recording takes no settings."""
+        named: dict[str, Any] = {**self.scan.named, **self.solver.named}
+        if self.target is not None:
+            named["preset, budget or accuracy"] = True
+        if named or self.tare is not None:
+            what = next(iter(named), "tare").replace("_", "-")
+            raise UsageError(
+                f"{name} is a recording, {what} cannot be set any more; leave the options of"
+                " scan, solver and tare out"
+            )
+        if self.record is not None:
+            raise UsageError(f"{name} is a recording already; copy the file")
