@@ -170,7 +170,7 @@ def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch():
     known, unknown_places = report_of(quiet_only(frames)), report_of(frames, None)
     assert named(known) == []
     for report, option in ((known, "--touch X,Y"), (unknown_places, "--skin")):
-        told = [text for text in report.untold if "which way the numbers run" in text]
+        told = [text for text in report.untold if "in which direction the numbers run" in text]
         assert any(option in text for text in told)
 
 

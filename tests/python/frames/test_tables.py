@@ -73,7 +73,7 @@ def test_column_choices():
     for unknown in ("d", "a-c", "2-4", ""):
         with pytest.raises(
             UsageError,
-            match=f"'{unknown}' is no number, range a:b or a:b:step, or header name;"
+            match=f"'{unknown}' is not a number, range a:b or a:b:step, or header name;"
             " names are time, a, b, c",
         ):
             chosen(unknown, 4, names, "--columns")
