@@ -153,5 +153,5 @@ void eits_forget(eits_context *ctx)
     /* ids count on: one that a host has seen never names another finger */
     ctx->solver.warm = 0;
     ctx->tracker.count = 0;
-    eits_follow_break(ctx);
+    eits_reference_tracking_break(ctx);
 }

@@ -1,11 +1,11 @@
-"""A model's own defaults as options, and what suits a stream."""
+"""The options of the core that a model's own defaults give, and those for a stream."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from eitskin.core.constants_table import (
-    FOLLOW_FRAMES,
+    REFERENCE_TRACKING_FRAMES,
     TRACK_CONFIRM,
     TRACK_DETECTION,
     TRACK_HOLD,
@@ -13,11 +13,11 @@ from eitskin.core.constants_table import (
 )
 from eitskin.core.options_table import ALL_TOUCH_FIT, MAX_TOUCHES, OF_MODEL
 from eitskin.core.results import Options
-from eitskin.model.model import GAIN_DRIFT_KEPT, REFERENCE_FOLLOWS, Model
+from eitskin.model.model import GAIN_DRIFT_KEPT, TRACKS_REFERENCE, Model
 
 
 def default_options(model: Model) -> Options:
-    """The model's own defaults."""
+    """Return the options that the model's own defaults give."""
     d = model.defaults
     return Options(
         **{name: getattr(d, name) for name in OF_MODEL},
@@ -25,15 +25,17 @@ def default_options(model: Model) -> Options:
         max_masked=model.protocol.n_rows // 2,
         touch_fit=ALL_TOUCH_FIT & ~d.touch_fit_left_out,
         project_reference=not d.touch_fit_left_out & GAIN_DRIFT_KEPT,
-        reference_frames=FOLLOW_FRAMES if d.touch_fit_left_out & REFERENCE_FOLLOWS else 0,
+        reference_frames=REFERENCE_TRACKING_FRAMES
+        if d.touch_fit_left_out & TRACKS_REFERENCE
+        else 0,
         touch_seek=bool(d.touch_fit_left_out & GAIN_DRIFT_KEPT),
     )
 
 
 def tracking(options: Options) -> Options:
-    """``options``, of :func:`default_options`, for frames that follow one another: as
-    eits_options_track in the C core sets them, to the bit in float32. docs/guide/tracking.md says
-    what that is worth."""
+    """Return ``options``, from :func:`default_options`, for consecutive frames. The result equals
+    that of eits_options_track in the C core, bit by bit in float32. docs/guide/tracking.md shows
+    the gain."""
     detection_factor = float(np.float32(options.detection_factor) * np.float32(TRACK_DETECTION))
     return replace(
         options,

@@ -12,10 +12,10 @@ import numpy as np
 from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.constants_table import (
     BASIS_TOLERANCE,
-    FAR_REGULARISATION,
     FINAL_RADIUS,
     INTERACTION_MAX,
     MAX_OF_NOISE,
+    MAX_REGULARISATION,
     MIN_REFERENCE_FRAMES,
     MIN_SQUARE,
     NOISE_ROUNDING,
@@ -206,7 +206,7 @@ class OracleEngine:
         self, ref: Reference, folded: Folded, unusable: BoolArray, found: Found
     ) -> Explained:
         asked = self.options.regularisation_noise_factor * ref.noise_v / ref.rms_v
-        asked = max(asked, FAR_REGULARISATION if ref.far else 0.0)
+        asked = max(asked, MAX_REGULARISATION if ref.far else 0.0)
         white = whitening(self.model, folded.known, asked)
         directions, drift = white.ignored, self._drift(ref, folded)
         if drift is not None:

@@ -9,7 +9,6 @@ from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.core.constants_table import (
     CROWD_CLEAR,
     CROWD_CLEAREST,
-    CROWD_ELECTRODES,
     CROWD_FAINT,
     CROWD_FAR,
     CROWD_LEFT,
@@ -330,7 +329,7 @@ def crowded(
     if weakest < clear**2 * unexplained:
         clear = float(np.sqrt(weakest / unexplained))
     score = CROWD_OFFSET
-    score += CROWD_TOUCHES * CROWD_ELECTRODES * len(touches) / model.protocol.n_electrodes
+    score += CROWD_TOUCHES * len(touches) / model.protocol.n_electrodes
     score += CROWD_NEAREST * min([CROWD_FAR, *apart])
     score += CROWD_WIDEST * max(t.radius_mm for t in touches) / options.touch_seed_radius_mm
     score += CROWD_LEFT * np.sqrt(unexplained) + CROWD_CLEAREST * clear

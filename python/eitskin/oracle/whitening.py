@@ -14,7 +14,6 @@ from eitskin.core.constants_table import (
     MIN_REGULARISATION,
     MIN_REGULARISATION_FRACTION,
     NOISE_POWER,
-    REGULARISATION_KEPT,
     REST_POWER,
     STEP_MARGIN,
 )
@@ -69,7 +68,7 @@ def _of_physics(model: Model, known: BoolArray, asked: float) -> Whitening:
     on the range of J_o, scaled so that the strongest direction keeps its weight."""
     assert model.row_form is not None
     mu = model.row_form.mu
-    of_all = asked if asked > REGULARISATION_KEPT * mu else mu
+    of_all = max(asked, mu)
     none = np.zeros((model.rank, 0))
     if of_all == mu and known.all():
         return Whitening(model.projection.astype(float), model.sensitivity, mu, 1.0, none)
